@@ -24,7 +24,7 @@ from mcml_sim import Grid, Orders, simulate_orders
 from profilefit.fitting.chains import posterior
 from profilefit.fitting.discrepancy import discrepancy
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("burley-whole", "liang-whole", "hazard")
@@ -38,7 +38,7 @@ def table(name: str, batches: int, photons: int, chain: int) -> list[tuple[str, 
     grid = Grid.from_edges(r=ring_edges(chosen.rings))
     runs = [simulate_orders(grid, photons, SEED + batch, chosen.setting, progress=False) for batch in range(batches)]
     profiles = Profiles.from_orders(whole(runs), albedo_values(chosen.albedos, chosen.setting))
-    one = fitted(chosen, inventory.find(name, catalogue.fits_folder()).law, profiles, jackknife=True)
+    one = fitted(chosen, catalogue.find(name, catalogue.fits_folder()).law, profiles, jackknife=True)
     if one.statistical is None:
         raise RuntimeError("profiles of photons have a covariance")
     errors = {

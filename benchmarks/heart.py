@@ -24,8 +24,8 @@ from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
 from benchmarks.table import show
 from mcml_sim.files.text_file import read_toml
 from profilefit.recipes.folder import shipped
-from profilefit.recipes.stack.gaussians import alike
-from profilefit.recipes.stack.record import request_of
+from profilefit.recipes.kinds import stack
+from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.heart import chart, scene, trials
 from profilefit.scenes.heart.fit import GRID, Errors, SplitLight, errors, fitted
 from profilefit.scenes.heart.law import Kernel, crossover_of
@@ -55,9 +55,9 @@ def kernels() -> list[Kernel]:
     """Return kernels of the stacks, in diffuse light."""
     found = []
     for name in STACKS:
-        media = request_of(name).stack.media
+        media = stack.request(name).stack.media
         units = [medium.layers[0].similar.mfp for medium in media]
-        found.append(kernel_of(alike(media, "diffuse", COUNT), units))
+        found.append(kernel_of(shared_gaussians(media, "diffuse", COUNT), units))
     return found
 
 

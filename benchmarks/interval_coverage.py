@@ -30,7 +30,7 @@ from profilefit.fitting.discrepancy import predicted
 from profilefit.fitting.estimate import Fit, ResidualFunction, fit
 from profilefit.fitting.objectives import EVERYWHERE, Rings
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.targets import albedo_values, ring_edges
 
@@ -70,7 +70,7 @@ def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
     edges = ring_edges(chosen.rings)
     light = simulate_orders(Grid.from_edges(r=edges), photons, SEED, chosen.setting, progress=False)
     run = Profiles.from_orders(light, albedo_values(chosen.albedos, chosen.setting))
-    law = inventory.find(name, catalogue.fits_folder()).law
+    law = catalogue.find(name, catalogue.fits_folder()).law
     for truth, profiles in (("known", _of_law(chosen, law, run)), ("exact", _exact(run))):
         closed = profiles.covariance
         if closed is None:

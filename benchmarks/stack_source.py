@@ -27,8 +27,8 @@ from mcml_sim import Medium
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.stack.record import FOLDER, StackRecord, load
+from profilefit.recipes.folder import STACKS, fits_folder
+from profilefit.recipes.kinds.stack import StackRecord, load
 from profilefit.shader.check.law_cost import Cost, TimedText, text_costs, timed_text
 from profilefit.shader.check.shader_law import PROFILE, _Pass
 from profilefit.shader.context import opened, renderer
@@ -135,7 +135,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--fits", type=Path, default=fits_folder(), metavar="FOLDER", help="of the records")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
     given = parser.parse_args(arguments)
-    folder = given.fits / FOLDER
+    folder = given.fits / STACKS
     records = [load(path) for path in record.available(folder).values()]
     if not records:
         print(f"{folder} has no record of a stack: `profilefit regenerate STACK.toml` makes one")

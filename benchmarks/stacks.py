@@ -28,9 +28,9 @@ from benchmarks.table import show
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.laws.gaussians import MOST
 from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.recipes.kinds.stack import NEAR_TRACED, of_rings
 from profilefit.recipes.stack import gaussians, photons
 from profilefit.recipes.stack.fit import stack_law
-from profilefit.recipes.stack.quality import NEAR_TRACED, of_rings
 
 LIGHTS = ("searchlight", "diffuse")
 THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]

@@ -13,8 +13,7 @@ from mcml_sim.cli.lazy import interruptible
 from mcml_sim.cli.program import one_line
 from profilefit.cli import options
 from profilefit.cli.fit_layers import fit_of_layers
-from profilefit.cli.folders import records_folder
-from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
@@ -184,14 +183,14 @@ def _of_phase(
         from mcml_sim.files.text_file import as_json as json_text
         from mcml_sim.files.whole_file import require_folder, write_whole
         from mcml_sim.runs.progress import working
+        from profilefit.recipes.kinds.phase import content, fits_of, request
         from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.phases.fit import ALL_ANGLES
-        from profilefit.recipes.phases.record import content, fits_of, table_of
         from profilefit.report.tables.phase_table import phase_tables, premise_lines
 
     accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}
     options.require_left_out(context, (name for name in context.params if name not in accepted), f"--kind is {PHASE}")
-    table = read_phase(table_of(str(data)) or data)
+    table = read_phase(request(str(data)) or data)
     if out is not None:
         require_folder(out, "fit.json")
     with working("fitting", quiet):

@@ -1,4 +1,4 @@
-"""Options that several subcommands have, and the words that a shell completes: names of laws, maps, records, recipes.
+"""Options and folders that several subcommands have, and the words that a shell completes: names of laws and records.
 
 Words are written out where their owner takes seconds to import; a test holds them against it.
 """
@@ -6,6 +6,7 @@ Words are written out where their owner takes seconds to import; a test holds th
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,10 +14,10 @@ from typing import Annotated, Any
 import typer
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.folders import known_folder, known_stacks
-from profilefit.errors import InputError
-from profilefit.laws import MAPS, PROFILES
-from profilefit.recipes.folder import fits_folder
+from profilefit.errors import InputError, OtherRecords
+from profilefit.laws import PROFILES
+from profilefit.recipes import kinds
+from profilefit.recipes.folder import EVIDENCE, fits_folder, known_folder
 
 Fits = Annotated[
     Path | None, typer.Option(help="Folder of the records: ./fits if it has any, which is said, else the ones shipped.")
@@ -53,7 +54,7 @@ ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
 
 
 def require_left_out(context: typer.Context, names: Iterable[str], where: str) -> None:
-    """InputError of an option that was given although it says nothing there."""
+    """Raise InputError on an option that was given although it says nothing there."""
     for name in names:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
@@ -68,7 +69,7 @@ def percent(text: str) -> str:
 
 
 def in_options(text: Any) -> Any:
-    """A text of the library, or content with such texts, with options in place of arguments."""
+    """Return a text of the library, or content with such texts, with options in place of arguments."""
     if isinstance(text, str):
         return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), text)
     if isinstance(text, Mapping):
@@ -76,60 +77,86 @@ def in_options(text: Any) -> Any:
     return [in_options(value) for value in text] if isinstance(text, list | tuple) else text
 
 
+def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
+    """Return the folder requested, or ./fits if it has records, or the one shipped.
+
+    One that is not the shipped one is named by an OtherRecords warning, since constants of a strange folder look like
+    ours; one that was requested is not, if `quiet`. InputError if it is no folder.
+    """
+    if requested is not None and not requested.is_dir():
+        raise InputError(f"--fits must be a folder of records, got {str(requested)!r}, which is none")
+    folder = known_folder(requested)
+    if folder.resolve() != fits_folder().resolve() and not (quiet and requested):
+        where = "" if requested else " in the folder that you are in; --fits chooses others"
+        warnings.warn(f"records of {str(folder)!r}{where}", OtherRecords, stacklevel=2)
+    return folder
+
+
+def evidence_folder(records: Path, requested: Path | None = None) -> Path:
+    """Return the folder requested, or ./evidence if it is there, or the one beside the records.
+
+    One that was not requested is named by an OtherRecords warning. InputError if one was requested and is no folder.
+    """
+    if requested is not None and not requested.is_dir():
+        raise InputError(f"--evidence must be a folder, got {str(requested)!r}, which is none")
+    if requested is None and EVIDENCE.is_dir():
+        where = f"measurements of {str(EVIDENCE)!r} in the folder that you are in; --evidence chooses others"
+        warnings.warn(where, OtherRecords, stacklevel=2)
+    return requested or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)
+
+
 def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Names of the records, and of those of stacks, in the folder that the command has been given so far."""
-    return _starting(incomplete, dict.fromkeys((*_known_records(ctx), *known_stacks(_folder(ctx)))))
+    """Return the names of the records in the folder that the command has been given so far."""
+    return _starting(incomplete, kinds.names(kinds.KINDS, _folder(ctx), forms=False))
 
 
 def recipes(incomplete: str) -> Iterator[str]:
-    """Names of the recipes that came with this installation."""
-    return _starting(incomplete, sorted(path.stem for path in fits_folder().glob("*.toml")))
+    """Return the names of what ships to regenerate records from."""
+    return _starting(incomplete, sorted({name for kind in kinds.KINDS for name in kind.requests()}))
 
 
 def subjects(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Names of laws, maps and records."""
-    return _starting(incomplete, dict.fromkeys((*PROFILES, *MAPS, *_known_records(ctx))))
+    """Return the names of laws, maps and their records."""
+    return _starting(incomplete, kinds.names((kind for kind in kinds.KINDS if kind.forms), _folder(ctx)))
+
+
+def exported(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """Return the names of laws, maps and every record."""
+    return _starting(incomplete, kinds.names(kinds.KINDS, _folder(ctx)))
 
 
 def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """What `stability` takes: those, and functions."""
+    """Return what `stability` takes: laws, maps, their records, and functions."""
     yield from subjects(ctx, incomplete)
     yield from _starting(incomplete, FUNCTIONS)
 
 
 def laws(incomplete: str) -> Iterator[str]:
-    """Names of profile laws."""
+    """Return the names of profile laws."""
     return _starting(incomplete, PROFILES)
 
 
 def fitted(incomplete: str) -> Iterator[str]:
-    """What `fit` takes for light: laws, and exact light."""
+    """Return what `fit` takes for light: laws, and exact light."""
     return _starting(incomplete, (EXACT, *PROFILES))
 
 
 def languages(incomplete: str) -> Iterator[str]:
-    """Languages of `export`."""
+    """Return the languages of `export`."""
     return _starting(incomplete, LANGUAGES)
 
 
 def parts(incomplete: str) -> Iterator[str]:
-    """Parts of `tradeoff`."""
+    """Return the parts of `tradeoff`."""
     return _starting(incomplete, PARTS)
 
 
 def constants(incomplete: str) -> Iterator[str]:
-    """Sets of constants, of whatever law."""
+    """Return the sets of constants, of whatever law."""
     with interruptible(__name__):
         from profilefit.laws.published import SETS
 
     return _starting(incomplete, dict.fromkeys(("regenerated", *(one.name for one in SETS))))
-
-
-def _known_records(ctx: typer.Context) -> list[str]:
-    with interruptible(__name__):
-        from profilefit.recipes.record import available
-
-    return list(available(known_folder(_folder(ctx))))
 
 
 def _folder(ctx: typer.Context) -> Path | None:

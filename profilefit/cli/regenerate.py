@@ -13,7 +13,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import Quiet
 from profilefit.errors import InputError
-from profilefit.recipes.folder import LOCAL, PHASES, STACKS, fits_folder
+from profilefit.recipes.folder import LOCAL, fits_folder
 
 PHOTON_STORE = ".photons"
 SEED = 1
@@ -23,7 +23,7 @@ PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting who
 
 
 class Preset(StrEnum):
-    """How many photons: quick is enough for four digits of most constants, full for five."""
+    """Number of photons: quick is enough for four digits of most constants, full for five."""
 
     QUICK = "quick"
     FULL = "full"
@@ -72,13 +72,9 @@ def regenerate(
         from mcml_sim.cli.screen import notes, print_json, put
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import is_watched
-        from profilefit.recipes.phases import record as phase_record
-        from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
-        from profilefit.recipes.reproduction import reproduction
+        from profilefit.recipes.regenerate import reproduction, requests_of
         from profilefit.recipes.run import RecipeRun
-        from profilefit.recipes.stack import record as stack_record
-        from profilefit.recipes.stack import sum_record
         from profilefit.recipes.workers import cores
         from profilefit.report.tables.summary_tables import outcome, reproduced, verdict
 
@@ -87,18 +83,7 @@ def regenerate(
     if photons is not None and photons < 1:
         raise InputError(f"photons must be a whole number >= 1, got {photons}")
     said = notes(quiet)
-    names = recipes if recipes else [*_shipped("", "toml"), *_shipped(STACKS, "toml"), *_shipped(PHASES, "csv")]
-    tables = {name: found for name in names if (found := phase_record.table_of(name)) is not None}
-    stacks = [stack_record.request_of(name) for name in names if name not in tables and stack_record.is_stack(name)]
-    others = [name for name in names if name not in tables and not stack_record.is_stack(name)]
-    those = chosen(others, fits_folder()) if others else ()
-    stack_record.require_apart(stacks)
-    if recipes and (stacks or tables):
-        _require_default(
-            {"--preset": preset is not Preset.QUICK, "--seed": seed != SEED, "--photons": photons is not None}
-        )
-    works = [make(stack) for make in (stack_record.work, sum_record.work) for stack in stacks]
-    works += [phase_record.work(table) for table in dict.fromkeys(tables.values())]
+    requests = requests_of(recipes or ())
     is_named = getattr(context.get_parameter_source("out"), "name", "") == "COMMANDLINE"
     if out.resolve() == fits_folder() and not is_named:
         raise InputError("--out must be given where ./fits holds the shipped records, for example --out mine, got none")
@@ -113,11 +98,11 @@ def regenerate(
         say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=is_watched() and not quiet,
     )
-    steps = regenerate_records(those, run, processes=cores(), others=works)
+    steps = regenerate_records(requests, run, processes=cores())
     written = {step.name: step.path for step in steps if step.path}
     seconds = {step.name: step.seconds for step in steps}
     beside = {name: reproduction(path, name) for name, path in written.items()}
-    compared = [one for one in beside.values() if one is not None]
+    compared = [found for found in beside.values() if found is not None]
     if len(written) > 1 or compared:
         put(reproduced(seconds, written, beside), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
@@ -130,19 +115,5 @@ def regenerate(
         )
     if compared:
         said.print(verdict(compared), markup=False)
-    if not all(one.is_reproduced for one in compared):
+    if not all(found.is_reproduced for found in compared):
         raise typer.Exit(1)
-
-
-def _shipped(folder: str, ending: str) -> list[str]:
-    """Names of the recipes, stacks or tables in a folder of the shipped records."""
-    return sorted(path.stem for path in (fits_folder() / folder).glob(f"*.{ending}"))
-
-
-def _require_default(given: dict[str, bool]) -> None:
-    """InputError on an option that stacks and phase functions do not take."""
-    for option, is_given in given.items():
-        if is_given:
-            raise InputError(
-                f"{option} must be left out where a stack or a phase function is fitted: its data and starts are fixed"
-            )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,13 +11,14 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.folders import evidence_folder, known_phases, known_stacks, records_folder
-from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.cli.options import AsJson, Fits, Quiet, evidence_folder, records_folder
 from profilefit.errors import InputError, OtherRecords, ShaderError
 
 if TYPE_CHECKING:
-    from profilefit.recipes.stack.sum_record import SumRecord
+    from profilefit.recipes.kinds import Chosen, Kind
     from profilefit.report.tables.law_tables import Qualities
+
+    Groups = Mapping[Kind, Mapping[str, Path]]
 
 MEGABYTE = 1e6
 MOST_MARKDOWN = 2**24  # bytes of a page whose tables are filled in
@@ -74,42 +75,32 @@ def report(
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen, show
         from mcml_sim.files.whole_file import require_folder
-        from profilefit.recipes import record
+        from profilefit.recipes.kinds import by_kind, no_records, records_of
         from profilefit.report import every_law
+        from profilefit.report.kinds import tables_of
         from profilefit.report.tables import law_tables
         from profilefit.report.tables.claims_table import read_claims
-        from profilefit.report.tables.stack_table import stack_table
 
     printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
     _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
-    ordinary, known = record.available(folder), known_stacks(fits)
-    if phases := [name for name in names or () if name not in ordinary and name in known_phases(fits)]:
-        _require_alone(
-            phases, names or [], {**printed, "--markdown": markdown, "--html": html, "--figures": figures_to}
-        )
-        _show_phases({name: known_phases(fits)[name] for name in phases}, as_json)
-        return
-    only_stacks = not names and not any((*printed.values(), markdown, html)) and not ordinary
-    if only_stacks and (table := stack_table(folder)) is not None:
-        show([table], screen())
-        return
-    stacks = {name: known[name] for name in names or () if name in known and name not in ordinary}
-    _take_stacks(stacks, folder, {"--quality": quality, "--html": html, "--figures": figures_to})
-    if markdown is not None and not names:
-        stacks = known_stacks(folder)
-    others = [name for name in names if name not in stacks] if names else list(ordinary)
-    contents = record.chosen(folder, others, list(known) if names else ()) if others or not stacks else {}
+    chosen = records_of(names or (), fits)
+    groups = by_kind(chosen if names else None, folder)
+    if not chosen and (any(printed.values()) or html or not any(groups.values())):
+        raise no_records(folder)
+    outputs = {"quality": quality, "claims": claims, "markdown": markdown, "html": html, "figures": figures_to}
+    _require_together(chosen, folder, [option for option, value in outputs.items() if value])
     if figures_to is not None:
         require_folder(figures_to)
     if markdown is not None:
-        _fill(markdown, contents, folder, stacks, quiet)
+        _fill(markdown, groups, folder, quiet)
     elif html is not None:
         _page(html, folder, evidence_folder(folder, evidence), names, quiet)
     elif as_json:
-        body: dict[str, Any] = {"records": _told(contents, stacks, names)}
-        if sums := _sums(stacks):
-            body["gaussians"] = {name: one.content for name, one in sums.items()}
+        body: dict[str, Any] = {}
+        for kind, name, path in chosen:
+            if (shown := tables_of(kind)) is not None:
+                body.setdefault(shown.key, {})[name] = kind.module.read(path)
         if quality:
             body["quality"] = law_tables.content(_measured(folder, names, quiet))
         if claims:
@@ -120,35 +111,9 @@ def report(
     elif claims:
         _show_claims(evidence_folder(folder, evidence), folder, quiet)
     else:
-        _show(_told(contents, stacks, names), _sums(stacks), folder, bool(names))
+        _show(chosen if names else (), groups, folder)
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
-
-
-def _require_alone(phases: list[str], names: list[str], others: dict[str, object]) -> None:
-    """InputError where tables of phase functions are asked for with what they are no part of."""
-    given = [option for option, value in others.items() if value and option != "--json"]
-    strange = [name for name in names if name not in phases]
-    if given or strange:
-        raise InputError(
-            f"{(given or strange)[0]!r} must be left out where NAME is a phase function's record, got {phases[0]!r}"
-        )
-
-
-def _show_phases(paths: Mapping[str, Path], as_json: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import print_json, screen, show
-        from profilefit.recipes.phases.record import load
-        from profilefit.report.tables.phase_table import phase_tables, premise_lines
-
-    found = {name: load(path).content for name, path in paths.items()}
-    if as_json:
-        print_json({"phases": found})
-        return
-    for one in found.values():
-        show(phase_tables(one), screen())
-        for line in premise_lines(one):
-            screen().print(line, markup=False)
 
 
 def _require_one(flags: dict[str, object]) -> None:
@@ -158,48 +123,30 @@ def _require_one(flags: dict[str, object]) -> None:
         raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
 
 
-def _take_stacks(stacks: Mapping[str, Path], folder: Path, others: dict[str, object]) -> None:
-    """Say where those are from that are not of the folder in use; InputError on an option that no stack takes."""
-    for name, path in stacks.items():
-        if given := [option for option, value in others.items() if value]:
-            raise InputError(f"{given[0]} must be left out where NAME is a stack, got {name!r}")
-        if path.parent.parent != folder:
-            warnings.warn(f"stack {name!r} is of {str(path.parent.parent)!r}", OtherRecords, stacklevel=2)
+def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[str]) -> None:
+    """Name the folder of records that are of another one; InputError on an option that says nothing of a kind."""
+    seen: set[str] = set()
+    for kind, name, path in chosen:
+        if option := next((option for option in given if option in kind.apart), None):
+            raise InputError(f"--{option} must be left out where NAME is {kind.words}, got {name!r}")
+        if (root := kind.root(path)) != folder and name not in seen:
+            warnings.warn(f"{kind.words.partition(' ')[2]} {name!r} is of {str(root)!r}", OtherRecords, stacklevel=2)
+        seen.add(name)
 
 
-def _told(
-    contents: dict[str, dict[str, Any]], stacks: Mapping[str, Path], names: list[str] | None
-) -> dict[str, dict[str, Any]]:
-    """What is said of records and of stacks, in the order of their names."""
-    with interruptible(__name__):
-        from profilefit.recipes.stack.schema import read
-
-    told = contents | {name: read(path) for name, path in stacks.items()}
-    return {name: told[name] for name in names or told}
-
-
-def _sums(stacks: Mapping[str, Path]) -> dict[str, SumRecord]:
-    """The records of sums of Gaussians that lie beside those of stacks."""
-    with interruptible(__name__):
-        from profilefit.recipes.stack.sum_record import beside, load
-
-    return {name: load(found) for name, path in stacks.items() if (found := beside(path)) is not None}
-
-
-def _show(contents: dict[str, dict[str, Any]], sums: Mapping[str, SumRecord], folder: Path, named: bool) -> None:
+def _show(named: Sequence[Chosen], groups: Groups, folder: Path) -> None:
+    """Print the tables of records, or a summary of every kind where none is named."""
     with interruptible(__name__):
         from mcml_sim.cli.screen import put, screen
-        from profilefit.report import record_tables, summary
-        from profilefit.report.tables.phase_table import phase_table
-        from profilefit.report.tables.stack_table import stack_table
-        from profilefit.report.tables.sum_table import sum_tables
+        from profilefit.report.kinds import tables_of
 
-    parts = [] if named else [summary(contents)]
-    for name in contents if named else ():
-        parts += record_tables(contents[name])
-        parts += sum_tables(sums[name]) if name in sums else []
-    if not named:
-        parts += [one for one in (stack_table(folder), phase_table(folder)) if one is not None]
+    parts: list[Any] = []
+    for kind, _, path in named:
+        if (shown := tables_of(kind)) is not None:
+            parts += shown.tables(kind.module.read(path), path)
+    for kind, paths in () if named else groups.items():
+        if (shown := tables_of(kind)) is not None and (table := shown.summary(paths, folder)) is not None:
+            parts.append(table)
     console = screen()
     for part in parts:
         put(part, console)
@@ -255,17 +202,13 @@ def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, qui
     notes(quiet).print(f"wrote {path}, {path.stat().st_size / MEGABYTE:.1f} MB", markup=False)
 
 
-def _fill(
-    path: Path, contents: dict[str, dict[str, Any]], folder: Path, stacks: Mapping[str, Path], quiet: bool
-) -> None:
+def _fill(path: Path, groups: Groups, folder: Path, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.whole_file import read_whole, require_writable, write_whole
         from mcml_sim.runs.progress import working
-        from profilefit.report import fill, markdown_sections, sections
-        from profilefit.report.tables.phase_table import phase_sections
-        from profilefit.report.tables.stack_table import stack_sections
-        from profilefit.report.tables.sum_table import sum_sections
+        from profilefit.report import fill
+        from profilefit.report.kinds import tables_of
 
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
@@ -277,13 +220,14 @@ def _fill(
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     require_writable(path)
-    measured = {}
-    made = markdown_sections(folder) | stack_sections(stacks) | sum_sections(stacks) | phase_sections(folder)
-    for name, make in made.items():
-        if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
-            try:
-                with working(f"measuring the table {name}", quiet):
-                    measured[name] = make()
-            except ShaderError as error:
-                notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
-    write_whole(path, fill(text, (sections(contents) if contents else {}) | measured))
+    tables = {}
+    for kind, paths in groups.items():
+        shown = tables_of(kind)
+        for name, make in shown.sections(paths, folder).items() if shown else ():
+            if f"<!-- {name} -->" in text:  # what is measured takes a minute: only where the file has a place for it
+                try:
+                    with working(f"measuring the table {name}", quiet):
+                        tables[name] = make()
+                except ShaderError as error:
+                    notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
+    write_whole(path, fill(text, tables))

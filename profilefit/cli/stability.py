@@ -10,8 +10,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.folders import records_folder
-from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 
 if TYPE_CHECKING:
     from profilefit.studies.stability.atlas import Findings

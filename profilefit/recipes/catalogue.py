@@ -1,8 +1,11 @@
-"""The laws by name, with the constants requested: published, corrected, regenerated, or from a record."""
+"""Laws and maps by name, with the constants requested: published, corrected, regenerated, or those of a record."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,6 +14,7 @@ from profilefit import laws
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.laws.entry import Entry
 from profilefit.laws.rational import Normalisation, Rational
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import covers, record_setting
@@ -19,6 +23,10 @@ from profilefit.recipes.record_folder import SEARCHLIGHT, Folder, Records
 Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.
 (ALBEDO_RECORD,) = Rational.entry.records
+Names = Sequence[str] | None
+Number = float | None
+REGENERATED = "regenerated"
+NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 
 
 def names() -> tuple[str, ...]:
@@ -157,3 +165,242 @@ def _made(kind: type[Law], values: dict[str, float], which: str, **given: Any) -
     if set(values) != set(known):
         raise RecordError(f"constants {which} must be {', '.join(known)}, got {', '.join(values) or '(none)'}")
     return kind(**given, **values)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class LoadedLaw:
+    """Law with its constants, in one setting.
+
+    name     of the law in the catalogue; constants the printed set or the records they come from, "" if it has none
+    files    those records; constants that they do not hold are as printed;  folder  of them and of the map behind it
+    """
+
+    name: str
+    constants: str
+    law: Any
+    files: tuple[Path, ...] = ()
+    folder: Path = field(default_factory=fits_folder, compare=False, repr=False)
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        """The names of those records."""
+        return tuple(path.stem for path in self.files)
+
+    @property
+    def label(self) -> str:
+        """What a table calls it: its record, or law and printed set."""
+        if self.records:
+            return self.records[0]
+        return f"{self.name}, {self.constants}" if self.constants else self.name
+
+    @property
+    def setting(self) -> Setting:
+        setting: Setting = self.law.setting
+        return setting
+
+
+Named = LoadedLaw  # its former name, for code outside of this package
+Found = LoadedLaw | None
+
+
+def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
+    """Profile laws with their constants; only those of the records `names`, where such are named.
+
+    matched  only those of settings that have an exact profile
+    Records of failed fits have no law.
+    """
+    records = Records.of(folder)
+    return [*_whole_laws(records, names, matched), *_single(records, names, ("profile", "as-published"), matched)]
+
+
+def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
+    """Laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
+    records = Records.of(folder)
+    return [*_whole_laws(records, names, matched), *_single(records, names, ("inverse",), matched)]
+
+
+def all_profiles(folder: Folder) -> list[LoadedLaw]:
+    """Every profile law of every setting, and last the inverse cdfs that none of them is made of."""
+    records = Records.of(folder)
+    whole = profile_laws(records, matched=False)
+    taken = {name for one in whole for name in one.records}
+    return [*whole, *(one for one in sampled_laws(records) if one.records and not set(one.records) & taken)]
+
+
+def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
+    """Maps between alpha and A; arguments as for `profile_laws`."""
+    records, entries = Records.of(folder), _entries(laws.map_classes())
+    return [
+        *(_printed_laws(entries, records) if names is None else ()),
+        *_regenerated(records, entries, names, matched),
+    ]
+
+
+def find(
+    name: str, folder: Folder, constants: str | None = None, n: float | None = None, g: float | None = None
+) -> LoadedLaw:
+    """Return a law or map by the name of one of its records, or by its own name.
+
+    A name of both is the profile law's; "albedo liang" is the map's.
+
+    Args:
+        name: of a record, law or map.
+        folder: where the regenerated records lie.
+        constants: as in `load`; None takes the regenerated ones or, where there are none, the only printed
+            set.
+        n, g: refractive index and mean cosine, if not those of the record or set [-].
+
+    Raises:
+        InputError: any other name, with the nearest names that there are.
+        SettingError: there are no constants for n and g.
+    """
+    records = Records.of(folder)
+    if (found := find_law(name, records, constants, n, g) or find_map(name, records, constants, n, g)) is not None:
+        return found
+    raise not_found(name, records, constants)
+
+
+def find_law(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+    """Return a profile law or sampler as `find` does; None where the name is of something else."""
+    records = Records.of(folder)
+
+    def of_records() -> list[LoadedLaw]:
+        return [*profile_laws(records, (name,), False), *sampled_laws(records, (name,))]
+
+    return _found(name, records, constants, {"n": n, "g": g}, laws.profile_classes().get(name), of_records)
+
+
+def find_map(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+    """Return a map between alpha and A as `find` does; None where the name is of something else."""
+    records, classes = Records.of(folder), laws.map_classes()
+    own = {kind.entry.key: kind for kind in classes.values()} | classes
+    return _found(
+        name, records, constants, {"n": n, "g": g}, own.get(name), lambda: albedo_laws(records, (name,), False)
+    )
+
+
+def _found(
+    name: str,
+    records: Records,
+    constants: str | None,
+    of: Mapping[str, Number],
+    kind: Any,
+    of_records: Callable[[], Sequence[LoadedLaw]],
+) -> Found:
+    """Return the law of a record, else of a class of that name, in the setting of `of`; None where there is neither."""
+    if name in records.paths and constants in (None, REGENERATED):
+        found = next(iter(of_records()), None)
+    elif kind is not None:
+        which = constants or _default(kind.entry, bool(kind.constant_names()))
+        found = _named(kind.entry, which, _load(kind.entry, which, None, records), records)
+    else:
+        return None
+    given: dict[str, Any] = {key: value for key, value in of.items() if value is not None}
+    if found is None or (setting := replace(found.setting, **given)) == found.setting:
+        return found
+    entry = found.law.entry
+    which = constants or (REGENERATED if found.records or not found.constants else found.constants)
+    return _named(entry, which, _load(entry, which, setting, records), records)
+
+
+def not_found(name: str, folder: Folder, constants: str | None = None) -> InputError:
+    """Return the error for a name that no law or map of these constants has."""
+    records = Records.of(folder)
+    if name in records.paths and constants in (None, REGENERATED):
+        return RecordError(f"record {name!r} holds no law of a fit that converged")
+    if name in records.paths:
+        return InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
+    there = {*records.paths, *names(), *laws.MAPS}
+    near = get_close_matches(name.lower(), sorted(there), n=2, cutoff=NEAR)
+    hint = f"did you mean {', '.join(near)}?" if near else f"laws: {', '.join(names())};"
+    return InputError(f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records")
+
+
+def _entries(classes: Mapping[str, Any]) -> list[Entry]:
+    """One for each class, whatever the names that it goes by."""
+    return list({kind.entry.key: kind.entry for kind in classes.values()}.values())
+
+
+def _load(entry: Entry, which: str, setting: Setting | None, records: Records) -> Any:
+    return (albedo_law if entry.is_map else load)(entry.name, which, setting, records)
+
+
+def _named(entry: Entry, which: str, law: Any, records: Records) -> LoadedLaw:
+    if which == "regenerated":
+        files = _files(entry, law.setting, records)
+    else:
+        files = (Path(which),) if which.endswith(".json") else ()
+    constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
+    return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files, records.folder)
+
+
+def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]:
+    return tuple(records.folder / f"{records.name(base, setting)}.json" for base in entry.records)
+
+
+def _default(entry: Entry, has_constants: bool) -> str:
+    """The regenerated constants, or the only ones printed where none were regenerated."""
+    if entry.records or not has_constants:
+        return "regenerated"
+    printed = [s.name for s in published.SETS if s.law == entry.printed]
+    if len(printed) == 1:
+        return printed[0]
+    accepted = ", ".join([*printed, "the path of a record (.json)"])
+    several = "one of " if printed else ""
+    raise InputError(f"constants must be {several}{accepted}: {entry.key} was not regenerated, got none")
+
+
+def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
+    """Every printed set of these, in the order of print."""
+    known = {entry.printed: entry for entry in entries}
+    sets = [(known[s.law], s.name) for s in published.SETS if s.law in known]
+    return [_named(entry, which, _load(entry, which, None, records), records) for entry, which in sets]
+
+
+def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
+    """Printed sets, laws without constants, and laws made of all their regenerated records."""
+    classes = laws.profile_classes()
+    entries = _entries(classes)
+    regenerated = _regenerated(records, entries, names, matched)
+    if names is not None:  # others are of none
+        return regenerated
+    bare = [name for name, kind in classes.items() if not kind.constant_names()]
+    unfitted = [LoadedLaw(name, "", load(name, folder=records), (), records.folder) for name in bare]
+    return [*_printed_laws(entries, records), *unfitted, *regenerated]
+
+
+def _regenerated(records: Records, entries: Sequence[Entry], names: Names, matched: bool) -> list[LoadedLaw]:
+    """These laws, in every setting whose records all are in the folder."""
+    there = _usable(records.named(names), matched)
+    settings = dict.fromkeys(record_setting(content) for content in there.values())
+    found = []
+    for entry in entries:
+        for setting in settings if entry.records else ():
+            parts = [path.stem for path in _files(entry, setting, records)]
+            if set(parts) & set(there) and len(_usable(records.named(parts), matched)) == len(parts):
+                found.append(_named(entry, "regenerated", _load(entry, "regenerated", setting, records), records))
+    return found
+
+
+def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[LoadedLaw]:
+    """Records that no law takes by its name alone; constants that they do not hold are as printed."""
+    entries = [*_entries(laws.profile_classes()), *_entries(laws.map_classes())]
+    found = []
+    for name, content in _usable(records.named(names), matched).items():
+        wholes = [[path.stem for path in _files(one, record_setting(content), records)] for one in entries]
+        taken = any(name in parts and len(_usable(records.named(parts), matched)) == len(parts) for parts in wholes)
+        if content["pipeline"] in pipelines and not taken:
+            path = records.folder / f"{name}.json"
+            law = load(content["law"], str(path), folder=records)
+            found.append(LoadedLaw(content["law"], name, law, (path,), records.folder))
+    return found
+
+
+def _usable(records: Records, matched: bool) -> dict[str, dict[str, Any]]:
+    """The records of fits that converged."""
+    found = records.contents(whole=True)
+    return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
+
+
+def _is_usable(content: Mapping[str, Any], matched: bool) -> bool:
+    return content["fit"]["result"] == "converged" and (record_setting(content).is_matched_isotropic or not matched)

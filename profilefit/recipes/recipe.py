@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from itertools import product
 from pathlib import Path
@@ -12,8 +12,8 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.recipes.kinds import LONGEST_TEXT, is_line, is_number
-from profilefit.recipes.schema import PIPELINES
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line, is_number
 
 TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
@@ -270,26 +270,22 @@ def available(folder: Path) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def is_recipe(name: str) -> bool:
+    """Return whether a name is that of a shipped recipe, or of a .toml file that is none of layers."""
+    if not name.endswith(".toml"):
+        return name in available(fits_folder())
+    path = Path(name)
+    return not (path.is_file() and "layers" in read_toml(path))
+
+
 def find(name: str, folder: Path) -> Recipe:
-    """A recipe by its name in `folder`, or by the path of a .toml file."""
+    """Return a recipe by its name in `folder`, or by the path of a .toml file."""
     if name.endswith(".toml"):
         return read(Path(name))
     known = available(folder)
     if name not in known:
         raise RecipeError(f"recipe must be one of {', '.join(known) or '(none)'} or a .toml file, got {name!r}")
     return read(known[name])
-
-
-def chosen(names: Sequence[str], folder: Path) -> tuple[Recipe, ...]:
-    """The recipes of these names or paths; all of `folder` if none is named. RecipeError if two write one record."""
-    found = tuple(find(name, folder) for name in names or available(folder))
-    first: dict[str, Path] = {}
-    for one in found:
-        if one.name in first:
-            paths = f"{first[one.name]} and {one.path}"
-            raise RecipeError(f"recipes must have different names, as their records do, got {paths}")
-        first[one.name] = one.path
-    return found
 
 
 def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[str] = frozenset()) -> Any:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,8 @@ from mcml_sim.files.text_file import plain as to_plain
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
-from profilefit.recipes import kinds, schema
+from profilefit.recipes import schema
+from profilefit.recipes.folder import available, is_file
 
 FORMAT = 2
 # What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.
@@ -32,9 +32,9 @@ MISFIT_BEFORE, MISFIT = "discrepancy", "misfit"
 ARRAYS_OF_FORMAT_1 = {f"{kind}_{MISFIT_BEFORE}": f"{kind}_{MISFIT}" for kind in ("samples", "log_density")}
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
+CONVERGED = "converged"
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
-NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
 
 
 def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
@@ -58,8 +58,8 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     Its law, pipeline, setting and constants must be there: that is what a law is made from. A `whole` record holds
     everything that `profilefit report` shows.
     """
-    if not kinds.is_line(path.stem):  # it is shown, and stands in exported texts
-        raise RecordError(f"{str(path)!r}: the name of a record must be {kinds.TEXT.words}")
+    if not schema.is_line(path.stem):  # it is shown, and stands in exported texts
+        raise RecordError(f"{str(path)!r}: the name of a record must be {schema.TEXT.words}")
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:
@@ -69,7 +69,7 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
     if not isinstance(content, dict) or content.get("format") not in (1, FORMAT):
-        found = kinds.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
+        found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
         raise RecordError(f"{path}: is not a record of format 1 or {FORMAT}, got {found}")
     if content["format"] == 1:
         content = _of_format_1(content)
@@ -97,7 +97,7 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read_of(path: Path, pipeline: str, words: str, shown: schema.Kinds) -> dict[str, Any]:
+def read_of(path: Path, pipeline: str, words: str, shown: schema.Fields) -> dict[str, Any]:
     """Read a record of one pipeline, `words` what it is of, which holds what is `shown`; RecordError on any other."""
     content = read(path)
     if content["pipeline"] != pipeline:
@@ -105,6 +105,14 @@ def read_of(path: Path, pipeline: str, words: str, shown: schema.Kinds) -> dict[
     if text := schema.mistyped(content, shown):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     return content
+
+
+def named(name: str, folder: Path, pipeline: str) -> Path | None:
+    """Return the record of a name in a folder, or the one at a path (.json) if it is of this pipeline; else None."""
+    if name.endswith(".json"):
+        path = Path(name)
+        return path if is_file(path) and read(path)["pipeline"] == pipeline else None
+    return available(folder).get(name)
 
 
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
@@ -117,7 +125,7 @@ def _outside(content: Mapping[str, Any]) -> str | None:
     """An index or a mean cosine of its own that is none of those which its constants are for."""
     for name, span in SPANS.items():
         own = content["setting"].get(name)
-        if span in content and kinds.is_number(own) and not _within(content, span, own):
+        if span in content and schema.is_number(own) and not _within(content, span, own):
             low, high = content[span]
             return f"setting.{name} must be in ({low:g}, {high:g}], as its {span} are, got {own:g}"
     return None
@@ -185,45 +193,21 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     return {ARRAYS_OF_FORMAT_1.get(name, name): array for name, array in found.items()}
 
 
-def available(folder: Path) -> dict[str, Path]:
-    """The records of a folder by name, in order."""
-    return {path.stem: path for path in sorted(folder.glob("*.json"))}
-
-
-def chosen(folder: Path, names: Sequence[str] | None = None, stacks: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """The records of these names, or all of a folder, as `read` gives them; RecordError names the nearest there are.
-
-    stacks  names of other records, which the error lists, since they are accepted where these are
-    """
-    known = available(folder)
-    if not known and not stacks:
-        raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
-    for name in names or ():
-        if name not in known:
-            raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known), stacks)}")
-    return {name: read(known[name], whole=True) for name in (names or known)}
-
-
-def _nearest(name: str, known: list[str], stacks: Sequence[str]) -> str:
-    """What may have been meant: names that begin so, or differ by a few letters; and all stacks."""
-    every = [*known, *stacks]
-    begun = sorted((one for one in every if one.startswith(name.lower())), key=len)
-    near = begun or get_close_matches(name.lower(), every, n=NEAREST, cutoff=ALIKE)
-    hint = f"did you mean {', '.join(near[:NEAREST])}? " if near else ""
-    others = f"stacks are {', '.join(stacks)}, and " if stacks else ""
-    return f"{hint}{others}`profilefit report` lists {'records' if stacks else 'them'}"
-
-
 def digest(*arrays: np.ndarray) -> str:
-    """SHA-256 of the numbers that were fitted, which shows whether two records are of the same data."""
+    """Return the SHA-256 of the numbers that were fitted, which shows whether two records are of the same data."""
     sha = hashlib.sha256()
     for array in arrays:
         sha.update(np.ascontiguousarray(array).tobytes())
     return sha.hexdigest()
 
 
+def first_failure(results: Iterable[str]) -> str:
+    """Return the first of several fits' results that is not converged; "converged" where all are."""
+    return next((result for result in results if result != CONVERGED), CONVERGED)
+
+
 def versions() -> dict[str, str]:
-    """The libraries that decide the numbers."""
+    """Return the versions of the libraries that decide the numbers."""
     return {name: version(name) for name in LIBRARIES}
 
 

@@ -1,4 +1,4 @@
-"""What a record must hold, and of which kinds: everything that laws, exported texts, tables and pages take from it.
+"""Fields of a record and their types: everything that laws, shader sources, tables and pages take from one.
 
 A record may come from anywhere. Its texts are shown on terminals and become comments in code, its numbers become
 constants: what passes here is safe for both.
@@ -6,35 +6,81 @@ constants: what passes here is safe for both.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from profilefit.recipes.kinds import (
-    COUNT,
-    DIGEST,
-    FLAG,
-    HALVES,
-    LIST,
-    MATRIX,
-    MEASURE,
-    MEASURES,
-    NUMBER,
-    NUMBERS,
-    PAIR,
-    RATIOS,
-    SPAN,
-    TABLE,
-    TEXT,
-    TEXTS,
-    Kind,
-    is_line,
-    is_number,
-    shown,
+LONGEST_TEXT = 1000  # characters; ours have 256
+LONGEST_SHOWN = 60  # characters of a value in a message
+
+
+def is_line(value: Any) -> bool:
+    """Return whether a value is one line of printable text, without control characters or hidden ones."""
+    return isinstance(value, str) and len(value) <= LONGEST_TEXT and value.isprintable()
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number that float64 can hold; true and false are none."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
+
+
+@dataclass(frozen=True)
+class FieldType:
+    """Type of a value in a record: `accepts` decides, `words` name it in messages."""
+
+    words: str
+    accepts: Callable[[Any], bool]
+
+
+def _every(accepts: Callable[[Any], bool], least: int = 0) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, list) and len(value) >= least and all(map(accepts, value))
+
+
+def _is_measure(value: Any) -> bool:
+    return value is None or is_number(value)
+
+
+def _is_matrix(value: Any) -> bool:
+    return value is None or _every(lambda row: _every(_is_measure)(row) and len(row) == len(value))(value)
+
+
+TEXT = FieldType(f"one line of printable text, of {LONGEST_TEXT} characters at most", is_line)
+TEXTS = FieldType("a list of texts", _every(is_line))
+DIGEST = FieldType(
+    "64 hexadecimal digits", lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{64}", value))
 )
+NUMBER = FieldType("a number", is_number)
+MEASURE = FieldType("a number or null", _is_measure)  # null where it is not finite
+COUNT = FieldType("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool) and 0 <= v < 2**63)
+FLAG = FieldType("true or false", lambda value: isinstance(value, bool))
+TABLE = FieldType("a table", lambda value: isinstance(value, dict))
+LIST = FieldType("a list", lambda value: isinstance(value, list))
+NUMBERS = FieldType("a list of numbers", _every(is_number, 1))
+MEASURES = FieldType("a list of numbers or nulls", _every(_is_measure))
+RATIOS = FieldType("a list of numbers > 0", _every(lambda value: is_number(value) and value > 0, 1))
+PAIR = FieldType("a list of two numbers or nulls", lambda value: _every(_is_measure)(value) and len(value) == 2)
+SPAN = FieldType("a list of two numbers", lambda value: _every(is_number)(value) and len(value) == 2)
+HALVES = FieldType("a list of pairs of numbers", _every(lambda row: _every(is_number)(row) and len(row) == 2))
+MATRIX = FieldType("a square matrix of numbers, or null", _is_matrix)
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: printable and shortened."""
+    try:
+        text = json.dumps(value)
+    except (ValueError, RecursionError, TypeError):  # Python spells no whole number beyond 4300 digits
+        return f"a {type(value).__name__}"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
 
 DEEPEST = 12  # tables and lists within one another; ours have 6
 # By dotted key, * for each one inside, ? behind what may be absent; a table stands before what is in it.
-Kinds = Mapping[str, Kind]
+Fields = Mapping[str, FieldType]
 # A constant's errors in a record, and what tables and texts call them; older records have no second and third.
 ERRORS = {
     "statistical_error": "photons",
@@ -44,7 +90,7 @@ ERRORS = {
     "jackknife_error": "jackknife",
 }
 # What a law is made of.
-NAMED: Kinds = {
+NAMED: Fields = {
     "law": TEXT,
     "pipeline": TEXT,
     "setting": TABLE,
@@ -52,19 +98,19 @@ NAMED: Kinds = {
     "cosines?": SPAN,
     "data_digest?": DIGEST,
 }
-CONSTANTS: Kinds = {
+CONSTANTS: Fields = {
     "constants": TABLE,
     "constants.*": TABLE,
     "constants.*.regenerated": NUMBER,
     **{f"constants.*.{name}?": MEASURE for name in ("published", *ERRORS)},
 }
 # What is shown besides, of whatever pipeline.
-TOLD: Kinds = {
+TOLD: Fields = {
     "name": TEXT,
     "title": TEXT,
     "equations": TEXT,
     "note?": TEXT,
-    "preset": Kind("quick or full", lambda value: value in ("quick", "full")),
+    "preset": FieldType("quick or full", lambda value: value in ("quick", "full")),
     "seed": COUNT,
     "setting.illumination": TEXT,
     "setting.n": NUMBER,
@@ -88,7 +134,7 @@ OF_MAP = {
     "fold": NUMBER,
 }
 SETS = ("published", "corrected", "regenerated")
-PARTS: Kinds = {
+PARTS: Fields = {
     "covariance?": TABLE,
     "covariance?.names": TEXTS,
     **{f"covariance?.{name}?": MATRIX for name in ("statistical", "misfit", "model")},
@@ -96,7 +142,7 @@ PARTS: Kinds = {
     "left_out?.rings": COUNT,
     "left_out?.albedos": COUNT,
     "derived?": TABLE,
-    "derived?.quantity": Kind(
+    "derived?.quantity": FieldType(
         "radius or reflectance", lambda value: isinstance(value, str) and value in ("radius", "reflectance")
     ),
     "derived?.alpha": NUMBERS,
@@ -126,13 +172,13 @@ PARTS: Kinds = {
     "starts?.outcomes.*.result": TEXT,
     "starts?.outcomes.*.constants": TABLE,
 }
-PROTOCOL: Kinds = {
+PROTOCOL: Fields = {
     "albedos": TABLE,
     "albedos.low": NUMBER,
     "albedos.high": NUMBER,
     "albedos.count": COUNT,
     "albedos.spacing": TEXT,
-    "rings?": Kind("a table or null", lambda value: value is None or isinstance(value, dict)),
+    "rings?": FieldType("a table or null", lambda value: value is None or isinstance(value, dict)),
     **{f"rings?.{name}": NUMBER for name in ("dr", "first", "last", "epsilon")},
     "rings?.count": COUNT,
     "rings?.trim": TEXT,
@@ -143,7 +189,7 @@ PROTOCOL: Kinds = {
     "weighting.objective": TEXT,
     **{f"weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
 }
-FIT: Kinds = {
+FIT: Fields = {
     **CONSTANTS,
     "constants.*.published": MEASURE,
     "constants.*.free?": FLAG,
@@ -180,14 +226,14 @@ FIT: Kinds = {
     **{f"quality.{one}?.{name}?": kind for one in SETS for name, kind in OF_MAP.items()},
     **PARTS,
 }
-ALBEDO: Kinds = {**FIT, **{f"quality.regenerated.{name}": kind for name, kind in OF_MAP.items()}}
-INVERSE: Kinds = {**FIT, "quality.alpha": NUMBERS, "quality.regenerated.inversion_error": NUMBERS}
-PROFILE: Kinds = {
+ALBEDO: Fields = {**FIT, **{f"quality.regenerated.{name}": kind for name, kind in OF_MAP.items()}}
+INVERSE: Fields = {**FIT, "quality.alpha": NUMBERS, "quality.regenerated.inversion_error": NUMBERS}
+PROFILE: Fields = {
     **FIT,
     "quality.alpha": NUMBERS,
     **{f"quality.regenerated.{name}": NUMBERS for name in ("rel", "ks", "l1")},
 }
-STAGED: Kinds = {
+STAGED: Fields = {
     **PROFILE,
     "stages": TABLE,
     "stages.coefficient_laws": TABLE,
@@ -203,7 +249,7 @@ STAGED: Kinds = {
     "stages.length_exponents?": TABLE,
     "stages.length_exponents?.*": NUMBER,
 }
-EVIDENCE: Kinds = {
+EVIDENCE: Fields = {
     "protocol?": TABLE,
     **{f"protocol?.{key}": kind for key, kind in PROTOCOL.items()},
     "readings": LIST,
@@ -225,7 +271,7 @@ EVIDENCE: Kinds = {
     "halves?.*.off?": MEASURE,
 }
 # Each pipeline: the objectives that its recipes can make small, and what its records hold.
-PIPELINES: dict[str, tuple[tuple[str, ...], Kinds]] = {
+PIPELINES: dict[str, tuple[tuple[str, ...], Fields]] = {
     "albedo": (("albedo", "reflectance", "relative_reflectance"), ALBEDO),
     "profile": (("energy", "relative"), PROFILE),
     "as-published": (("radial",), STAGED),
@@ -236,19 +282,19 @@ ABSENT = object()
 
 
 def problem(content: dict[str, Any], whole: bool) -> str | None:
-    """What is wrong with a record, in one line, or None; of a `whole` one with anything that a report shows."""
+    """Return what is wrong with a record, in one line, or None; of a `whole` one with anything that a report shows."""
     pipeline = content.get("pipeline")
-    kinds = [NAMED if pipeline == "evidence" else {**NAMED, **CONSTANTS}]
+    needed = [NAMED if pipeline == "evidence" else {**NAMED, **CONSTANTS}]
     if whole and is_line(pipeline):
         if pipeline not in PIPELINES:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
-        kinds += [TOLD, PIPELINES[str(pipeline)][1]]
-    found = _unfit(content) or next((text for one in kinds if (text := mistyped(content, one))), None)
+        needed += [TOLD, PIPELINES[str(pipeline)][1]]
+    found = _unfit(content) or next((text for fields in needed if (text := mistyped(content, fields))), None)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
 
 
 def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
-    """What no record holds, at whatever key: text of several lines or unprintable, no numbers, nests without end."""
+    """Return, in one line, what no record may hold: text of several lines, no numbers, nests without end; else None."""
     if isinstance(value, str):
         return None if is_line(value) else f"{place or 'it'} must be {TEXT.words}, got {shown(value)}"
     if isinstance(value, int | float):
@@ -268,17 +314,23 @@ def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
     return None
 
 
-def mistyped(content: dict[str, Any], kinds: Kinds) -> str | None:
-    """The first key that is absent or of another kind."""
-    for key, kind in kinds.items():
+def mistyped(content: Mapping[str, Any], fields: Fields) -> str | None:
+    """Return, in one line, the first key that is absent or of another type; None where all are right."""
+    for key, kind in fields.items():
         for place, value in _each(content, key.split(".")):
             if not kind.accepts(value):
                 return f"{place} must be {kind.words}, got {'nothing' if value is ABSENT else shown(value)}"
     return None
 
 
+def missing_constant(content: Mapping[str, Any], names: Iterable[str]) -> str | None:
+    """Return, in one line, the first constant that a record lacks; None where it has all."""
+    missing = next((name for name in names if name not in content["constants"]), None)
+    return f"constants.{missing} must be a table, got nothing" if missing else None
+
+
 def _each(value: Any, key: list[str], place: str = "") -> Iterator[tuple[str, Any]]:
-    """Every value that stands at a key, ABSENT where it must and does not; what is above it has been checked."""
+    """Return every value that stands at a key, ABSENT where one must; what is above it has been checked."""
     if not key:
         yield place[1:], value
     elif value is None:  # a table that may be null
@@ -291,7 +343,7 @@ def _each(value: Any, key: list[str], place: str = "") -> Iterator[tuple[str, An
 
 
 def _mismatched(content: dict[str, Any]) -> str | None:
-    """Lists that must be as long as others, names that must be of the constants, measures that come together."""
+    """Return, in one line, a list of the wrong length, a strange name, or a measure without its twin; else None."""
     names = content.get("covariance", {}).get("names", [])
     if strange := [name for name in names if name not in content["constants"]]:
         return f"covariance.names must be of its constants, got {strange[0]!r}"

@@ -52,8 +52,16 @@ SCENES = {
     "fur": ("profilefit.scenes.fur.scene", "fur.toml"),
 }
 
+# What scenes export, by its name or by how that of a file ends: what it is, and the module whose `source` writes it.
+SOURCES = {
+    "sea-segment": ("of light in water", "profilefit.scenes.sea.source"),
+    ".toml": ("of light in water", "profilefit.scenes.sea.source"),
+    "fur": ("of fur", "profilefit.scenes.fur.source"),
+}
+
 __all__ = [
     "SCENES",
+    "SOURCES",
     "Camera",
     "ExactLaw",
     "Lambert",

@@ -1,4 +1,4 @@
-"""One file that holds a law: its text, every constant with its errors, and what they are constants of."""
+"""File that holds a law: its text, every constant with its errors, and what they are constants of."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
-from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import Named
+from profilefit.recipes import catalogue, kinds
+from profilefit.recipes.catalogue import LoadedLaw, not_found
+from profilefit.recipes.folder import known_folder
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
@@ -63,8 +65,51 @@ alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s'
 A the total diffuse reflectance (the colour) under that light."""
 
 
-def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = None) -> str:
-    """The whole file of a law or map in one of `LANGUAGES`; `folder` holds the record of the map that normalises it.
+# By the key of a kind: the module beside this one whose `source` writes the file of what the kind's `find` returned.
+SOURCES = {"law": "law_file", "albedo_map": "law_file", "stack": "stack_text", "phase": "phase_text"}
+
+
+def export_subject(
+    subject: str,
+    lang: str = "glsl",
+    name: str | None = None,
+    fits: Path | None = None,
+    scenes: Mapping[str, tuple[str, str]] | None = None,
+    **options: Any,
+) -> str:
+    """Return the whole file of a record or law of any kind, or of what a scene exports.
+
+    Args:
+        subject: name of a record, law or map, path of a record, or what scenes export.
+        lang: one of `LANGUAGES`.
+        name: what the names in it begin with, by default its own; two media in one shader need two.
+        fits: folder of records; None stands for ./fits and those shipped.
+        scenes: what scenes export, as `profilefit.scenes.SOURCES`.
+        options: constants, n and g of a law, as for `catalogue.find`.
+
+    Raises:
+        InputError: a subject, language, name or option that there is not; RecordError on a damaged record.
+    """
+    for kind in kinds.KINDS:
+        module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module
+        if hasattr(module, "source") and (found := kind.find(subject, fits, **options)) is not None:
+            text: str = module.source(found, lang, name)
+            return text
+    for ending, (words, home) in (scenes or {}).items():
+        if subject == ending or (ending.startswith(".") and subject.endswith(ending)):
+            kinds.require_none(options, words, subject)
+            text = import_module(home).source(subject, lang, name)
+            return text
+    raise not_found(subject, known_folder(fits), options.get("constants"))
+
+
+def source(named: LoadedLaw, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of a law or map as `export` does, normalised by the map beside its own record."""
+    return export(named, named.folder, lang, name)
+
+
+def export(named: LoadedLaw, folder: Folder, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of a law or map in one of `LANGUAGES`; `folder` holds the record of the map behind it.
 
     name  what the names in it begin with, by default `emit.prefix`: two media in one shader need two
     InputError for another language, for a name that is none, or for a law without shader source; RecordError where a
@@ -73,15 +118,16 @@ def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = 
     require_language(lang, name)
     sources = _sources(named, Records.of(folder))
     if lang == "json":
-        return json.dumps(_plain(named, sources), indent=1, sort_keys=True, allow_nan=False) + "\n"
+        return json_file(_plain(named, sources))
     make = emit.map_text if isinstance(named.law, AlbedoLaw) else emit.law_text
     body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(named, sources))
-    head = commented(_head(named, sources, lang, name), MARKS.get(lang, "//"))
-    return head + "\n" + (ES_HEAD if lang == "glsl-es" else "") + body
+    return text_file(_head(named, sources, name), lang, body)
 
 
-def export_medium(named: Named, folder: Folder, start: str, head: Sequence[str], values: Mapping[str, Floats]) -> str:
-    """The GLSL file of a law, with one medium's values and their errors (2, colours) after it, as START_NAME."""
+def export_medium(
+    named: LoadedLaw, folder: Folder, start: str, head: Sequence[str], values: Mapping[str, Floats]
+) -> str:
+    """Return the GLSL file of a law, with one medium's values and their errors (2, colours) after it, as START_NAME."""
     lines = []
     for name, (each, errors) in values.items():
         kind = "float" if each.size == 1 else f"vec{each.size}"
@@ -91,7 +137,7 @@ def export_medium(named: Named, folder: Folder, start: str, head: Sequence[str],
 
 
 def require_language(lang: str, name: str | None) -> None:
-    """InputError unless it is one of `LANGUAGES`, and no name is given to JSON."""
+    """Raise InputError unless it is one of `LANGUAGES`, and no name is given to JSON."""
     if lang not in LANGUAGES:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
     if lang == "json" and name is not None:
@@ -99,25 +145,28 @@ def require_language(lang: str, name: str | None) -> None:
 
 
 def function_lines(start: str, names: Sequence[tuple[str, str]]) -> list[str]:
-    """What each function gives, a line each; names (call, words), the call less what it begins with, `start`."""
+    """Return what each function gives, a line each; names (call, words), the call less what it begins with, `start`."""
     width = max(30, *(len(called) + 2 for called, _ in names))
     return [f"{start}_{called:<{width}}{words}" for called, words in names]
 
 
 def json_file(content: Mapping[str, Any]) -> str:
-    """A whole file of data, and what made it."""
+    """Return a whole file of data, and what made it."""
     body = {**content, "made_by": f"profilefit {__version__}"}
     return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
 
 
 def text_file(head: Sequence[str], lang: str, text: str) -> str:
-    """A whole file of a text in a language, under a head of lines (comments)."""
+    """Return a whole file of a text in a language, under a head of lines (comments).
+
+    The first two hold nothing from outside: there, a word of a comment can change how Python reads it (PEP 263).
+    """
     lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
     return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text
 
 
 def commented(lines: Iterable[str], mark: str) -> str:
-    """Lines as comments and nothing else, whatever they hold.
+    """Return lines as comments and nothing else, whatever they hold.
 
     Split at every kind of line break; what is not printable ASCII becomes its escape, as in a Python string, and a line
     ends in no backslash (nor its trigraph), with which a preprocessor would join the next one to it.
@@ -142,8 +191,8 @@ class _Source:
     spare: bool = False
 
 
-def _sources(named: Named, records: Records) -> list[_Source]:
-    """The records behind a law: its own, and that of the map which normalises it."""
+def _sources(named: LoadedLaw, records: Records) -> list[_Source]:
+    """Return the records behind a law: its own, and that of the map which normalises it."""
     own = "map" if isinstance(named.law, AlbedoLaw) else "law"
     found = [_source(own, path, records) for path in named.files]
     if getattr(named.law, "albedo", None) is not None:
@@ -156,13 +205,11 @@ def _source(of: str, path: Path, records: Records, spare: bool = False) -> _Sour
     return _Source(of, path, records.read(path, whole=True), hashlib.sha256(path.read_bytes()).hexdigest(), spare)
 
 
-def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None) -> list[str]:
-    """What a reader of the file must know, a line each. The first two hold nothing from outside: there, a word of a
-    comment can change how Python reads the file (PEP 263)."""
+def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> list[str]:
+    """Return what a reader of the file must know, a line each."""
     is_map = isinstance(named.law, AlbedoLaw)
     kind = "map between alpha and A" if is_map else "reflectance profile of a half space"
-    lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], ""]
-    lines += [f"{named.name}, {named.constants or 'no constants'}: {kind}"]
+    lines = [f"{named.name}, {named.constants or 'no constants'}: {kind}"]
     start = name or emit.prefix(named.law)
     lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
     lines += ["", *_setting_lines(named.setting), ""]
@@ -186,7 +233,7 @@ def _setting_lines(setting: Setting) -> list[str]:
 
 
 def _provenance(source: _Source, before: str) -> list[str]:
-    """A record: its title, equations, range, error and digests, each line after whose it is."""
+    """Return a record's title, equations, range, error and digests, each line after whose it is."""
     content = source.content
     lines = [f"record {source.path.stem}: {content['title']}", content["equations"]]
     if source.spare:
@@ -208,23 +255,28 @@ def _provenance(source: _Source, before: str) -> list[str]:
     return [before + line for line in [*lines, f"sha256 of the record {source.digest}"]]
 
 
-def _remarks(named: Named, sources: Sequence[_Source]) -> dict[str, str]:
-    """The errors of each constant, in words; of a profile law's map, the names begin with map_."""
+def _remarks(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, str]:
+    """Return the errors of each constant, in words; of a profile law's map, the names begin with map_."""
     remarks = {}
     start = "" if isinstance(named.law, AlbedoLaw) else "map_"
     for source in sources:
         law = named.law.albedo if source.of == "map" and start else named.law
         before = start if source.of == "map" else ""
         for name, errors in text_errors(law, source.content).items():
-            found = [f"{error:.2g} ({ERRORS[key]})" for key, error in errors.items()]
-            remarks[before + name] = "+- " + ", +- ".join(found) if found else "held"
+            remarks[before + name] = error_remark(errors) or "held"
     if named.files:  # a record may hold a part of a law's constants
         remarks = {**dict.fromkeys(named.law.constant_names(), "as printed"), **remarks}
     return remarks
 
 
+def error_remark(errors: Mapping[str, Any]) -> str:
+    """Return the standard errors of a constant in words, by the keys of `ERRORS`; an empty text where it has none."""
+    found = [f"{errors[key]:.2g} ({word})" for key, word in ERRORS.items() if errors.get(key) is not None]
+    return "+- " + ", +- ".join(found) if found else ""
+
+
 def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-    """Each constant of a law's text that a record has made -> its standard errors there, by the keys of `ERRORS`.
+    """Return the standard errors of each constant of a law's text that a record holds, by the keys of `ERRORS`.
 
     A constant that several of the record's come to at the law's index has those of their covariance; a jackknife has
     none, so that its errors are left out there.
@@ -248,20 +300,19 @@ def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[st
     return found
 
 
-def _printed(named: Named) -> Any:
-    """The printed set that a law's constants are, or None."""
+def _printed(named: LoadedLaw) -> Any:
+    """Return the printed set that a law's constants are, or None."""
     own = named.law.entry.printed, named.constants
     return next((s for s in published.SETS if not named.files and (s.law, s.name) == own), None)
 
 
-def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
-    """The same as data: every constant with its errors, null where a kind of error does not apply."""
+def _plain(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, Any]:
+    """Return the file as data: every constant with its errors, null where a kind of error does not apply."""
     printed = _printed(named)
     law = named.law
     made = {
         "law": named.name,
         "label": named.label,
-        "made_by": f"profilefit {__version__}",
         "setting": {"illumination": law.setting.illumination, "n": law.setting.n, "g": law.setting.g},
         "units": "lengths in mean free paths 1 / (mu_s' + mu_a)",
         "constants": law.text_constants(),

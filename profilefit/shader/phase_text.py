@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 
-from mcml_sim import __version__
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture, Phase, as_table
 from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, MOST_TERMS
-from profilefit.recipes.phases.record import DEFAULT, PhaseRecord
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.kinds.phase import DEFAULT, PhaseRecord
 from profilefit.shader import emit
-from profilefit.shader.law_file import ES_HEAD, MARKS, TARGETS, TRANSLATED, commented, require_language
+from profilefit.shader.law_file import TRANSLATED, error_remark, json_file, require_language, text_file
 
 NAMES = (
     ("pdf(off)", "density of the direction [1/sr], off = 1 - cos of the turn: 0 straight on, 2 straight back"),
@@ -21,7 +18,7 @@ NAMES = (
 
 
 def phase_text(phase: Phase, lang: str = "glsl", name: str = "phase", told: Mapping[str, str] | None = None) -> str:
-    """A sum of one to four terms of Henyey and Greenstein, ready to include: NAME_pdf(off), NAME_sample(xi).
+    """Return a sum of one to four terms of Henyey and Greenstein, ready to include: NAME_pdf(off), NAME_sample(xi).
 
     lang, name, told  as for `emit.law_text`;  InputError on any other phase function: fit terms to it
     """
@@ -34,7 +31,7 @@ def phase_text(phase: Phase, lang: str = "glsl", name: str = "phase", told: Mapp
 
 
 def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = None) -> str:
-    """The whole file of a record's best sum of terms, its moments held, in one of `law_file.LANGUAGES`.
+    """Return the whole file of a record's best sum of terms, its moments held, in one of `law_file.LANGUAGES`.
 
     name  what the names in it begin with, by default the record's own with underscores; InputError where that is none
     """
@@ -43,14 +40,12 @@ def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = Non
     constants, content = record.constants(form, how), record.content
     if lang == "json":
         kept = {key: content[key] for key in ("title", "equations", "note", "data", "data_digest", "constants")}
-        body = {**kept, "made_by": f"profilefit {__version__}", "phase": as_table(record.phase(form, how))}
-        return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+        return json_file({**kept, "phase": as_table(record.phase(form, how))})
     start = name or record.path.stem.replace("-", "_")
-    told = {key: _errors(one) for key, one in constants.items()}
+    told = {key: error_remark(errors) for key, errors in constants.items()}
     text = phase_text(record.phase(form, how), TRANSLATED.get(lang, lang), start, told)
     own, data = content["phases"][form][how], content["data"]
-    head = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], ""]
-    head += [f"phase function {record.path.stem}: {FORMS[form].title}"]
+    head = [f"phase function {record.path.stem}: {FORMS[form].title}"]
     head += [f"{start}_{called:<20}{words}" for called, words in NAMES]
     head += [
         "",
@@ -58,11 +53,11 @@ def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = Non
     ]
     head += [f"mean cosine {own['mean_cosine']:.4f}, turned by more than 90 degrees {own['backscattered']:.5f}"]
     head += [content["note"], f"sha256 of the data {content['data_digest']}"]
-    return commented(head, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text
+    return text_file(head, lang, text)
 
 
 def _terms(phase: Phase) -> tuple[list[float], list[float]]:
-    """Weights and g of all terms."""
+    """Return weights and g of all terms."""
     own = phase.simplest
     pairs = list(zip(own.weights, own.phases, strict=True)) if isinstance(own, Mixture) else [(1.0, own)]
     for _, one in pairs:
@@ -73,6 +68,4 @@ def _terms(phase: Phase) -> tuple[list[float], list[float]]:
     return [float(weight) for weight, _ in pairs], [float(one.mean_cosine) for _, one in pairs]
 
 
-def _errors(one: Mapping[str, float | None]) -> str:
-    found = [f"{one[key]:.2g} ({word})" for key, word in ERRORS.items() if one.get(key) is not None]
-    return "+- " + ", +- ".join(found) if found else ""
+source = export_phase

@@ -18,10 +18,11 @@ import mcml_sim
 import profilefit
 from mcml_sim.cli.app import app as mcml_sim_cli
 from profilefit import cli
-from profilefit.recipes import inventory, recipe
-from profilefit.recipes.stack import record as stack_record
+from profilefit.recipes import catalogue, recipe
+from profilefit.recipes.folder import STACKS
+from profilefit.recipes.kinds import stack
 from profilefit.shader.law_file import export
-from profilefit.shader.stack_file import export_stack
+from profilefit.shader.stack_text import export_stack
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, FITS = ROOT / "docs", ROOT / "fits"
@@ -154,9 +155,9 @@ def test_the_law_of_thirty_lines_is_one(monkeypatch, capsys):
 @pytest.mark.parametrize(("printed", "call"), [("scatter", "radiance(uv)"), ("scatter_stack", "radiance(uv), 1.0")])
 def test_the_shader_that_is_printed_compiles(tmp_path, printed, call):
     if printed == "scatter":
-        law = export(inventory.find("hazard-diffuse", FITS), FITS)
+        law = export(catalogue.find("hazard-diffuse", FITS), FITS)
     else:
-        law = export_stack(stack_record.load(FITS / stack_record.FOLDER / "skin.json"))
+        law = export_stack(stack.load(FITS / STACKS / "skin.json"))
     main = f"in vec2 uv;\nout vec4 colours;\nvoid main() {{ colours = vec4({call}); }}\n"
     path = tmp_path / "scatter.frag"
     path.write_text(f"#version 330\n{law}{(EXAMPLES / f'{printed}.glsl').read_text()}{main}", encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 
 import profilefit
 from mcml_sim import Setting
-from profilefit.recipes import inventory, record
+from profilefit.recipes import catalogue, record
 from profilefit.report.records import largest_error
 from profilefit.report.tables.cells import to_error
 from profilefit.report.tables.law_page import index_text, law_pages, page_text
@@ -26,7 +26,7 @@ def test_every_law_and_every_record_has_its_place(pages):
     members = [one for page in pages for one in page.members]
     records = {name for name, path in record.available(FITS).items() if "constants" in record.read(path)}
     assert {name for one in members for name in one.records} == records
-    printed = {one.label for one in inventory.profile_laws(FITS) if not one.records}
+    printed = {one.label for one in catalogue.profile_laws(FITS) if not one.records}
     assert printed <= {one.label for one in members}
     index = index_text(pages, FITS)
     assert index.count("\n| [") == len(members)
@@ -73,5 +73,5 @@ def test_what_a_page_tells_to_type_gives_that_law(pages):
             assert law.setting == one.setting, call
         for command in re.findall(r"^profilefit export (.+) --lang glsl$", text, re.MULTILINE):
             name, *constants = shlex.split(command.replace("--constants ", ""))
-            law = inventory.find(name, FITS, *constants).law
+            law = catalogue.find(name, FITS, *constants).law
             assert any(law.constants() == one.law.constants() for one in page.members), command

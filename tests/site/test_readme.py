@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.claims import RUNS
 from profilefit.recipes import record
-from profilefit.recipes.inventory import profile_laws
+from profilefit.recipes.catalogue import profile_laws
 from profilefit.report import fill, sections
 from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.law_tables import markdown_laws, markdown_sections, measured_profile

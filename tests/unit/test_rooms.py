@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from profilefit.recipes.kinds import KINDS
+
 ROOT = Path(__file__).resolve().parents[2]
 
 # A room, or a file in the root, imports only from those before it.
@@ -151,6 +153,46 @@ def test_no_scene_knows_another():
             assert {part(room, target) for target in targets if target.startswith(f"{room}.")} <= {"stage", own}, module
 
 
+# Rooms of a kind, whose modules commands reach by the table of kinds. `fit` takes tables of one's own, by name.
+OF_KINDS = ("recipes.stack", "recipes.phases", "shader.stack_text", "shader.phase_text")
+OF_OWN_DATA = ("fit", "fit_layers")
+
+
+def known_kinds(path: Path) -> list[str]:
+    """Imports of what only one kind has, and comparisons with the name of a kind, in a command, as file:line."""
+    found = set()
+    words = {word for kind in KINDS for word in (kind.key, kind.folder, kind.plural)} - {""}
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            homes = [name.removeprefix("profilefit.") for name in imported_names(node, "profilefit.cli.x", False)]
+            own = {f"recipes.kinds.{kind.key}" for kind in KINDS}
+            if any(f"{home}.".startswith(f"{one}.") for home in homes for one in {*OF_KINDS, *own}):
+                found.add(node.lineno)
+        elif isinstance(node, ast.Compare | ast.Match | ast.Subscript):
+            told = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}
+            if told & words:
+                found.add(node.lineno)
+    return [f"{path}:{line}" for line in sorted(found)]
+
+
+def test_commands_know_no_kind_by_name():
+    commands = [path for path in (ROOT / "profilefit" / "cli").glob("*.py") if path.stem not in OF_OWN_DATA]
+    assert len(commands) > 10
+    assert [place for path in commands for place in known_kinds(path)] == []
+
+
+def test_a_command_that_knows_a_kind_is_seen(tmp_path):
+    """Negative control: each of these lines, and none of the first two."""
+    path = tmp_path / "leaf.py"
+    path.write_text(
+        'from profilefit.recipes.kinds import KINDS\nif name == "hazard": pass\n'
+        "from profilefit.recipes.kinds.stack import load\nfrom profilefit.recipes.kinds import gaussians\n"
+        'import profilefit.recipes.phases.data\nif kind.key == "phase": pass\nif where in ("stacks", "x"): pass\n'
+        'match kind.key:\n    case "albedo_map": pass\ntext = SOURCES["law"]\n'
+    )
+    assert known_kinds(path) == [f"{path}:{line}" for line in (3, 4, 5, 6, 7, 8, 10)]
+
+
 def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
     """Module -> the modules of all packages that import it or from it."""
     found: dict[str, set[str]] = {}
@@ -164,12 +206,12 @@ def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
 
 
 def test_a_file_is_one_noun():
-    """Neither a crumb of one other file nor two; subcommands are one file each, however short."""
+    """Neither a crumb of one other file nor two; subcommands and kinds of records are one file each, however short."""
     known, wrong = importers(ROOT, list(PACKAGES)), set()
     for package in PACKAGES:
         for module, path in modules(ROOT, package).items():
             lines = len(path.read_text(encoding="utf-8").splitlines())
-            if path.stem in ("__init__", "__main__") or ".cli." in module:
+            if path.stem in ("__init__", "__main__") or any(shelf in module for shelf in (".cli.", ".recipes.kinds.")):
                 continue
             if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
                 wrong.add(module)

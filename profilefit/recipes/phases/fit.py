@@ -79,12 +79,16 @@ class PhaseFit:
 
 
 def fit_phase(
-    data: PhaseData, form: str, hold: Sequence[str] = (), angles: tuple[float, float] = ALL_ANGLES
+    data: PhaseData,
+    form: str,
+    hold: Sequence[str] = (),
+    angles: tuple[float, float] = ALL_ANGLES,
+    seed: int = SEED,
 ) -> PhaseFit:
-    """The form nearest to a table, all rows alike in ln p (or by sigma, where the table has it), but for one at 0.
+    """Fit the form nearest to a table, all rows alike in ln p (or by sigma, where the table has it), but for one at 0.
 
     form    a name of `FORMS`;  hold  of the table's mean cosine and backscattered share, those that are kept
-    angles  of the rows that count [degrees]; moments are those of the whole table
+    angles  of the rows that count [degrees]; moments are those of the whole table;  seed  of random starts
     InputError on another name, more moments than the form has numbers, or fewer rows than twice those.
     """
     if form not in FORMS:
@@ -105,7 +109,7 @@ def fit_phase(
         )
     arrays = _arrays(data, used, moments)
     residual = _residual(form, held)
-    random = np.random.default_rng(SEED)
+    random = np.random.default_rng(seed)
     found = [least_squares(residual, start, arrays) for start in own.starts(random, STARTS)]
     best = min(found, key=lambda one: (not one.converged, one.cost if np.isfinite(one.cost) else np.inf))
     best = judged(best, tuple(f"parameter {i + 1}" for i in range(own.free)))

@@ -28,7 +28,7 @@ from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.stack import photons
 from profilefit.recipes.stack.file import LayerStack
-from profilefit.recipes.stack.photons import TracedRings
+from profilefit.recipes.stack.photons import USUAL, TracedRings, Tracing
 from profilefit.recipes.toml_tables import Tables
 
 Floats = NDArray[np.float64]
@@ -44,18 +44,16 @@ TIMID = 1e-3  # weight of a constant's distance from its start: those that nothi
 # ln, but of w its logit, and u a multiple of the least one with which A is monotone in d.
 START = (0.0, 0.0, 0.2, 0.2, -2.0, -2.0, -1.0, 0.0, -2.0)
 MOST_FORWARD = 0.95
-STARTS, SPREAD, SEED = 6, 0.8, 1
+STARTS, SPREAD = 6, 0.8
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
-NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: right to a tenth of the law's error and better
-
-
-Lights = list[tuple[Floats, ...] | TracedRings]
+NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: its error is a tenth of the law's or less
+RingData = tuple[Floats, ...] | TracedRings  # exact light at radii, or traced rings
 
 
 class Interface(NamedTuple):
-    """What one interface of a stack was fitted to, and how that ended.
+    """Light that one interface of a stack was fitted to, and the fit.
 
     law        of the stack below the surface of its upper layer;  thicknesses  (m,) of that layer, fitted at [length]
     best       the optimum taken, in unbounded parameters;  found  those of every start
@@ -67,7 +65,7 @@ class Interface(NamedTuple):
     medium: Medium
     is_below: bool
     thicknesses: Floats
-    lights: Lights
+    lights: list[RingData]
     best: Solution
     found: tuple[Solution, ...]
 
@@ -92,32 +90,37 @@ def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | L
 
 
 def fitted(
-    medium: Medium, illumination: str, starts: Sequence[ArrayLike] = ()
+    medium: Medium, illumination: str, starts: Sequence[ArrayLike] = (), tracing: Tracing = USUAL
 ) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
-    """The law, and the fit at each interface from the surface down; none of a half space.
+    """Fit the law: it, and the fit at each interface from the surface down; none of a half space.
 
     starts  constants (9,) of each interface: the law is the optimum that a fit from there reaches, not the best one of
             the search, which many optima beside each other make a matter of rounding. Light of isotropic layers only
+    tracing  of layers that scatter forward; its seed is that of random starts, too
     """
     require(medium)
     require_illumination(illumination)
     setting = setting_of(medium, illumination)
     if all(layer.g == 0 for layer in medium.layers):
         hazard = catalogue.load("hazard", setting=setting)
-        return _fitted(
-            medium, [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers], starts=starts
-        )
-    _, begun = fitted(replace(medium, layers=tuple(layer.similar for layer in medium.layers)), illumination)
-    tops = [photons.half_space(layer, setting, SEED + place) for place, layer in enumerate(medium.layers)]
-    return _fitted(medium, tops, begun)
+        tops = [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+        return _fitted(medium, tops, tracing, starts=starts)
+    similar = replace(medium, layers=tuple(layer.similar for layer in medium.layers))
+    _, initial_fits = fitted(similar, illumination, tracing=tracing)
+    tops = [photons.half_space(layer, setting, tracing, place) for place, layer in enumerate(medium.layers)]
+    return _fitted(medium, tops, tracing, initial_fits)
 
 
 def _fitted(
-    medium: Medium, tops: list[LayerLaw], begun: tuple[Interface, ...] = (), starts: Sequence[ArrayLike] = ()
+    medium: Medium,
+    tops: list[LayerLaw],
+    tracing: Tracing,
+    initial_fits: tuple[Interface, ...] = (),
+    starts: Sequence[ArrayLike] = (),
 ) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
-    """From the last layer up, over the half spaces of the layers.
+    """Fit interface after interface from the last layer up, over the half spaces of the layers.
 
-    begun  the interfaces of the similar stack, from whose constants those of traced light start
+    initial_fits  the interfaces of the similar stack, from whose constants those of traced light start
     """
     law: StackLaw | LayerLaw = tops[-1]
     done: list[Interface] = []
@@ -125,23 +128,23 @@ def _fitted(
         layer, top, illumination = medium.layers[place], tops[place], tops[place].setting.illumination
         here = Medium(medium.layers[place:], medium.n_above)
         d = _thicknesses(layer.similar, is_below=place > 0)
-        lights: Lights = []
-        if begun:
-            lights += [rings_of(here, each, illumination, number) for number, each in enumerate(d)]
-            best = _solved(begun[place].best.parameters, top, law, d, lights)
+        lights: list[RingData] = []
+        if initial_fits:
+            lights += [rings_of(here, each, illumination, number, tracing) for number, each in enumerate(d)]
+            best = _solved(initial_fits[place].best.parameters, top, law, d, lights)
             found: tuple[Solution, ...] = (best,)
         else:
             lights += [light_of(here, each, illumination) for each in d]
-            best, found = _searched(top, law, d, lights, starts[place] if starts else None)
+            best, found = _searched(top, law, d, lights, tracing.seed, starts[place] if starts else None)
         law = _law_of(best.parameters, top, law, layer.thickness)
         done.insert(0, Interface(law, here, place > 0, d, lights, best, found))
     return law, tuple(done)
 
 
-def rings_of(medium: Medium, d: float, illumination: str, number: int) -> TracedRings:
-    """Traced light under a first layer of another thickness."""
+def rings_of(medium: Medium, d: float, illumination: str, number: int, tracing: Tracing = USUAL) -> TracedRings:
+    """Trace light under a first layer of another thickness d [length]; number  of the run, by which seeds differ."""
     edges = photons.ring_edges(medium.layers[0], medium.layers)
-    return photons.traced(medium.with_first(d), illumination, edges, photons.STACK_PHOTONS, SEED + 100 + number)
+    return tracing.rings(medium.with_first(d), illumination, edges, photons.STACK_PHOTONS, 100 + number)
 
 
 def errors(one: Interface) -> dict[str, dict[str, float | None]]:
@@ -155,12 +158,12 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     """
     top, below, thickness = one.law.top, one.law.below, one.law.thickness
 
-    def refitted(d: Floats, lights: Lights) -> Floats:
+    def refitted(d: Floats, lights: list[RingData]) -> Floats:
         return _vector(_law_of(_solved(one.best.parameters, top, below, d, lights).parameters, top, below, thickness))
 
     own, fewer = _vector(one.law), None
     if not one.is_traced:
-        coarse: Lights = []
+        coarse: list[RingData] = []
         coarse += [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
         fewer = refitted(one.thicknesses, coarse)
     count = len(one.thicknesses)
@@ -186,7 +189,7 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     }
 
 
-def _without(lights: Lights, number: int) -> Lights:
+def _without(lights: list[RingData], number: int) -> list[RingData]:
     """Copy of the lights in which one has no weight: leaving it out would change the shape, and compile a program."""
     light = lights[number]
     weight = 0.0 * np.asarray(light[2])
@@ -278,10 +281,15 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 
 def _searched(
-    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights, given: ArrayLike | None = None
+    top: LayerLaw,
+    below: LayerLaw | StackLaw,
+    d: Floats,
+    lights: list[RingData],
+    seed: int,
+    given: ArrayLike | None = None,
 ) -> tuple[Solution, tuple[Solution, ...]]:
     """The best optimum of several starts, or that of constants which are given; and all."""
-    random = np.random.default_rng(SEED)
+    random = np.random.default_rng(seed)
     spread = START + SPREAD * random.standard_normal((STARTS - 2, len(START)))
     starts = [np.array(START), _as_slabs_add(top, below), *spread]
     found = tuple(_solved(start, top, below, d, lights) for start in starts)
@@ -299,7 +307,7 @@ def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
 
-def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights) -> Solution:
+def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[RingData]) -> Solution:
     """The optimum from a start; fits to traced light stay near it where nothing speaks against that."""
     if isinstance(lights[0], TracedRings):
         rings = [light for light in lights if isinstance(light, TracedRings)]

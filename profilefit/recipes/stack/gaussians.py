@@ -17,6 +17,7 @@ from profilefit.fitting.estimate import judged
 from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.recipes.stack import fit, photons
+from profilefit.recipes.stack.photons import USUAL, Tracing
 
 Floats = NDArray[np.float64]
 NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
@@ -24,7 +25,7 @@ WIDEST = 0.5  # and of the widest, over that within which all light counts
 # Narrowest and widest sigma of a dense sum, over the first and the last ring; steps of ln sigma.
 DENSE = (0.25, 0.7, 0.4)
 ALONE = 8  # starts of one Gaussian
-SEED = 300
+OFFSET = 299  # of the seed of traced light
 # Of the row by which non-negative least squares makes weights sum to one: the optimum that follows does so to rounding.
 TO_ONE = 1e3
 SEARCH_WORTH = 1e-8  # as `worth` in `solve`, for the starts. `joint` goes on from the best of them
@@ -66,15 +67,14 @@ class JointSum(NamedTuple):
         return np.any(self.slopes != 0, axis=1)
 
 
-def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES) -> SumLight:
-    """Rings even in ln r to 99.5 % of the light: exact, or of photons where a layer scatters forward."""
+def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES, tracing: Tracing = USUAL) -> SumLight:
+    """Return rings even in ln r to 99.5 % of the light: exact, or of photons where a layer scatters forward."""
     fit.require(medium)
     first = medium.layers[0]
     unit = first.similar.mfp
     if any(layer.g > 0 for layer in medium.layers):
-        rings = photons.traced(
-            medium, illumination, photons.ring_edges(first, medium.layers), photons.STACK_PHOTONS, SEED
-        )
+        edges = photons.ring_edges(first, medium.layers)
+        rings = tracing.rings(medium, illumination, edges, photons.STACK_PHOTONS, OFFSET)
         counts = rings.weight > 0
         first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
         inside = slice(first_ring, last_ring + 1)
@@ -89,9 +89,11 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES)
     return SumLight(r[seen] / unit, energy, weight, light.reflectance, np.zeros(energy.size), float(share[0]))
 
 
-def lights_of(media: Sequence[Medium], illumination: str, nodes: exact.Nodes = fit.NODES) -> tuple[SumLight, ...]:
-    """`sum_light` of media of one unit of length, edges in that unit; of equal media once."""
-    found = {medium: sum_light(medium, illumination, nodes) for medium in dict.fromkeys(media)}
+def lights_of(
+    media: Sequence[Medium], illumination: str, nodes: exact.Nodes = fit.NODES, tracing: Tracing = USUAL
+) -> tuple[SumLight, ...]:
+    """Return `sum_light` of media of one unit of length, edges in that unit; of equal media once."""
+    found = {medium: sum_light(medium, illumination, nodes, tracing) for medium in dict.fromkeys(media)}
     return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].similar.mfp) for medium in media)
 
 
@@ -100,11 +102,13 @@ def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: i
 
     A is the stack's own. InputError as of `stack_law`, and on another count.
     """
-    (found,) = alike((medium,), illumination, count)
+    (found,) = shared_gaussians((medium,), illumination, count)
     return found
 
 
-def alike(media: Sequence[Medium], illumination: str = "searchlight", count: int = 6) -> tuple[MediumGaussians, ...]:
+def shared_gaussians(
+    media: Sequence[Medium], illumination: str = "searchlight", count: int = 6
+) -> tuple[MediumGaussians, ...]:
     """Sums of the same 1 to 8 variances, in one unit of length, for media of one unit: red, green and blue, say.
 
     Each x is in mean free paths of its own first layer.

@@ -6,7 +6,9 @@ same reduced coefficients A differs by up to a sixth, R_d within a mean free pat
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import jax
@@ -18,6 +20,7 @@ from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw
+from profilefit.recipes.run import PHOTONS, RecipeRun
 
 Floats = NDArray[np.float64]
 HALF_SPACE_PHOTONS, STACK_PHOTONS = 2**22, 2**21
@@ -46,9 +49,40 @@ class TracedRings(NamedTuple):
     error: float
 
 
-def traced(medium: Medium, illumination: str, edges: Floats, photons: int, seed: int) -> TracedRings:
-    """Light of a medium in rings; those beyond 99.7 % of it, and within the first edge, do not count."""
-    tally = simulate(medium, Grid.from_edges(r=edges), photons, seed, illumination=illumination, progress=False)
+class Tracing(NamedTuple):
+    """Numbers of photons, seeds and store of the traced light of one medium.
+
+    seed   the first one;  photons  of each run in place of the usual number, else `times` of it
+    store  folder of which a later run takes the photons that are there
+    """
+
+    seed: int = 1
+    photons: int | None = None
+    times: int = 1
+    store: Path | None = None
+
+    @classmethod
+    def of(cls, run: RecipeRun, name: str) -> Tracing:
+        """Return how a command traces the light of a medium of this name, which no other has."""
+        times = PHOTONS[run.preset] // PHOTONS["quick"]
+        return cls(run.seed, run.photons, times, run.store and run.store / "stacks" / name)
+
+    def rings(self, medium: Medium, illumination: str, edges: Floats, usual: int, offset: int) -> TracedRings:
+        """Trace light of a medium as `traced` does; usual  number of photons;  offset  of the seed, one a run."""
+        own = f"{illumination} {medium}".encode() + edges.tobytes()
+        store = self.store and self.store / f"{hashlib.sha256(own).hexdigest()[:16]}-{offset}"
+        return traced(medium, illumination, edges, self.photons or self.times * usual, self.seed + offset, store)
+
+
+USUAL = Tracing()
+
+
+def traced(
+    medium: Medium, illumination: str, edges: Floats, photons: int, seed: int, store: Path | None = None
+) -> TracedRings:
+    """Trace light of a medium in rings; those beyond 99.7 % of it, and within the first edge, do not count."""
+    grid = Grid.from_edges(r=edges)
+    tally = simulate(medium, grid, photons, seed, store, illumination=illumination, progress=False)
     found = tally.reflectance_r.scaled(tally.grid.r_areas)
     energy, error = np.asarray(found.value, float), np.asarray(found.standard_error, float)
     whole = tally.diffuse_reflectance
@@ -68,13 +102,13 @@ def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
     return np.append(0.0, np.geomspace(near, FARTHEST / min(rates), RINGS))
 
 
-def half_space(layer: Layer, setting: Setting, seed: int, photons: int = HALF_SPACE_PHOTONS) -> LayerLaw:
-    """The law of a layer's half space, fitted to traced light; in similar lengths and albedo."""
+def half_space(layer: Layer, setting: Setting, tracing: Tracing = USUAL, offset: int = 0) -> LayerLaw:
+    """Fit the law of a layer's half space to traced light, in similar lengths and albedo; offset  of the seed."""
     own = replace(setting, g=layer.g)
     similar = layer.similar
     edges = ring_edges(layer, (layer,))
     medium = Medium((replace(layer, thickness=np.inf),), layer.n / setting.n)
-    rings = traced(medium, setting.illumination, edges, photons, seed)
+    rings = tracing.rings(medium, setting.illumination, edges, HALF_SPACE_PHOTONS, offset)
     data = (rings.edges / similar.mfp, rings.energy, rings.weight)
 
     def residual(parameters, light):

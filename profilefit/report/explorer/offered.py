@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from profilefit.recipes import inventory
-from profilefit.recipes.inventory import Named, profile_laws
+from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import Named, profile_laws
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.law_file import export
 
@@ -76,7 +76,7 @@ def _refracting(named: Named, records: Records) -> Refracting | None:
     label = next((one.label for one in same if one.setting.n != named.setting.n), None)
     if label is None:
         return None
-    texts = [_text(inventory.find(label, records, n=n), records) for n in INDICES]
+    texts = [_text(catalogue.find(label, records, n=n), records) for n in INDICES]
     pieces = [re.split(WORDS, text) for text in texts]
     places = [at for at, words in enumerate(zip(*pieces, strict=True)) if len(set(words)) > 1]
     return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])

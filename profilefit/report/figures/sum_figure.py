@@ -14,7 +14,7 @@ from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS
-from profilefit.recipes.stack.sum_record import COUNTS, SumRecord, load
+from profilefit.recipes.kinds.gaussians import COUNTS, SumRecord, load
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, VERMILION, canvas, legend_below, plain_log, save, styled
 from profilefit.report.records import Source
 from profilefit.report.tables.sum_table import published

@@ -12,8 +12,8 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.measured.photo.workflow import Photo
+from profilefit.recipes.catalogue import Named, find
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.inventory import Named, find
 from profilefit.report.drawing import inline
 from profilefit.report.figures.photo_figures import RINGS, SPOT
 from profilefit.report.page.document import document

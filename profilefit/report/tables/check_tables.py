@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.markdown import markdown_table

@@ -13,7 +13,7 @@ from rich.console import RenderableType
 
 from mcml_sim.files.text_file import read_json
 from profilefit.errors import InputError
-from profilefit.recipes.kinds import is_line, is_number, shown
+from profilefit.recipes.schema import is_line, is_number, shown
 from profilefit.report.tables.cells import column_table, significant
 from profilefit.report.tables.markdown import markdown_table
 

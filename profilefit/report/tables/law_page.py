@@ -18,7 +18,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Text
-from profilefit.recipes.inventory import Named, albedo_laws, all_profiles
+from profilefit.recipes.catalogue import Named, albedo_laws, all_profiles
 from profilefit.recipes.record import SPANS, record_name, record_setting
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.records import (

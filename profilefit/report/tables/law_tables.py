@@ -22,8 +22,8 @@ from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.laws.base import Sampler
+from profilefit.recipes.catalogue import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
-from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.targets import albedo_values

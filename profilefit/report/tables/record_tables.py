@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
-from profilefit.recipes.stack.record import PIPELINE as STACK
+from profilefit.recipes.kinds.stack import PIPELINE as STACK
 from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
     TOTAL,

@@ -10,8 +10,8 @@ from rich.console import RenderableType
 
 from profilefit.laws.stack import StackLaw
 from profilefit.recipes import record
-from profilefit.recipes.stack.record import FOLDER, PIPELINE
-from profilefit.recipes.stack.schema import BY_THICKNESS, interfaces, read
+from profilefit.recipes.folder import STACKS
+from profilefit.recipes.kinds.stack import BY_THICKNESS, PIPELINE, interfaces, read
 from profilefit.report.records import Content, largest_error, numbered_errors
 from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
@@ -34,7 +34,7 @@ LEFT = ("layer", "channel", "interface", "constant", "result")
 
 def stack_table(folder: Path) -> RenderableType | None:
     """Return the records of stacks that lie in a folder of records; None where there are none."""
-    paths = record.available(folder / FOLDER).values()
+    paths = record.available(folder / STACKS).values()
     stacks = [read(path) for path in paths if record.read(path)["pipeline"] == PIPELINE]
     if not stacks:
         return None

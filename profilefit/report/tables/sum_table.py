@@ -11,8 +11,8 @@ from rich.console import RenderableType
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
+from profilefit.recipes.kinds.gaussians import COUNTS, SumRecord, load
 from profilefit.recipes.stack.sum_errors import constant_names, quality
-from profilefit.recipes.stack.sum_record import COUNTS, SumRecord, beside, load
 from profilefit.report.records import largest_error, numbered_errors
 from profilefit.report.tables.cells import column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
@@ -40,9 +40,8 @@ def sum_tables(record: SumRecord) -> list[RenderableType]:
     return [_over_number(record), _constants(record)]
 
 
-def sum_sections(stacks: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
-    """Return the table of these stacks' sums for Markdown, by the name of its mark; none where none has a sum."""
-    paths = {name: record for name, path in stacks.items() if (record := beside(path)) is not None}
+def sum_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
+    """Return the table of these records of sums for Markdown, by the name of its mark; none where there is none."""
 
     def made() -> str:
         rows = [

@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from profilefit.recipes import record
-from profilefit.recipes.reproduction import Reproduction
+from profilefit.recipes.regenerate import Reproduction
 from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
 from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark

@@ -16,10 +16,11 @@ from mcml_sim import Medium
 from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
-from profilefit.recipes.folder import LOCAL, STACKS, fits_folder
-from profilefit.recipes.stack import fit, sum_record
+from profilefit.recipes.folder import LOCAL, fits_folder
+from profilefit.recipes.kinds import gaussians
+from profilefit.recipes.kinds.stack import StackRequest, matching, requested
+from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.gaussians import SumLight, dense, joint, lights_of
-from profilefit.recipes.stack.record import StackRequest, matching, requested
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
@@ -235,9 +236,8 @@ def light_of(stack: StackRequest, count: int) -> Scattering:
     media = stack.stack.media
     for folder in (LOCAL, fits_folder()):
         found = matching(stack, folder)
-        path = None if found is None else sum_record.beside(folder / STACKS / f"{found.name}.json")
-        if path is not None:
-            record = sum_record.load(path)
+        record = None if found is None else gaussians.find(found.name, folder)
+        if record is not None:
             units = [medium.layers[0].similar.mfp for medium in media]
             kernel = kernel_of(record.laws(stack.illumination, count), units)
             return _light(kernel, record.lights(stack.illumination))

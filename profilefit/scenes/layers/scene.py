@@ -15,8 +15,8 @@ from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.recipes.folder import LOCAL, fits_folder
+from profilefit.recipes.kinds.stack import StackRequest, matching, requested
 from profilefit.recipes.stack import fit
-from profilefit.recipes.stack.record import StackRequest, matching, requested
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mcml_sim.media.checks import is_number
 from mcml_sim.media.phase import Mixture
 from profilefit.errors import InputError
-from profilefit.recipes.phases import record as phases
+from profilefit.recipes.kinds import phase
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.sea.caustics import Splat, focus, splat_for
 from profilefit.scenes.sea.haze import KINDS
@@ -213,7 +213,7 @@ def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
 
 def lobes_of(name: str) -> tuple[tuple[float, float], ...]:
     """(weight, g) of the terms fitted to a phase function that has a record. InputError."""
-    found = phases.find(name).phase(FORM)
+    found = phase.named(name).phase(FORM)
     assert isinstance(found, Mixture)
     return tuple((float(w), float(one.mean_cosine)) for w, one in zip(found.weights, found.phases, strict=True))
 

@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
-from profilefit.recipes.inventory import Named, albedo_laws, profile_laws
+from profilefit.recipes.catalogue import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records

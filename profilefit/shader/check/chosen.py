@@ -12,8 +12,8 @@ import moderngl
 from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.recipes import catalogue, inventory
-from profilefit.recipes.inventory import Named
+from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check.half import HalfCheck, check_half
 from profilefit.shader.check.law_check import LawCheck, check_laws
@@ -63,7 +63,7 @@ def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str
 def regenerated(folder: Folder) -> Chosen:
     """All laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
-    profiles, maps = inventory.all_profiles(records), inventory.albedo_laws(records, matched=False)
+    profiles, maps = catalogue.all_profiles(records), catalogue.albedo_laws(records, matched=False)
     of_laws, of_maps = (
         [each for one in group if one.records for each in _spread(one, records)] for group in (profiles, maps)
     )
@@ -75,7 +75,7 @@ def _spread(one: Named, records: Records) -> list[Named]:
     low, high = content.get("indices") or (0.0, 0.0)
     cosines = COSINES if "cosines" in content else (one.setting.g,)
     places = product((n for n in INDICES if low < n <= high), cosines)
-    return [inventory.find(one.label, records, n=n, g=g) for n, g in places] or [one]
+    return [catalogue.find(one.label, records, n=n, g=g) for n, g in places] or [one]
 
 
 def printed(constants: str, folder: Folder) -> Chosen:
@@ -83,7 +83,7 @@ def printed(constants: str, folder: Folder) -> Chosen:
     wanted = constants.removeprefix("published:")
     laws, maps = (
         [one for one in group if not one.records and one.constants == wanted]
-        for group in (inventory.profile_laws(folder), inventory.albedo_laws(folder))
+        for group in (catalogue.profile_laws(folder), catalogue.albedo_laws(folder))
     )
     return [one for one in laws if one.law.entry.has_text], maps
 
@@ -95,7 +95,7 @@ def _under(name: str, group: Sequence[Named]) -> list[Named]:
 
 def _loaded(name: str, constants: str | None, folder: Folder) -> Chosen:
     """A law or map that is in no list: one without constants, one that was not regenerated, or a mistake."""
-    one = inventory.find(name, folder, constants)
+    one = catalogue.find(name, folder, constants)
     return ([], [one]) if isinstance(one.law, AlbedoLaw) else ([one], [])
 
 

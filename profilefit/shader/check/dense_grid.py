@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.shader_law import Values
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.shader.check.shader_law import ShaderLaw, Values, half_extension
 

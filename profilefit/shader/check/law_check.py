@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, dense_grid, validity

@@ -17,7 +17,7 @@ from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
-from profilefit.recipes.inventory import Named, profile_laws
+from profilefit.recipes.catalogue import Named, profile_laws
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.dense_grid import ULP

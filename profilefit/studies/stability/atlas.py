@@ -11,8 +11,8 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws import MAPS
 from profilefit.laws.entry import EVERYWHERE
-from profilefit.recipes import catalogue, inventory
-from profilefit.recipes.inventory import Named
+from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
 from profilefit.studies.stability import (
@@ -80,8 +80,8 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     Raises InputError for an unknown name.
     """
     requested, records = list(names), Records.of(folder)
-    profiles = [one for one in inventory.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
-    albedos = inventory.albedo_laws(records, matched=False)
+    profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
+    albedos = catalogue.albedo_laws(records, matched=False)
 
     def chosen(one: Named, label: str) -> bool:
         return bool({label, one.name, *one.records} & set(requested)) if requested else not quick or label in QUICK

@@ -7,12 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.fur import law
 from profilefit.scenes.fur.law import shadow, shell_shadow
+from profilefit.scenes.fur.source import strand_text
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, FurWay, trial
-from profilefit.shader.emit import text_beside
-from profilefit.shader.fur_file import strand_text
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
@@ -101,7 +99,7 @@ def of_slabs() -> Cells:
 
 def of_shadow() -> Iterator[Cells]:
     """Yield a cone's shadow in float32: by its shader source, and by the formula as textbooks have it."""
-    text = RoundedText(strand_text(text_beside(law.__name__, "glsl/strand.glsl"), "python", NAME), np.float32)
+    text = RoundedText(strand_text("python", NAME), np.float32)
     yield _shadow("cone's shadow", True, TEXT32, lambda *given: text.call("shadow", *given))
     yield _shadow("cone's shadow, by acos", False, FLOAT32, by_acos)
 

@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability.cells import Cells, judged_cells
 from profilefit.studies.stability.layout import (

@@ -16,7 +16,7 @@ from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE

@@ -11,7 +11,7 @@ from mcml_sim import exact
 from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.studies.stability.cells import Cells, RoundedText, Verdict
 from profilefit.studies.stability.layout import (
     ALPHA_OF,

@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.sea import law
 from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
 from profilefit.scenes.sea.request import PHASE, lobes_of
+from profilefit.scenes.sea.source import segment_text
 from profilefit.scenes.sea.waves import Waves, random_floor
-from profilefit.shader.emit import text_beside
-from profilefit.shader.sea_file import segment_text
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
@@ -118,7 +116,7 @@ def of_beam() -> Cells:
 
 def of_segment() -> Iterator[Cells]:
     """Yield the integral in float32: by its shader source, the function in Python, and the usual formula."""
-    text = RoundedText(segment_text(text_beside(law.__name__, "glsl/segment.glsl"), "python", NAME), np.float32)
+    text = RoundedText(segment_text("python", NAME), np.float32)
     yield _segment(SEGMENT, True, TEXT32, lambda *given: text.call("integral", *given))
     yield _segment(SEGMENT, True, FLOAT32, segment_integral)
     yield _segment("segment, plain", False, FLOAT32, plain_integral)

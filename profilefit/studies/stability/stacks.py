@@ -15,8 +15,8 @@ from profilefit.errors import RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
-from profilefit.recipes.record import available
-from profilefit.recipes.stack import record
+from profilefit.recipes.folder import STACKS, available
+from profilefit.recipes.kinds.stack import load
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.stack_text import single_text, stack_text
@@ -142,8 +142,8 @@ def cells_of(folder: Path) -> Iterator[Cells]:
 
 def recorded_stacks(folder: Path) -> Iterator[StackCase]:
     """Yield the laws of a folder's stacks, one a colour."""
-    for name, path in available(folder / record.FOLDER).items():
-        loaded = record.load(path)
+    for name, path in available(folder / STACKS).items():
+        loaded = load(path)
         for channel, law in zip(CHANNELS, loaded.laws, strict=True):
             try:
                 parts = loaded.content["interfaces"][channel]["quality"]

@@ -51,7 +51,7 @@ def test_more_of_them_are_nearer(illumination):
 def test_colours_share_their_variances():
     """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
     blue = Medium((Layer(1.4, 0.35, 2.6, 0.0, 0.3), Layer(1.4, 1.2, 1.3, 0.0)))
-    both = gaussians.alike((HEART, blue), "diffuse", 4)
+    both = gaussians.shared_gaussians((HEART, blue), "diffuse", 4)
     units = [medium.layers[0].mfp for medium in (HEART, blue)]
     first, second = (np.array(one.variance) * unit**2 for one, unit in zip(both, units, strict=True))
     np.testing.assert_allclose(first, second, rtol=1e-12)

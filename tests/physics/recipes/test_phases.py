@@ -12,16 +12,17 @@ from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, backscattered, haltrin
 from profilefit.recipes.folder import shipped
-from profilefit.recipes.phases import record
+from profilefit.recipes.kinds import phase as record
 from profilefit.recipes.phases.data import read_phase
 from profilefit.recipes.phases.fit import MOMENTS, fit_phase
-from profilefit.recipes.work import alone
+from profilefit.recipes.run import RecipeRun, alone
 from tests.fixtures import slow
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = shipped("fits") / "phases"
 PETZOLD = read_phase(FOLDER / "petzold.csv")
 SHIPPED = record.load(FOLDER / "petzold.json")
+RUN = RecipeRun("quick", 1, Path(), None, None)
 KNOWN = Mixture((0.7, 0.3), (HenyeyGreenstein(0.95), HenyeyGreenstein(0.3)))
 
 
@@ -209,7 +210,7 @@ def test_shipped_record():
     # Neither premise of Haltrin's form holds.
     assert data["mean_cosine"] - data["second"] > 0.06
     assert data["regression"] - data["mean_cosine"] > 0.03
-    assert record.find("petzold").content == SHIPPED.content
+    assert record.named("petzold").content == SHIPPED.content
     # An older record than units and spans.
     assert record.table_lines(data) == [
         "petzold.csv: values were divided by their integral over all directions, 0.9924."
@@ -219,7 +220,7 @@ def test_shipped_record():
 @pytest.mark.slow
 def test_the_record_comes_out_again(tmp_path):
     said = []
-    again = record.load(alone(record.work(FOLDER / "petzold.csv"), tmp_path, say=said.append))
+    again = record.load(alone(record.fit(FOLDER / "petzold.csv", RUN), tmp_path, say=said.append))
     assert said[:-1] == record.table_lines(again.content["data"])
     assert len(said) == 4
     for name, one in SHIPPED.content["constants"].items():
@@ -306,4 +307,4 @@ def test_damaged_records(tmp_path):
     content["pipeline"] = "profile"
     damaged("must be a record of phase functions, got pipeline 'profile'")
     with pytest.raises(InputError, match=r"must be one of petzold, or a \.json, got 'baltic'"):
-        record.find("baltic")
+        record.named("baltic")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.shader.check import validity
 from profilefit.studies.stability import gradients
 from profilefit.studies.stability.cells import Verdict
@@ -12,7 +12,7 @@ FITS = catalogue.fits_folder()
 
 
 def of_map(label):
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == label)
+    one = next(one for one in catalogue.albedo_laws(FITS) if one.label == label)
     return list(gradients.of_map(one, validity.of_map(one, FITS)))
 
 

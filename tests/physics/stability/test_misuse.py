@@ -3,7 +3,7 @@
 import numpy as np
 
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import find
+from profilefit.recipes.catalogue import find
 from profilefit.studies.stability import misuse
 from profilefit.studies.stability.cells import Verdict
 from profilefit.studies.stability.layout import FLOAT64

@@ -7,7 +7,7 @@ import pytest
 
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import find, profile_laws
+from profilefit.recipes.catalogue import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.studies.stability.cells import EXTENDED, RoundedText, Verdict
 from profilefit.studies.stability.law_cells import MEASURED, Reference, computed, limits_of

@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.studies.stability import law_cells, layout, map_cells
 from profilefit.studies.stability.cells import ADVICE, Cells, Verdict
 from profilefit.studies.stability.layout import (
@@ -28,7 +28,7 @@ FITS = catalogue.fits_folder()
 @pytest.fixture(scope="module")
 def printed():
     """The printed laws of Liang et al.: g as it is, and the energy of (17)."""
-    one = next(one for one in inventory.profile_laws(FITS) if one.label == "liang, published")
+    one = next(one for one in catalogue.profile_laws(FITS) if one.label == "liang, published")
     limits = law_cells.limits_of(one, FITS)
     return [law_cells.unclipped(one, limits), law_cells.own_energy(one, limits)]
 
@@ -37,7 +37,7 @@ def printed():
 def of_maps():
     """All regions of the printed map (8) and of the rational one."""
     labels = {"liang, published", "albedo-rational"}
-    maps = [one for one in inventory.albedo_laws(FITS) if one.label in labels]
+    maps = [one for one in catalogue.albedo_laws(FITS) if one.label in labels]
     return [region for one in maps for cells in map_cells.cells_of(one, FITS) for region in regions_of(cells)]
 
 
@@ -69,7 +69,7 @@ def test_the_map_folds_and_the_rational_one_does_not(of_maps):
 @pytest.mark.slow
 def test_a_wrong_constant_of_another_law_is_seen():
     """Negative control: a fault in a constant of Burley's law turns more cells of cdf and radii red."""
-    one = next(one for one in inventory.profile_laws(FITS) if one.label == "burley, published")
+    one = next(one for one in catalogue.profile_laws(FITS) if one.label == "burley, published")
     limits = law_cells.limits_of(one, FITS)
 
     def red(factor):
@@ -82,7 +82,7 @@ def test_a_wrong_constant_of_another_law_is_seen():
 
 
 def test_a_wrong_constant_of_our_own_map_is_a_failure():
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "albedo-rational")
+    one = next(one for one in catalogue.albedo_laws(FITS) if one.label == "albedo-rational")
     law = eqx.tree_at(lambda law: law.b, one.law, 1.3 * one.law.b)
     regions = [
         each
@@ -126,7 +126,7 @@ def test_what_is_not_judged_is_a_region_that_says_why():
 
 def test_a_red_cell_of_our_own_is_a_failure():
     """Negative control: a red cell in the middle of a law that is right there."""
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "albedo-rational")
+    one = next(one for one in catalogue.albedo_laws(FITS) if one.label == "albedo-rational")
     cells = next(cells for cells in map_cells.cells_of(one, FITS) if cells.arithmetic == FLOAT64)
     codes = cells.codes.copy()
     codes[cells.axes[0].nearest(0.5)] = Verdict.INACCURATE

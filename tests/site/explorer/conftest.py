@@ -3,7 +3,7 @@
 import pytest
 
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import profile_laws
+from profilefit.recipes.catalogue import profile_laws
 from profilefit.report.explorer import explorer_section
 from profilefit.report.explorer.offered import address
 

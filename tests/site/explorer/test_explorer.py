@@ -8,7 +8,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.report.explorer.offered import first, offered
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
@@ -178,7 +178,7 @@ def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, fits, n
     light = "diffuse" if name.endswith("diffuse") else "searchlight"
     for n in (1.02, 1.34, 1.6):
         found = chosen(explorer, name, n)
-        named = inventory.find(f"{name}-refracting", fits, n=n)
+        named = catalogue.find(f"{name}-refracting", fits, n=n)
         assert explorer.locator("[data-part='text']").text_content() == export(named, fits, "glsl-es", "law")
         truth = profile_quality(named.law, found["alpha"])
         np.testing.assert_allclose(found["rel"], truth.rel, atol=REFRACTED[0])
@@ -187,7 +187,7 @@ def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, fits, n
         assert explorer.locator("[data-part='foreign']").is_hidden()
     chosen(explorer, name)
     assert explorer.locator("[data-part='text']").text_content() == export(
-        inventory.find(name, fits), fits, "glsl-es", "law"
+        catalogue.find(name, fits), fits, "glsl-es", "law"
     )
 
 

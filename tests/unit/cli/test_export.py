@@ -9,8 +9,8 @@ import pytest
 
 from mcml_sim.files.text_file import read_toml
 from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import find
 from profilefit.recipes.folder import shipped
-from profilefit.recipes.inventory import find
 from profilefit.scenes.fur import law as fur
 from profilefit.scenes.sea import beam_share
 from profilefit.scenes.sea.scene import read

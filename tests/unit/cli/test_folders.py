@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from profilefit.cli.folders import records_folder
+from profilefit.cli.options import records_folder
 from profilefit.errors import InputError, OtherRecords
 from profilefit.recipes.folder import fits_folder
 

@@ -9,8 +9,8 @@ import pytest
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.stack import record as stacks
-from profilefit.recipes.stack import sum_record
+from profilefit.recipes.kinds import gaussians
+from profilefit.recipes.kinds import stack as stacks
 from profilefit.shader.law_file import LANGUAGES
 from tests.unit.recipes.stack.test_record import STACK, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
@@ -37,7 +37,7 @@ g = 0.0
 def heart(command, monkeypatch):
     """STACK as a file, whose fit takes no time."""
     monkeypatch.setattr(stacks, "_channel", made)
-    monkeypatch.setattr(sum_record, "_of_light", made_sums)
+    monkeypatch.setattr(gaussians, "_of_light", made_sums)
     monkeypatch.setattr("profilefit.recipes.workers.cores", lambda: 1)
     Path("heart.toml").write_text(STACK, encoding="utf-8")
     return "heart.toml"
@@ -272,7 +272,7 @@ def test_a_grey_stack_is_fitted(command):
         status, text, err = command("export", str(path), "--lang", lang)
         assert (status, err) == (0, "")
         assert "veil" in text
-    sums = sum_record.load(Path("mine/gaussians/veil.json"))
+    sums = gaussians.load(Path("mine/gaussians/veil.json"))
     assert sums.content["fit"]["result"] == "converged"
     red, green, blue = sums.laws("diffuse", 8)
     assert red == green == blue  # one grey light, fitted with itself

@@ -39,12 +39,9 @@ from profilefit.measured.instrument import beam_of
 from profilefit.measured.photo.setup import read_setup
 from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record
-from profilefit.recipes.inventory import Named, find
-from profilefit.recipes.phases import record as phase_record
+from profilefit.recipes.catalogue import LoadedLaw, find
+from profilefit.recipes.kinds import gaussians, phase, stack
 from profilefit.recipes.phases.data import read_phase
-from profilefit.recipes.stack import record as stack_record
-from profilefit.recipes.stack import schema as stack_schema
-from profilefit.recipes.stack import sum_record
 from profilefit.recipes.stack.file import read_layers
 from profilefit.report.page.document import write_page
 from profilefit.report.tables.claims_table import read_claims
@@ -122,9 +119,9 @@ def read_heart(path: Path) -> object:
 # Kind -> the ending of its files, what mutates it, and all that reads it.
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
     "record": (".json", lambda seed: mutations.record(seed)[1], (lambda path: record.read(path, whole=True),)),
-    "stack-record": (".json", mutations.stack, (stack_schema.read,)),
-    "sum-record": (".json", mutations.sum_record, (sum_record.load,)),
-    "phase-record": (".json", mutations.phase_record, (phase_record.load,)),
+    "stack-record": (".json", mutations.stack, (stack.read,)),
+    "sum-record": (".json", mutations.sum_record, (gaussians.load,)),
+    "phase-record": (".json", mutations.phase_record, (phase.load,)),
     "claims": (".json", mutations.claims, (read_claims_of,)),
     "scene": (".toml", mutations.toml("examples/skin.toml"), (requirements.read,)),
     "head": (".toml", mutations.toml("examples/skin-head.toml"), (lambda path: skin.read(str(path), read_toml(path)),)),
@@ -134,7 +131,7 @@ KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], objec
     "fur": (".toml", mutations.toml("examples/fur.toml"), (read_scene("fur"),)),
     "photo": (".toml", mutations.toml("examples/photo.toml"), (read_setup,)),
     "recipe": (".toml", mutations.recipe, (recipe.read,)),
-    "stack": (".toml", mutations.toml("fits/stacks/skin.toml"), (lambda path: stack_record.request_of(str(path)),)),
+    "stack": (".toml", mutations.toml("fits/stacks/skin.toml"), (lambda path: stack.request(str(path)),)),
     "table": (".csv", mutations.table, (read_profile,)),
     "facts": (".csv", mutations.facts, (lambda path: premises(reading.read(path)),)),
     "beam": (".csv", mutations.beam, (lambda path: beam_of("beam", str(path), "mm"),)),
@@ -230,7 +227,7 @@ def skeleton(text: str, lang: str) -> Any:
     return tokens(text, True), tokens(text, False)
 
 
-def code_of(named: Named, lang: str) -> tuple[str, str, str]:
+def code_of(named: LoadedLaw, lang: str) -> tuple[str, str, str]:
     """What decides an exported code, numbers apart: one prefix serves laws of matched and of refracting surfaces."""
     return type(named.law).__name__, emit.prefix(named.law), lang
 

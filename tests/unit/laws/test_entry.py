@@ -17,7 +17,7 @@ from profilefit.laws.base import Sampler
 from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational
-from profilefit.recipes import inventory, recipe, record, starts
+from profilefit.recipes import catalogue, recipe, record, starts
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record_folder import Records
 from profilefit.shader import emit
@@ -51,8 +51,8 @@ def test_an_entry_tells_of_what_there_is(name):
 
 def test_no_record_is_of_an_index_that_its_law_is_not_made_for():
     for one in [
-        *inventory.profile_laws(fits_folder(), matched=False),
-        *inventory.albedo_laws(fits_folder(), matched=False),
+        *catalogue.profile_laws(fits_folder(), matched=False),
+        *catalogue.albedo_laws(fits_folder(), matched=False),
     ]:
         assert one.law.entry.n.holds(one.setting.n), one.label
 
@@ -205,9 +205,9 @@ def test_a_record_is_read_once(monkeypatch):
     assert seen == ["hazard", "albedo-rational"]
     records = Records(fits_folder())
     seen.clear()
-    inventory.find("hazard", records)
-    inventory.find("hazard", records)
+    catalogue.find("hazard", records)
+    catalogue.find("hazard", records)
     assert seen == ["hazard", "albedo-rational"]
-    inventory.profile_laws(records, matched=False)
-    inventory.albedo_laws(records, matched=False)
+    catalogue.profile_laws(records, matched=False)
+    catalogue.albedo_laws(records, matched=False)
     assert sorted(seen) == sorted(records.paths)

@@ -6,7 +6,7 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import albedo_laws, find, profile_laws, sampled_laws
+from profilefit.recipes.catalogue import albedo_laws, find, profile_laws, sampled_laws
 
 FITS = catalogue.fits_folder()
 

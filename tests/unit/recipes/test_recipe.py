@@ -9,8 +9,8 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.fitting.objectives import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
-from profilefit.recipes import pipelines
 from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.kinds import albedo_map, law
 from profilefit.recipes.recipe import available, find, read
 from profilefit.recipes.record import record_name, spanning_name
 from profilefit.recipes.schema import PIPELINES
@@ -83,7 +83,7 @@ def test_there_are_shipped_recipes():
 def test_every_objective_has_a_pipeline_and_the_other_way_round():
     named = [objective for objectives, _ in PIPELINES.values() for objective in objectives]
     assert sorted(named) == sorted(OBJECTIVES)
-    assert list(PIPELINES) == list(pipelines.PIPELINES)
+    assert list(PIPELINES) == [*albedo_map.PIPELINES, *law.PIPELINES]
 
 
 def test_a_good_recipe_holds_what_its_file_says(write):

@@ -7,7 +7,9 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import RecipeError
-from profilefit.recipes import catalogue, recipe, regenerate
+from profilefit.recipes import catalogue, recipe
+from profilefit.recipes.kinds import KINDS, albedo_map, law
+from profilefit.recipes.regenerate import regenerate, requests_of
 from profilefit.recipes.run import RecipeRun
 
 FITS = catalogue.fits_folder()
@@ -19,12 +21,17 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     said: list[str] = []
     run = RecipeRun("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
     with pytest.raises(RecipeError, match="start must be one of published, corrected, got 'improved'"):
-        regenerate.regenerate((recipe.find("albedo-liang", FITS), recipe.read(bad)), run)
+        regenerate(requests_of(["albedo-liang", str(bad)]), run)
     assert not said
     assert not Path(tmp_path / "store").exists()
 
 
-def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
+def of_recipes(*recipes):
+    by_key = {kind.key: kind for kind in KINDS}
+    return [(by_key["albedo_map" if one.pipeline == "albedo" else "law"], one) for one in recipes]
+
+
+def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, tmp_path):
     made = []
 
     def pipeline(chosen, run, light):
@@ -43,7 +50,9 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
         exactly,
         replace(exactly, name="checked", setting=diffuse, check="orders"),
     )
-    written = regenerate.regenerate(recipes, run, {"albedo": pipeline, "profile": pipeline})
+    monkeypatch.setitem(albedo_map.PIPELINES, "albedo", pipeline)
+    monkeypatch.setitem(law.PIPELINES, "profile", pipeline)
+    written = regenerate(of_recipes(*recipes), run)
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
     assert made == [
         ("albedo-n1.4", refracted),
@@ -65,10 +74,10 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
 def test_records_are_the_same_bytes_whatever_the_processes(tmp_path):
     """Maps, a fit to photons, and what compares the records of all."""
     names = ("albedo-liang", "albedo-rational", "burley-whole", "reproduction")
-    recipes = tuple(recipe.find(name, FITS) for name in names)
+    requests = requests_of(names)
     for processes in (1, 2, 3):
         run = RecipeRun("quick", 5, tmp_path / str(processes), tmp_path / "store", 200_000, lambda _: None, False)
-        steps = regenerate.regenerate(recipes, run, processes=processes)
+        steps = regenerate(requests, run, processes=processes)
         assert all(step.seconds > 0 for step in steps)
         assert {step.path.stem for step in steps if step.path} == set(names)
     one, *others = [{p.name: p.read_bytes() for p in tmp_path.glob(f"{processes}/*.*")} for processes in (1, 2, 3)]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.reproduction import compared, reproduction, stated_error
+from profilefit.recipes.regenerate import compared, reproduction, stated_error
 from tests.fixtures import slow
 
 NAMES = {"burley-whole": 4, "albedo-liang": 3}  # constants; the second is of traced light

@@ -28,7 +28,7 @@ def test_every_setting_has_its_own_store_and_resumes(run):
         batches = sorted((run.store / folder).glob("batch-*"))
         assert len(batches) == 1
         before = batches[0].stat().st_mtime_ns
-        assert np.array_equal(run.light(setting).counts.exits, light.counts.exits)
+        assert np.array_equal(run.part().light(setting).counts.exits, light.counts.exits)
         assert batches[0].stat().st_mtime_ns == before
     assert len(list(run.store.rglob("batch-*"))) == len(SETTINGS)
 

@@ -12,7 +12,7 @@ from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import albedo_laws, profile_laws, sampled_laws
+from profilefit.recipes.catalogue import albedo_laws, profile_laws, sampled_laws
 from profilefit.report.tables.law_tables import (
     NOTHING,
     content,

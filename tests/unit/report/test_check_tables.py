@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.dense_grid import Count, Spread
@@ -23,11 +23,11 @@ def law(*bounds, name="hazard-refracting"):
     rounding = {"rel": 1e-6, "ks": 2e-7, "inversion_error": 4e-7}
     spreads = {PROFILE: spread, CDF: spread, SAMPLE: spread, OWN: spread}
     model = ModelError({"rel": 0.049, "ks": 0.0096}, name)
-    return LawCheck(inventory.find(name, FITS), model, rounding, {"rel": 0.05}, NONE, NONE, bounds, spreads)
+    return LawCheck(catalogue.find(name, FITS), model, rounding, {"rel": 0.05}, NONE, NONE, bounds, spreads)
 
 
 def mapped(*bounds):
-    one = inventory.find("albedo-rational-refracting", FITS)
+    one = catalogue.find("albedo-rational-refracting", FITS)
     errors = {"delta_A": 1e-7, "delta_alpha": 2e-7}
     return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, NONE, Count(0, 0, 0, 7), bounds, {})
 

@@ -7,8 +7,8 @@ import pytest
 
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, fits_folder
+from profilefit.recipes.kinds.stack import interfaces, read
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.stack.schema import interfaces, read
 from profilefit.report.records import largest_error
 from profilefit.report.tables.record_tables import record_tables
 from profilefit.report.tables.stack_table import stack_tables

@@ -12,7 +12,7 @@ import pytest
 
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
-from profilefit.recipes.folder import STACKS, fits_folder
+from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.stack.sum_errors import constant_names
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
 from profilefit.report.page.measured import EvidenceFolder
@@ -123,10 +123,10 @@ def test_the_figure_is_whole(tmp_path):
 
 def test_the_guide_has_the_numbers_of_the_records():
     """`profilefit report --markdown docs/guide/layered.md` fills its table; the prose below says what it shows."""
-    sections = sum_sections(record.available(fits_folder() / STACKS))
+    sections = sum_sections(record.available(fits_folder() / SUMS))
     text = GUIDE.read_text(encoding="utf-8")
     assert f"<!-- stack-gaussians -->\n{sections['stack-gaussians']()}\n<!-- /stack-gaussians -->" in text
-    assert sum_sections({"none": fits_folder() / STACKS / "none.json"}) == {}
+    assert sum_sections({}) == {}
     worst = np.array(
         [
             [max(n["rel"]) for n in one.content["sums"][light]["by_count"]]

@@ -9,12 +9,12 @@ import pytest
 from profilefit.errors import ShaderError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.beam_diffusion import BeamDiffusion
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.shader import emit
 from profilefit.shader.context import program
 
 FITS = catalogue.fits_folder()
-ALL = [*inventory.profile_laws(FITS), *inventory.albedo_laws(FITS)]
+ALL = [*catalogue.profile_laws(FITS), *catalogue.albedo_laws(FITS)]
 LAWS = {emit.prefix(one.law): one.law for one in ALL if not isinstance(one.law, BeamDiffusion)}
 HEADS = {"glsl": "#version 330\n", "glsl-es": "#version 300 es\nprecision highp float;\n"}
 VERTEX = "void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"

@@ -14,7 +14,7 @@ import pytest
 
 from profilefit.errors import InputError, ShippedMap
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import find
+from profilefit.recipes.catalogue import find
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.law_file import LANGUAGES, TARGETS, commented, export

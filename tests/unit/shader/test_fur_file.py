@@ -7,16 +7,14 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.scenes.fur import law, truth
+from profilefit.scenes.fur.source import source, strand_text
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.context import program
-from profilefit.shader.emit import text_beside
-from profilefit.shader.fur_file import export_strand, strand_text
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.cells import RoundedText
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
-SOURCE = text_beside(law.__name__, "glsl/strand.glsl")
-TEXT = strand_text(SOURCE, "python", "law")
+TEXT = strand_text("python", "law")
 SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
 CALLS = (
     "fur_shadow(u.x, u.y) + fur_shared(u.x, u.y, u.z, u.x) + fur_visibility(u.x, u.y, u.z) + fur_slice(u.x, u.y)"
@@ -109,7 +107,7 @@ def require_roots(found, given):
 
 def test_shadow_and_visibility_in_float64():
     random = np.random.default_rng(2)
-    made = functions(strand_text(SOURCE, "python"))
+    made = functions(strand_text("python"))
     for lean in ((0.0, 0.0), (0.3, -0.2)):
         radius, length, theta, z, density = random.uniform((0.1, 1.0, 0.0, 0.0, 0.0), (2, 30, 1.57, 1, 2), (2000, 5)).T
         aside = length * np.hypot(np.tan(theta) - lean[0], lean[1])
@@ -173,7 +171,7 @@ def test_what_an_eye_and_a_lamp_share(context):
         assert np.all(exact <= DOUBLE.call("shadow", radius, one) * (1.0 + 1e-9))
     np.testing.assert_allclose(SINGLE.call("shared", *given), exact, rtol=1e-6)
     calls = "found = vec4(fur_shared(q.x, q.y, q.z, q.w), 0.0, 0.0, 0.0);"
-    drawn = _Pass(context, "fur", DRAW.format(text=strand_text(SOURCE), calls=calls), "f4")(*given)[0]
+    drawn = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given)[0]
     np.testing.assert_allclose(drawn, exact, rtol=3e-6)
 
 
@@ -219,7 +217,7 @@ def test_a_ray_along_the_axis_or_the_side(text):
 
 
 def test_in_float32_on_opengl(context):
-    text = strand_text(SOURCE)
+    text = strand_text()
     radius, aside = covers()
     z, area = rounded(np.random.default_rng(5).random(radius.shape), 3.0)
     shadow, seen, disc, _ = _Pass(context, "fur", DRAW.format(text=text, calls=COVERED), "f4")(radius, aside, area, z)
@@ -233,7 +231,7 @@ def test_swept_on_opengl(context, start, r):
     """k is what the shader has made of m: a texel has room for four arguments."""
     calls = MET.format(k="0.02 * sqrt(max(1.0 - q.z * q.z - q.w * q.w, 0.0))", r=r)
     given = met_cleanly(start, 50)
-    found, k, _, _ = _Pass(context, "fur", DRAW.format(text=strand_text(SOURCE), calls=calls), "f4")(*given[:4])
+    found, k, _, _ = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given[:4])
     assert judged(found, [*given[:4], np.full_like(k, float(r)), k], 0.02) < 1e-5
 
 
@@ -241,23 +239,23 @@ def test_swept_on_opengl(context, start, r):
 def test_degenerate_rays_on_opengl(context, r):
     given = rounded(*degenerate(), float(r), 0.05)
     calls = MET.format(k="0.05", r=r)
-    found = _Pass(context, "fur", DRAW.format(text=strand_text(SOURCE), calls=calls), "f4")(*given[:4])[0]
+    found = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given[:4])[0]
     require_roots(found, given)
 
 
 @pytest.mark.parametrize("head", HEADS)
 def test_glsl(context, head):
-    fragment = HEADS[head] + 2 * strand_text(SOURCE, "glsl") + MAIN.format(calls=CALLS)
+    fragment = HEADS[head] + 2 * strand_text("glsl") + MAIN.format(calls=CALLS)
     program(context, "fur", fragment, HEADS[head] + VERTEX).release()
 
 
 def test_hlsl(tmp_path):
-    require_hlsl(tmp_path, 2 * strand_text(SOURCE, "hlsl"), CALLS)
+    require_hlsl(tmp_path, 2 * strand_text("hlsl"), CALLS)
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)
 def test_whole_files(lang):
-    text = export_strand(SOURCE, lang)
+    text = source("fur", lang)
     if lang == "json":
         told = json.loads(text)
         assert told["law"] == "fur"
@@ -272,7 +270,7 @@ def test_whole_files(lang):
     ):
         assert f"fur_{called}" in text
     assert "strand_" not in text
-    assert "fur_" not in export_strand(SOURCE, lang, "hair")
+    assert "fur_" not in source("fur", lang, "hair")
     if lang == "python":
         assert functions(text)["fur_shadow"](2.0, 0.0) == pytest.approx(4.0 * np.pi)
 
@@ -280,10 +278,10 @@ def test_whole_files(lang):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: strand_text(SOURCE, "wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: export_strand(SOURCE, "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: export_strand(SOURCE, "json", "hair"), "name must be left out where lang is json, .*, got 'hair'"),
-        (lambda: export_strand(SOURCE, "glsl", "gl_hair"), "name must be letters, digits"),
+        (lambda: strand_text("wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
+        (lambda: source("fur", "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
+        (lambda: source("fur", "json", "hair"), "name must be left out where lang is json, .*, got 'hair'"),
+        (lambda: source("fur", "glsl", "gl_hair"), "name must be letters, digits"),
     ],
 )
 def test_refused(make, message):

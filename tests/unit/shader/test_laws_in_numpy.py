@@ -13,16 +13,16 @@ from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.laws.quantile import Quantile
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.shader import emit
 
 FITS = catalogue.fits_folder()
 LAWS = {
     one.label: one.law.in_reduced()
-    for one in inventory.profile_laws(FITS, matched=False)
+    for one in catalogue.profile_laws(FITS, matched=False)
     if not isinstance(one.law, BeamDiffusion)  # it has no text
 }
-MAPS = {one.label: one.law.in_reduced() for one in inventory.albedo_laws(FITS, matched=False)}
+MAPS = {one.label: one.law.in_reduced() for one in catalogue.albedo_laws(FITS, matched=False)}
 ALPHA = np.array([0.03, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999, 0.99999, 1.0])[:, None]
 X = np.geomspace(1e-6, 200.0, 120)[None, :]
 XI = np.concatenate([np.geomspace(1e-6, 9e-3, 20), np.linspace(0.0123, 0.99, 80), 1.0 - np.geomspace(9e-3, 1e-6, 20)])

@@ -7,13 +7,13 @@ import pytest
 
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, from_table
 from profilefit.errors import InputError
-from profilefit.recipes.phases.record import find
+from profilefit.recipes.kinds.phase import named
 from profilefit.shader.context import program
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.phase_text import export_phase, phase_text
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
-RECORD = find("petzold")
+RECORD = named("petzold")
 SEA = RECORD.phase()
 PHASES = pytest.mark.parametrize(
     "phase",

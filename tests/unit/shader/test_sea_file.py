@@ -7,19 +7,17 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.scenes.sea import law
+from profilefit.scenes.sea.source import blur_text, export_blur, export_segment, segment_text
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.context import program
-from profilefit.shader.emit import text_beside
 from profilefit.shader.law_file import LANGUAGES
-from profilefit.shader.sea_file import blur_text, export_blur, export_segment, segment_text
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
-SOURCE = text_beside(law.__name__, "glsl/segment.glsl")
 LOBES = ((0.7, 0.95), (0.3, 0.6))
 C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
 BLURS = [law.water_gaussians(omega, c * DEPTH, LOBES, 3) for omega, c in zip(OMEGA, C, strict=True)]
 TEXTS = {
-    "segment": lambda lang: segment_text(SOURCE, lang),
+    "segment": lambda lang: segment_text(lang),
     "blur": lambda lang: blur_text(BLURS, C, lang),
 }
 CALLS = {
@@ -53,7 +51,7 @@ def test_the_segment_in_float64():
     random = np.random.default_rng(2)
     c, s0, t0, t1 = random.uniform(0.01, 2.0, (4, 1000))
     m = np.append(-1.0, random.uniform(-1.0, 1.0, 999))
-    made = functions(segment_text(SOURCE, "python"))
+    made = functions(segment_text("python"))
     np.testing.assert_allclose(
         made["sea_segment_integral"](c, s0, t0, m, t1), law.segment_integral(c, s0, t0, m, t1), rtol=1e-8
     )
@@ -94,7 +92,7 @@ def test_hlsl(tmp_path, which):
 
 @pytest.mark.parametrize("lang", LANGUAGES)
 def test_whole_files(lang):
-    segment, blur = export_segment(SOURCE, lang), export_blur(BLURS, C, DEPTH, lang)
+    segment, blur = export_segment(lang), export_blur(BLURS, C, DEPTH, lang)
     if lang == "json":
         assert json.loads(segment)["law"] == "sea-segment"
         green = json.loads(blur)["numbers"]["green"]
@@ -103,7 +101,7 @@ def test_whole_files(lang):
     assert "sea_segment_integral(c, s0, t0, m, t1)" in segment
     assert "after 4 m of water" in blur
     assert "attenuation of red, green, blue 0.5, 0.2, 0.4 [1/m]" in blur
-    assert "sea_" not in export_segment(SOURCE, lang, "fog")
+    assert "sea_" not in export_segment(lang, "fog")
     assert "fog_share(" in export_blur(BLURS, C, DEPTH, lang, "fog")
     if lang == "python":
         assert functions(segment)["sea_segment_integral"](1.0, 0.0, 0.0, -1.0, 2.0) == 2.0
@@ -112,11 +110,11 @@ def test_whole_files(lang):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: segment_text(SOURCE, "wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: export_segment(SOURCE, "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: export_segment(SOURCE, "json", "fog"), "name must be left out where lang is json"),
+        (lambda: segment_text("wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
+        (lambda: export_segment("wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
+        (lambda: export_segment("json", "fog"), "name must be left out where lang is json"),
         (lambda: export_blur(BLURS, C, DEPTH, "json", "fog"), "name must be left out where lang is json"),
-        (lambda: export_segment(SOURCE, "glsl", "gl_fog"), "name must be letters, digits"),
+        (lambda: export_segment("glsl", "gl_fog"), "name must be letters, digits"),
         (lambda: blur_text(BLURS[:2], C), "blurs must be three of one number of Gaussians, .*, got 3, 3"),
         (lambda: blur_text([], C), "blurs must be three .*, got none"),
         (

@@ -4,23 +4,26 @@ import hashlib
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from mcml_sim import Setting
+from mcml_sim.files.text_file import read_toml
 from profilefit.errors import DamagedRecord, InputError, OutputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.stack import record as stacks
-from profilefit.recipes.stack.record import StackRequest, find, load, matching, request_of, require_apart
-from profilefit.recipes.stack.schema import read
-from profilefit.recipes.work import alone
+from profilefit.recipes.folder import STACKS, fits_folder
+from profilefit.recipes.kinds import stack as stacks
+from profilefit.recipes.kinds.stack import StackRequest, find, load, matching, read, request
+from profilefit.recipes.regenerate import requests_of
+from profilefit.recipes.run import RecipeRun, alone
 from tests.fixtures import slow
 
+RUN = RecipeRun("quick", 1, Path(), None, None)
 STACK = """\
 title = "Muscle under its skin"
 illumination = "diffuse"
@@ -66,7 +69,7 @@ def constants(medium, number):
     return {name: value * factor for name, value in CONSTANTS.items()}
 
 
-def made(illumination, medium, starts=()):
+def made(illumination, medium, starts=(), tracing=None):
     """What `_channel` gives after a minute, at once: exact light has no photons, and nothing was fitted."""
     setting = Setting(illumination, n=medium.layers[0].n)
     own = catalogue.load("hazard", setting=setting).constants()
@@ -112,7 +115,7 @@ def file(tmp_path):
 @pytest.fixture
 def written(at_once, file, tmp_path):
     """The record of the stack above."""
-    return alone(stacks.work(request_of(file())), tmp_path / "mine")
+    return alone(stacks.fit(request(file()), RUN), tmp_path / "mine")
 
 
 def by_hand(of: StackRequest, channel: int) -> StackLaw:
@@ -129,8 +132,8 @@ def by_hand(of: StackRequest, channel: int) -> StackLaw:
 @pytest.mark.parametrize("text", [STACK, *slow(THREE)], ids=["two layers", "three"])
 def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path, text):
     said: list[str] = []
-    of = request_of(file(text=text))
-    path = alone(stacks.work(of), tmp_path / "mine", say=said.append)
+    of = request(file(text=text))
+    path = alone(stacks.fit(of, RUN), tmp_path / "mine", say=said.append)
     assert path == tmp_path / "mine" / "stacks" / "heart.json"
     assert [re.sub(r"[\d.]+ s", "SECONDS", line) for line in said] == [f"stacks/heart: SECONDS, {of.title}"]
     found = load(path)
@@ -146,7 +149,7 @@ def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path,
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
-    again = alone(stacks.work(of), tmp_path / "again")
+    again = alone(stacks.fit(of, RUN), tmp_path / "again")
     assert again.read_bytes() == path.read_bytes()
 
 
@@ -155,7 +158,7 @@ def test_grey_layers_are_fitted_once(monkeypatch, file, tmp_path):
     monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
     grey = [("[0.05, 0.20, 0.35]", "0.2"), ("[1.8, 2.2, 2.6]", "2"), ("[0.20, 0.80, 1.2]", "0.8")]
     grey += [("[1.13, 1.2, 1.3]", "1.2")]
-    path = alone(stacks.work(request_of(file(*(one for pair in grey for one in pair)))), tmp_path)
+    path = alone(stacks.fit(request(file(*(one for pair in grey for one in pair))), RUN), tmp_path)
     assert len(asked) == 1
     red, green, blue = load(path).laws
     assert red.constants() == green.constants() == blue.constants()
@@ -166,7 +169,7 @@ def test_starts_of_the_file_are_those_of_its_colours(monkeypatch, file, tmp_path
     monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
     rows = {name: [0.2, -0.1, *[1.0] * 6, float(place)] for place, name in enumerate(CHANNELS, start=1)}
     text = "\n[start]\n" + "\n".join(f"{name} = [{row}]" for name, row in rows.items())
-    alone(stacks.work(request_of(file(text=STACK + text))), tmp_path)
+    alone(stacks.fit(request(file(text=STACK + text)), RUN), tmp_path)
     assert [given[2][0].tolist() for given in asked] == list(rows.values())
 
 
@@ -272,20 +275,20 @@ def test_a_record_of_another_law_is_none_of_a_stack(tmp_path):
 def test_what_is_a_stack(file, tmp_path):
     recipe = tmp_path / "recipe.toml"
     recipe.write_text((fits_folder() / "hazard.toml").read_text())
-    assert stacks.is_stack(file())
-    assert stacks.is_stack("heart")
-    assert request_of("heart").stack.names == ("epicardium", "heart muscle")
+    assert request(file())
+    assert request("heart")
+    assert request("heart").stack.names == ("epicardium", "heart muscle")
     for name in (str(recipe), "hazard", "nothing", str(tmp_path / "nothing.toml"), "a" * 300, "a" * 300 + ".toml"):
-        assert not stacks.is_stack(name)
+        assert not request(name)
 
 
 def test_what_a_file_says(file):
-    of = request_of(file(name="mine"))
+    of = request(file(name="mine"))
     assert (of.name, of.title, of.illumination) == ("mine", "Muscle under its skin", "diffuse")
-    plain = request_of(file('title = "Muscle under its skin"\nillumination = "diffuse"\n', ""))
+    plain = request(file('title = "Muscle under its skin"\nillumination = "diffuse"\n', ""))
     assert (plain.title, plain.illumination) == (stacks.TITLE, "diffuse")
     # A scene's file is one of a stack: what draws it is not looked at.
-    drawn = request_of(file('[[layers]]\nname = "epi', 'scene = "layers"\npose = 3\n[[layers]]\nname = "epi'))
+    drawn = request(file('[[layers]]\nname = "epi', 'scene = "layers"\npose = 3\n[[layers]]\nname = "epi'))
     assert drawn.stack.media == of.stack.media
 
 
@@ -317,7 +320,7 @@ REFUSED = [
 def test_a_mistake_in_a_file_is_one_line(file, tmp_path, pieces, message):
     path = file(*pieces)
     with pytest.raises(InputError, match=message) as caught:
-        request_of(path)
+        stacks.requested(path, read_toml(Path(path)))
     assert str(caught.value).startswith(f"{path}: ")
     assert str(caught.value).isprintable()
 
@@ -331,41 +334,42 @@ def test_a_mistake_in_a_file_is_one_line(file, tmp_path, pieces, message):
 )
 def test_what_no_law_is_for_is_refused_before_any_fit(monkeypatch, file, tmp_path, pieces, message):
     monkeypatch.setattr(stacks, "_channel", lambda *_: pytest.fail("nothing is to be fitted"))
-    of = request_of(file(*pieces))
+    of = request(file(*pieces))
     with pytest.raises(InputError, match=message):
-        alone(stacks.work(of), tmp_path / "mine")
+        alone(stacks.fit(of, RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
 
 
 def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
     """Not after two colours, either; and an old record stays as it was."""
 
-    def fails(illumination, medium, starts):
+    def fails(illumination, medium, starts, tracing):
         if medium.layers[0].mu_a > 0.3:
             raise FloatingPointError("blue diverges")
         return made(illumination, medium)
 
-    of = request_of(file())
+    of = request(file())
     monkeypatch.setattr(stacks, "_channel", fails)
     with pytest.raises(FloatingPointError, match="blue diverges"):
-        alone(stacks.work(of), tmp_path / "mine")
+        alone(stacks.fit(of, RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
     monkeypatch.setattr(stacks, "_channel", made)
-    path = alone(stacks.work(of), tmp_path / "mine")
+    path = alone(stacks.fit(of, RUN), tmp_path / "mine")
     before = path.read_bytes()
     monkeypatch.setattr(stacks, "_channel", fails)
     with pytest.raises(FloatingPointError, match="blue diverges"):
-        alone(stacks.work(replace(of, title="another")), tmp_path / "mine")
+        alone(stacks.fit(replace(of, title="another"), RUN), tmp_path / "mine")
     assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
     (tmp_path / "full").write_text("in the way")
     monkeypatch.setattr(stacks, "_channel", made)
     with pytest.raises(OutputError, match=r"cannot write into .*full"):
-        alone(stacks.work(of), tmp_path / "full")
+        alone(stacks.fit(of, RUN), tmp_path / "full")
 
 
 def test_a_record_is_found_by_path_and_by_name(written, tmp_path):
     folder = tmp_path / "mine"
-    assert find(str(written), tmp_path) == find("heart", folder) == written
+    digest = hashlib.sha256(written.read_bytes()).hexdigest()
+    assert find(str(written), tmp_path).digest == find("heart", folder).digest == digest
     for name in ("skin", "hazard", str(fits_folder() / "hazard.json"), str(tmp_path / "nothing.json"), "a" * 300):
         assert find(name, folder) is None
     assert find("heart", tmp_path) is None
@@ -379,12 +383,12 @@ def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
     """By whatever names; at another thickness or light, or with another coefficient, it is of something else."""
     folder = tmp_path / "mine"
     names = ('"epicardium"', '"bark"', '"assumed"', '"a book"', '"Muscle under its skin"', '"x"')
-    same = request_of(file(*names, name="x"))
+    same = request(file(*names, name="x"))
     found = matching(same, folder)
     assert found is not None
     assert found.digest == load(written).digest
     for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
-        assert matching(request_of(file(*pieces, name="x")), folder) is None
+        assert matching(request(file(*pieces, name="x")), folder) is None
     assert matching(same, tmp_path) is None
 
 
@@ -410,7 +414,7 @@ def test_a_damaged_record_of_something_else_stops_nothing(written, file, tmp_pat
         first.write_text(json.dumps(content))
     for pieces, name in (((), "heart"), (("0.3\n", "0.31\n"), None)):
         with pytest.warns(DamagedRecord, match=rf"first\.json is passed over: {cause}") as said:
-            found = matching(request_of(file(*pieces)), folder)
+            found = matching(request(file(*pieces)), folder)
         assert (found and found.name) == name
         assert len(said) == 1
         assert str(said[0].message).isprintable()
@@ -422,8 +426,8 @@ def test_the_record_that_is_asked_for_must_be_whole(written, file, tmp_path):
     other_half_space(content)
     written.write_text(json.dumps(content))
     with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
-        matching(request_of(file()), tmp_path / "mine")
-    assert matching(request_of(file("0.3\n", "0.31\n")), tmp_path / "mine") is None
+        matching(request(file()), tmp_path / "mine")
+    assert matching(request(file("0.3\n", "0.31\n")), tmp_path / "mine") is None
 
 
 NOT_SHOWN = {
@@ -461,33 +465,35 @@ def test_what_no_report_can_show_is_one_line(written, message, change):
 def test_a_record_matches_an_image_of_thicknesses(at_once, file, tmp_path):
     """Whose mean has more digits than a record."""
     Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
-    of = request_of(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
+    of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
     mean = of.stack.media[0].layers[0].thickness
     assert mean != float(f"{mean:.12g}")
-    path = alone(stacks.work(of), tmp_path / "mine")
+    path = alone(stacks.fit(of, RUN), tmp_path / "mine")
     found = matching(of, tmp_path / "mine")
     assert found is not None
     assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
     assert load(path).stack.map is None
 
 
-SHIPPED = sorted(path.stem for path in (fits_folder() / stacks.FOLDER).glob("*.toml"))
+SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_stack_has_its_record(name):
     """Of the layers that its file has, and under the map and laws that ship today."""
-    found = matching(request_of(name), fits_folder())
+    found = matching(request(name), fits_folder())
     assert found is not None
     assert found.name == name
-    assert find(name, fits_folder()) == fits_folder() / stacks.FOLDER / f"{name}.json"
+    assert find(name, fits_folder()).digest == found.digest
     for channel, law in enumerate(found.laws):
         ends = sorted([law.top.reflectance, law.below.reflectance])
         assert ends[0] <= law.total(0.2) <= ends[1], channel
 
 
-def test_stacks_of_one_name_would_write_one_record(file):
-    of = request_of(file())
-    require_apart([of, replace(of, name="skin")])
+def test_stacks_of_one_name_would_write_one_record(file, tmp_path):
+    path, other = file(), tmp_path / "other" / "heart.toml"
+    other.parent.mkdir()
+    other.write_text(STACK)
+    assert [kind.key for kind, _ in requests_of([path, "skin", path])] == ["stack", "gaussians"] * 2
     with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
-        require_apart([of, replace(of, name="skin"), of])
+        requests_of([path, "skin", str(other)])

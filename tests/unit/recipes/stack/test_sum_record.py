@@ -11,19 +11,18 @@ from profilefit.errors import InputError, RecordError
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
+from profilefit.recipes.kinds import gaussians as sums
+from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
+from profilefit.recipes.run import alone
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.stack import sum_record
-from profilefit.recipes.stack.record import request_of
 from profilefit.recipes.stack.sum_errors import constant_names
-from profilefit.recipes.stack.sum_record import COUNTS, beside, load
-from profilefit.recipes.work import alone
-from tests.unit.recipes.stack.test_record import STACK, changed
+from tests.unit.recipes.stack.test_record import RUN, STACK, changed
 
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 EDGES = np.geomspace(0.01, 10.0, 6)
 
 
-def made_sums(media, illumination):
+def made_sums(media, illumination, tracing=None):
     """What `_of_light` gives after a minute, at once; each light, number, colour and Gaussian has its own."""
     shift = 1.0 + ILLUMINATIONS.index(illumination)
     constants, by_count = {}, []
@@ -33,7 +32,7 @@ def made_sums(media, illumination):
         errors = dict.fromkeys(ERRORS, 1e-3) | {"statistical_error": None}
         for name, value in zip(constant_names(count), values, strict=True):
             constants[f"{count}.{name}"] = {"published": None, "regenerated": value, "free": True, **errors}
-        measured = {key: [place / count for place in (0.1, 0.2, 0.3)] for key in sum_record.MEASURED}
+        measured = {key: [place / count for place in (0.1, 0.2, 0.3)] for key in sums.MEASURED}
         by_count.append({"result": "converged", "steps": 9, "condition_number": 3.0, **measured})
     whole = [0.5, 0.4, 0.3][: len(media)]
     energy = np.full(5, 0.05)
@@ -41,7 +40,7 @@ def made_sums(media, illumination):
         f"{channel}_{key}": value
         for channel, a in zip(CHANNELS, whole, strict=True)
         for key, value in zip(
-            sum_record.ARRAYS,
+            sums.ARRAYS,
             (EDGES * shift, energy * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])),
             strict=True,
         )
@@ -58,14 +57,14 @@ def made_sums(media, illumination):
 @pytest.fixture
 def written(monkeypatch, tmp_path):
     """The record of a stack whose fit takes no time."""
-    monkeypatch.setattr(sum_record, "_of_light", made_sums)
+    monkeypatch.setattr(sums, "_of_light", made_sums)
     (tmp_path / "heart.toml").write_text(STACK, encoding="utf-8")
-    return alone(sum_record.work(request_of(str(tmp_path / "heart.toml"))), tmp_path / "mine")
+    return alone(sums.fit(request(str(tmp_path / "heart.toml")), RUN), tmp_path / "mine")
 
 
 def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
     assert written == tmp_path / "mine" / "gaussians" / "heart.json"
-    found, of = load(written), request_of(str(tmp_path / "heart.toml"))
+    found, of = load(written), request(str(tmp_path / "heart.toml"))
     assert found.stack.media == of.stack.media
     for light in ILLUMINATIONS:
         known = made_sums(of.stack.media, light)
@@ -83,14 +82,14 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
             assert [one.whole, one.inside] == known["arrays"][f"{channel}_ends"].tolist()
     first, second = (found.laws(light)[0].variance for light in ILLUMINATIONS)
     assert first != second
-    again = alone(sum_record.work(of), tmp_path / "again")
+    again = alone(sums.fit(of, RUN), tmp_path / "again")
     assert again.read_bytes() == written.read_bytes()
     assert again.with_suffix(".npz").read_bytes() == written.with_suffix(".npz").read_bytes()
 
 
 def test_it_belongs_to_the_record_of_its_stack(written, tmp_path):
-    assert beside(tmp_path / "mine" / STACKS / "heart.json") == written
-    assert beside(tmp_path / "mine" / STACKS / "skin.json") is None
+    assert find("heart", tmp_path / "mine").path == written
+    assert find("skin", tmp_path / "mine") is None
 
 
 DAMAGE = {
@@ -169,11 +168,11 @@ def test_damaged_arrays_are_one_line(written, name, value):
 
 
 def test_what_no_sums_are_for_is_refused_before_any_fit(monkeypatch, tmp_path):
-    monkeypatch.setattr(sum_record, "_of_light", lambda *_: pytest.fail("nothing is to be fitted"))
+    monkeypatch.setattr(sums, "_of_light", lambda *_: pytest.fail("nothing is to be fitted"))
     path = tmp_path / "heart.toml"
     path.write_text(STACK.replace("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), encoding="utf-8")
     with pytest.raises(InputError, match="layers must have one n for a law of a stack"):
-        alone(sum_record.work(request_of(str(path))), tmp_path / "mine")
+        alone(sums.fit(request(str(path)), RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
 
 
@@ -186,7 +185,7 @@ def shipped():
 def test_a_shipped_stack_has_its_sums(shipped, name):
     """Of the layers that its file has; all fits converged, each error there where it applies."""
     found = shipped[name]
-    assert record.plain(found.stack.media) == record.plain(request_of(name).stack.media)
+    assert record.plain(found.stack.media) == record.plain(request(name).stack.media)
     assert found.content["fit"]["result"] == "converged"
     for place, one in found.content["constants"].items():
         known = {key for key in ERRORS if one[key] is not None}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError, RecordError
-from profilefit.recipes import catalogue, inventory
+from profilefit.recipes import catalogue
 from profilefit.shader import emit
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import Bound
@@ -18,9 +18,9 @@ from profilefit.shader.check.map_check import check_map
 from profilefit.shader.check.shader_law import Values
 
 FITS = catalogue.fits_folder()
-HAZARD = inventory.find("hazard", FITS)
-REFRACTING = inventory.find("hazard-refracting", FITS, n=1.2)
-RATIONAL = inventory.find("albedo-rational-refracting", FITS)
+HAZARD = catalogue.find("hazard", FITS)
+REFRACTING = catalogue.find("hazard-refracting", FITS, n=1.2)
+RATIONAL = catalogue.find("albedo-rational-refracting", FITS)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_a_regenerated_law_passes_with_room(context, exact):
 @pytest.mark.slow
 def test_the_gpus_numbers_have_the_records_errors(context):
     """Of a law that has an exact profile, measured anew."""
-    (found,) = check_laws(context, [inventory.find("burley-whole", FITS)], FITS)
+    (found,) = check_laws(context, [catalogue.find("burley-whole", FITS)], FITS)
     assert names(found) == []
     assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-5)
     assert found.measured["ks"] == pytest.approx(found.model.values["ks"], rel=1e-4)
@@ -110,7 +110,7 @@ def test_an_index_between_has_the_worse_of_its_neighbours_errors():
     content = json.loads((FITS / "hazard-refracting.json").read_text())
     known = {n: rel for n, rel in zip(*(content["quality"]["by_index"][key] for key in ("n", "rel")), strict=True)}
     for n, near in ((1.2, (1.2,)), (1.25, (1.2, 1.3)), (1.4, (1.4,)), (1.55, (1.5, 1.6)), (1.6, (1.6,))):
-        found = bounds.of_profile(inventory.find("hazard-refracting", FITS, n=n), FITS)
+        found = bounds.of_profile(catalogue.find("hazard-refracting", FITS, n=n), FITS)
         assert found.values["rel"] == max(known[one] for one in near)
         assert found.source == "hazard-refracting"
 
@@ -129,11 +129,11 @@ def test_what_the_paper_promises_is_judged_of_its_constants_alone():
     assert str(valid.alpha) == "[1e-06, 1]"
     assert str(valid.xi) == "[0, 1]"
     assert str(validity.of_map(maps[0], FITS)[0]) == "[0, 1]"
-    whole = inventory.find("liang-whole", FITS)
+    whole = catalogue.find("liang-whole", FITS)
     assert str(validity.of_profile(whole, FITS).xi) == "[0.01, 1]"
-    fitted, _ = validity.of_map(inventory.find("albedo-liang", FITS), FITS)
+    fitted, _ = validity.of_map(catalogue.find("albedo-liang", FITS), FITS)
     assert (fitted.low, fitted.high) == pytest.approx((0.05, 0.9), abs=1e-4)
-    inverse = next(one for one in inventory.sampled_laws(FITS) if one.label == "liang-inverse-as-published")
+    inverse = next(one for one in catalogue.sampled_laws(FITS) if one.label == "liang-inverse-as-published")
     assert validity.of_profile(inverse, FITS).alpha is None
     assert set(bounds.of_profile(inverse, FITS).values) == {"inversion_error"}
 

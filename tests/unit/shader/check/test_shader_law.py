@@ -9,7 +9,7 @@ import pytest
 import profilefit
 from profilefit.errors import ShaderError
 from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import find
+from profilefit.recipes.catalogue import find
 from profilefit.shader import emit, export
 from profilefit.shader.check.law_cost import costs
 from profilefit.shader.check.shader_law import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half

@@ -13,22 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim import Medium, Setting
+from mcml_sim import Medium
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import RecordError
 from profilefit.laws.gaussians import DEFAULT, MOST, MediumGaussians
 from profilefit.materials import CHANNELS
-from profilefit.recipes import record
+from profilefit.recipes import record, schema
 from profilefit.recipes.folder import SUMS
-from profilefit.recipes.kinds import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT
-from profilefit.recipes.schema import Kinds
-from profilefit.recipes.stack import fit, gaussians
+from profilefit.recipes.kinds import stack as stack_kind
+from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack
+from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
+from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields
+from profilefit.recipes.stack import fit as stacks
+from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
 from profilefit.recipes.stack.gaussians import SumLight
-from profilefit.recipes.stack.record import StackRequest, damage, told_stack
+from profilefit.recipes.stack.photons import Tracing
 from profilefit.recipes.stack.sum_errors import constant_names, errors, quality
-from profilefit.recipes.work import Made, Work
 
+__all__ = ["find", "fit", "quality", "read", "request"]
 PIPELINE = "gaussians"
 TITLE = "Sums of 1 to 8 Gaussians, three colours with the same variances"
 EQUATIONS = "R_d = A sum_i w_i e^(-r^2 / 2 v_i) / (2 pi v_i)"
@@ -45,13 +48,13 @@ ARRAYS = ("edges", "energy", "weight", "noise", "ends")  # of a colour's light; 
 COUNTS = range(1, MOST + 1)
 MEASURED = ("rel", "rms", "ks", "alone")  # of red, green and blue
 # What tables and pictures take from a record.
-TOLD: Kinds = {
+USED: Fields = {
     **dict.fromkeys(("title", "equations", "note", "unit"), TEXT),
     "layers": LIST,
     "sums": TABLE,
     "data_digest": DIGEST,
 }
-OF_LIGHT: Kinds = {
+OF_LIGHT: Fields = {
     **dict.fromkeys(("reflectance", "share"), NUMBERS),
     "by_count": LIST,
     "by_count.*": TABLE,
@@ -60,8 +63,8 @@ OF_LIGHT: Kinds = {
     "by_count.*.condition_number": MEASURE,
     **{f"by_count.*.{name}": NUMBERS for name in MEASURED},
 }
-SHOWN: Kinds = {
-    **TOLD,
+SHOWN: Fields = {
+    **USED,
     **{f"sums.{light}": TABLE for light in ILLUMINATIONS},
     **{f"sums.{light}.{key}": kind for light in ILLUMINATIONS for key, kind in OF_LIGHT.items()},
 }
@@ -77,18 +80,23 @@ class SumRecord:
     path: Path
 
     def laws(self, illumination: str, count: int = DEFAULT) -> tuple[MediumGaussians, ...]:
-        """Of red, green and blue, as `gaussians.alike` fits them."""
-        found, units = self.content["sums"][illumination], [one.layers[0].similar.mfp for one in self.stack.media]
+        """Return the sums of red, green and blue, as `gaussians.shared_gaussians` fits them."""
+        of_light, units = self.content["sums"][illumination], [one.layers[0].similar.mfp for one in self.stack.media]
         variances, *weights = _values(self.content, illumination, count)
         scaled = (tuple((variances / unit**2).tolist()) for unit in units)
         return tuple(
-            MediumGaussians(fit.setting_of(medium, illumination), whole, own, tuple(weight.tolist()))
-            for medium, whole, own, weight in zip(self.stack.media, found["reflectance"], scaled, weights, strict=True)
+            MediumGaussians(stacks.setting_of(medium, illumination), whole, own, tuple(weight.tolist()))
+            for medium, whole, own, weight in zip(
+                self.stack.media, of_light["reflectance"], scaled, weights, strict=True
+            )
         )
 
     def lights(self, illumination: str) -> tuple[SumLight, ...]:
-        """What red, green and blue were fitted to, edges in the stack's unit; RecordError on damaged arrays."""
-        arrays, found = record.read_arrays(self.path), []
+        """Return the light that red, green and blue were fitted to, edges in the stack's unit.
+
+        RecordError on damaged arrays.
+        """
+        arrays, lights = record.read_arrays(self.path), []
         for channel in CHANNELS:
             try:
                 edges, energy, weight, noise, ends = (arrays[f"{illumination}_{channel}_{key}"] for key in ARRAYS)
@@ -99,67 +107,86 @@ class SumRecord:
             if not (sound and np.all(np.diff(edges) > 0) and np.all(energy > 0) and light.whole > 0):
                 file = self.path.with_suffix(".npz")
                 raise RecordError(f"{file}: is damaged: {illumination}_{channel} is no light in rings; regenerate it")
-            found.append(light)
-        return tuple(found)
+            lights.append(light)
+        return tuple(lights)
 
 
-def work(of: StackRequest) -> Work:
-    """Fits of the sums of a stack in both lights: a minute. InputError on media without a law."""
+def find(name: str, folder: Path) -> SumRecord | None:
+    """Return the sums of a stack by the path of their record or by name in a folder; None where there are none."""
+    path = record.named(name, folder / SUMS, PIPELINE)
+    return None if path is None else load(path)
+
+
+def request(name: str) -> StackRequest | None:
+    """Return the stack of a file of layers or of a shipped one by its name, None if it is of something else."""
+    return stack_kind.request(name)
+
+
+def fit(of: StackRequest, run: RecipeRun) -> Work:
+    """Return the record to be made of a stack in both lights, in one part: a minute. InputError if no law fits."""
     for medium in of.stack.media:
-        fit.require(medium)
+        stacks.require(medium)
 
-    def finish(found: list[Any]) -> Made:
-        (lights,) = found
+    def finish(results: list[Any]) -> RecordContent:
+        (lights,) = results
         arrays = {f"{light}_{name}": array for light, one in lights.items() for name, array in one["arrays"].items()}
-        return _content(of, lights, arrays), arrays
+        return _content(of, run, lights, arrays), arrays
 
-    return Work(f"{SUMS}/{of.name}", (partial(_of_lights, of.stack.media),), finish)
+    part = partial(_of_lights, of.stack.media, Tracing.of(run, f"{of.name}-sums"))
+    return Work(f"{SUMS}/{of.name}", (part,), finish, order=(LAWS, 1, 1))
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return all that a record says; RecordError on one that is damaged."""
+    return dict(load(path).content)
 
 
 def beside(stack: Path) -> Path | None:
-    """The record of sums that belongs to a stack's, FITS/stacks/NAME.json; None where there is none."""
+    """Return the record of sums that belongs to a stack's, FITS/stacks/NAME.json; None where there is none."""
     path = stack.parent.parent / SUMS / stack.name
     return path if path.exists() else None
 
 
 def load(path: Path) -> SumRecord:
-    """A record; RecordError in one line on one that is damaged."""
+    """Return a record; RecordError in one line on one that is damaged."""
     content = record.read_of(path, PIPELINE, "sums of Gaussians", SHOWN)
     if text := _mismatched(content):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     record.record_setting(content)
     with damage(path):
-        return SumRecord(told_stack(str(path), content, TOLD), content, path)
+        return SumRecord(recorded_stack(str(path), content, USED), content, path)
 
 
-def _of_lights(media: tuple[Medium, ...]) -> dict[str, dict[str, Any]]:
+def _of_lights(media: tuple[Medium, ...], tracing: Tracing) -> dict[str, dict[str, Any]]:
     """Fit both illuminations in one process, since they share most of the work of the exact light."""
-    return {illumination: _of_light(media, illumination) for illumination in ILLUMINATIONS}
+    return {illumination: _of_light(media, illumination, tracing) for illumination in ILLUMINATIONS}
 
 
-def _of_light(media: tuple[Medium, ...], illumination: str) -> dict[str, Any]:
-    """All that is recorded of one light."""
+def _of_light(media: tuple[Medium, ...], illumination: str, tracing: Tracing) -> dict[str, Any]:
+    """Fit one light, and return all that is recorded of it."""
     is_traced = any(layer.g > 0 for layer in media[0].layers)
-    lights = gaussians.lights_of(media, illumination)
-    fewer = None if is_traced else gaussians.lights_of(media, illumination, fit.NODES.fewer)
+    lights = gaussians.lights_of(media, illumination, tracing=tracing)
+    fewer = None if is_traced else gaussians.lights_of(media, illumination, stacks.NODES.fewer)
     constants: dict[str, Any] = {}
     by_count = []
     for count in COUNTS:
-        found = gaussians.joint(lights, count)
-        values, known = np.append(found.variances, found.weights), errors(found, lights, media, fewer)
+        fitted = gaussians.joint(lights, count)
+        values, known = np.append(fitted.variances, fitted.weights), errors(fitted, lights, media, fewer)
         for place, name in enumerate(constant_names(count)):
             constants[f"{count}.{name}"] = {
-                **{"published": None, "regenerated": values[place], "free": bool(found.free[place])},
+                **{"published": None, "regenerated": values[place], "free": bool(fitted.free[place])},
                 **{key: None if one is None else one[place] for key, one in known.items()},
             }
-        each = [quality(one, found.variances, own) for one, own in zip(lights, found.weights, strict=True)]
+        each = [quality(one, fitted.variances, own) for one, own in zip(lights, fitted.weights, strict=True)]
+        own = [(light, gaussians.joint([light], count)) for light in lights]
         by_count.append(
             {
-                "result": found.best.result,
-                "steps": found.best.steps,
-                "condition_number": found.best.condition_number,
+                "result": fitted.best.result,
+                "steps": fitted.best.steps,
+                "condition_number": fitted.best.condition_number,
                 **{key: [one[key] for one in each] for key in ("rel", "rms", "ks")},
-                "alone": [_alone(light, count) for light in lights],
+                # rel where a colour has variances of its own.
+                "alone": [quality(light, one.variances, one.weights[0])["rel"] for light, one in own],
             }
         )
     return {
@@ -179,51 +206,36 @@ def _arrays(light: SumLight) -> tuple[np.ndarray, ...]:
     return light.edges, light.energy, light.weight, light.noise, np.array([light.whole, light.inside])
 
 
-def _alone(light: SumLight, count: int) -> float:
-    """rel where a colour has variances of its own."""
-    found = gaussians.joint([light], count)
-    return quality(light, found.variances, found.weights[0])["rel"]
-
-
-def _content(of: StackRequest, found: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    first = of.stack.media[0].layers[0]
-    is_traced = any(layer.g > 0 for layer in of.stack.media[0].layers)
-    results = [one["result"] for of_light in found.values() for one in of_light["by_count"]]
-    of_default = [of_light["by_count"][DEFAULT - 1] for of_light in found.values()]
+def _content(
+    of: StackRequest, run: RecipeRun, lights: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
+    of_default = [of_light["by_count"][DEFAULT - 1] for of_light in lights.values()]
     return {
+        **header(of, run, PIPELINE, (NOTE, TRACED_NOTE)),
         "title": TITLE,
-        "law": PIPELINE,
-        "pipeline": PIPELINE,
         "equations": EQUATIONS,
-        "note": TRACED_NOTE if is_traced else NOTE,
-        "setting": Setting(of.illumination, n=first.n, g=first.g),
-        "unit": of.stack.unit,
-        "layers": of.stack.layers,
         "constants": {
-            f"{light}.{name}": value for light, one in found.items() for name, value in one["constants"].items()
+            f"{light}.{name}": value for light, one in lights.items() for name, value in one["constants"].items()
         },
-        "fit": {"result": next((one for one in results if one != "converged"), "converged")},
+        "fit": {"result": record.first_failure([one["result"] for of in lights.values() for one in of["by_count"]])},
         "quality": {"regenerated": {key: [v for one in of_default for v in one[key]] for key in ("rel", "ks")}},
         "sums": {
-            light: {key: one[key] for key in ("reflectance", "share", "by_count")} for light, one in found.items()
+            light: {key: one[key] for key in ("reflectance", "share", "by_count")} for light, one in lights.items()
         },
-        "truth": {"kind": "photons" if is_traced else "exact"},
-        "preset": "quick",
-        "seed": gaussians.SEED,
-        "versions": record.versions(),
+        "seed": gaussians.OFFSET + run.seed,
         "data_digest": record.digest(*(arrays[name] for name in sorted(arrays))),
     }
 
 
 def _values(content: Mapping[str, Any], illumination: str, count: int) -> np.ndarray:
-    """(4, N): variances [unit^2], then weights of red, green and blue [-]."""
+    """Return (4, N): variances [unit^2], then weights of red, green and blue [-]."""
     of = content["constants"]
-    found = [float(of[f"{illumination}.{count}.{name}"]["regenerated"]) for name in constant_names(count)]
-    return np.reshape(found, (1 + len(CHANNELS), count))
+    values = [float(of[f"{illumination}.{count}.{name}"]["regenerated"]) for name in constant_names(count)]
+    return np.reshape(values, (1 + len(CHANNELS), count))
 
 
 def _mismatched(content: Mapping[str, Any]) -> str | None:
-    """Lists that must be as long as others, constants that must be there, and make a sum."""
+    """Return which list must be as long as others, and which constants are missing or make no sum; else None."""
     for light in ILLUMINATIONS:
         one = content["sums"][light]
         if len(one["by_count"]) != MOST:
@@ -236,9 +248,8 @@ def _mismatched(content: Mapping[str, Any]) -> str | None:
         if not all(0 < value <= 1 for value in one["reflectance"]):
             return f"sums.{light}.reflectance must be in (0, 1]"
         for count in COUNTS:
-            names = (f"{light}.{count}.{name}" for name in constant_names(count))
-            if missing := next((name for name in names if name not in content["constants"]), None):
-                return f"constants.{missing} must be a table, got nothing"
+            if text := schema.missing_constant(content, (f"{light}.{count}.{name}" for name in constant_names(count))):
+                return text
             variances, *weights = _values(content, light, count)
             if not (variances[0] > 0 and np.all(np.diff(variances) > 0)):
                 return f"constants.{light}.{count}.v1 and on must rise from above 0"

@@ -1,4 +1,4 @@
-"""Random cones of fur as a file: what one hides of the skin, what is seen at a height, where a ray comes into one."""
+"""Shader source of random cones of fur: what one hides of the skin, what is seen, where a ray comes into one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from profilefit.shader import emit
 from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
 FUR = "fur"  # what names begin with
-OWN = "strand_"  # in the scene's text
+OWN = "strand_"  # in the GLSL beside
 TITLE = "random cones of fur: what they hide, their discs on shells, and where a ray comes into one"
 NAMES = (
     ("shadow(radius, aside)", "area A that one hides of the skin [length^2]"),
@@ -36,8 +36,8 @@ EQUATIONS = (
 )
 
 
-def strand_text(source: str, lang: str = "glsl", name: str = FUR) -> str:
-    """Five functions of floats, ready to include; any length unit, the same for all.
+def strand_text(lang: str = "glsl", name: str = FUR) -> str:
+    """Return five functions of floats, ready to include; any length unit, the same for all.
 
     NAME_shadow(radius, aside)           [length^2], of radius > 0 and aside >= 0 [length]
     NAME_shared(radius, first, second, turn)  [length^2], of asides >= 0 [length] and an angle in [0, pi] [rad]
@@ -45,17 +45,17 @@ def strand_text(source: str, lang: str = "glsl", name: str = FUR) -> str:
     NAME_slice(t, exponent)              [-], of t in [0, 1], exponent > 0
     NAME_swept(qx, qy, mx, my, r, k)     [length], of lengths q and r, m and k [-]; finite, 1e8 where there is no root
 
-    source  the fur's glsl/strand.glsl;  lang, name  as for `emit.law_text`
+    lang, name  as for `emit.law_text`
     InputError on another language, and on a name that no language takes.
     """
-    parts = [emit.read_text("common"), source.replace(OWN, emit.PLACEHOLDER)]
-    return emit.filled(parts, name, {}, 0, lang, {})
+    own = emit.text_beside(__name__, "glsl/strand.glsl").replace(OWN, emit.PLACEHOLDER)
+    return emit.filled([emit.read_text("common"), own], name, {}, 0, lang, {})
 
 
-def export_strand(source: str, lang: str = "glsl", name: str | None = None) -> str:
-    """The whole file of cones in one of `law_file.LANGUAGES`, under a head that tells its functions and units.
+def source(subject: str, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of cones in one of `law_file.LANGUAGES`, under a head of its functions and units.
 
-    Arguments and errors as of `strand_text`; InputError on a name for JSON, which has no functions.
+    subject  "fur";  lang, name  and errors as of `strand_text`; InputError on a name for JSON, which has no functions.
     """
     require_language(lang, name)
     if lang == "json":
@@ -63,4 +63,4 @@ def export_strand(source: str, lang: str = "glsl", name: str | None = None) -> s
         return json_file({**content, "equations": "; ".join(EQUATIONS), "note": " ".join(NOTE)})
     start = name or FUR
     head = [TITLE, *function_lines(start, NAMES), "", *EQUATIONS, "", *NOTE]
-    return text_file(head, lang, strand_text(source, TRANSLATED.get(lang, lang), start))
+    return text_file(head, lang, strand_text(TRANSLATED.get(lang, lang), start))

@@ -1,8 +1,8 @@
-"""All forms of a phase function fitted to one table: their record, FITS/phases/NAME.json, and back to them."""
+"""Phase functions fitted to a table in every form: their record, FITS/phases/NAME.json, and back to them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -15,13 +15,12 @@ from mcml_sim.media.checks import shown
 from mcml_sim.media.phase import Phase
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, regression
-from profilefit.recipes import record
-from profilefit.recipes.folder import LOCAL, PHASES, fits_folder
-from profilefit.recipes.kinds import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS
+from profilefit.recipes import record, schema
+from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
 from profilefit.recipes.phases.data import PhaseData, read_phase
 from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
-from profilefit.recipes.schema import Kinds
-from profilefit.recipes.work import Work
+from profilefit.recipes.run import LAWS, RecipeRun, Work
+from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS, Fields
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -35,7 +34,7 @@ DEFAULT = ("4-terms", HELD)
 FULL_SPHERE = 4 * np.pi  # [sr], the integral of values that are said relative to isotropic ones
 NEAR_ONE = 0.1
 SMALLEST = 1e-4  # share that is printed
-OF_FIT: Kinds = {
+OF_FIT: Fields = {
     "": TABLE,
     ".held": TEXTS,
     ".result": TEXT,
@@ -44,7 +43,7 @@ OF_FIT: Kinds = {
     **dict.fromkeys((".rms", ".mean_cosine", ".backscattered", ".second"), NUMBER),
     ".bands": MEASURES,
 }
-SHOWN: Kinds = {
+SHOWN: Fields = {
     **dict.fromkeys(("title", "equations", "note", "data_digest"), TEXT),
     **{"data": TABLE, "data.source": TEXT, "data.rows": COUNT, "phases": TABLE},
     **dict.fromkeys(("data.integral", "data.mean_cosine", "data.backscattered", "data.second"), NUMBER),
@@ -60,17 +59,17 @@ SHOWN: Kinds = {
 
 @dataclass(frozen=True)
 class PhaseRecord:
-    """A record, read. content  all that it says;  path  of its file"""
+    """Record of the fits to a table. content  all that it says;  path  of its file"""
 
     content: Mapping[str, Any]
     path: Path
 
     def constants(self, form: str, how: str = HELD) -> dict[str, Mapping[str, Any]]:
-        """Of a form with its moments held or free, each with its errors."""
+        """Return the constants of a form with its moments held or free, each with its errors."""
         return {name: self.content["constants"][f"{form}.{how}.{name}"] for name in FORMS[form].names}
 
     def phase(self, form: str = DEFAULT[0], how: str = DEFAULT[1]) -> Phase:
-        """A fitted phase function; InputError on another form."""
+        """Return a fitted phase function; InputError on another form."""
         if form not in FORMS:
             raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
         if how not in (HELD, FREE):
@@ -82,28 +81,65 @@ class PhaseRecord:
             raise RecordError(f"{self.path}: is damaged: {error}; regenerate it") from None
 
 
-def fits_of(
-    data: PhaseData, angles: tuple[float, float] = ALL_ANGLES, say: Callable[[str], None] = lambda _: None
-) -> list[PhaseFit]:
-    """Every form, its moments free and then held, as many as it has numbers for."""
-    found = []
-    for name, form in FORMS.items():
-        for hold in ((), MOMENTS[: form.free]):
-            found.append(fit_phase(data, name, hold, angles))
-        say(f"{name} fitted")
+def find(name: str, folder: Path) -> PhaseRecord | None:
+    """Return the fits of a record by its path or by its name in a folder; None where there is none."""
+    path = record.named(name, folder / PHASES, PIPELINE)
+    return None if path is None else load(path)
+
+
+def named(name: str) -> PhaseRecord:
+    """Return the record of a name, in ./fits or that is shipped, or of a path; InputError if there is none."""
+    if name.endswith(".json"):
+        return load(Path(name))
+    folders = LOCAL, fits_folder()
+    if (found := next(filter(None, (find(name, folder) for folder in folders)), None)) is not None:
+        return found
+    known = dict.fromkeys(own for folder in reversed(folders) for own in record.available(folder / PHASES))
+    raise InputError(f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}")
+
+
+def request(name: str) -> Path | None:
+    """Return the table that a name means: a .csv, or one that is shipped; None where it means something else."""
+    path = Path(name) if name.endswith(".csv") else fits_folder() / PHASES / f"{name}.csv"
+    return path if name.endswith(".csv") or is_file(path) else None
+
+
+def fit(table: Path, run: RecipeRun) -> Work:
+    """Return the record to be made of a table, in one part: a minute. InputError on a damaged table."""
+    data = read_phase(table)
+    arrays = {"angles": data.angles, "values": data.values}
+    return Work(
+        f"{PHASES}/{table.stem}",
+        (partial(fits_of, data, seed=run.seed),),
+        lambda results: (content(data, results[0], run), arrays),
+        tuple(table_lines(described(data))),
+        (LAWS, 1, 2),
+    )
+
+
+def quality(fits: Sequence[PhaseFit]) -> dict[str, Any]:
+    """Return the root mean squares of ln(form / table) [-]."""
+    return {"regenerated": {"rms": [each.rms for each in fits]}}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return all that a record says; RecordError in one line on one that is damaged."""
+    found = record.read_of(path, PIPELINE, "phase functions", SHOWN)
+    names = (f"{form}.{how}.{name}" for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
+    if text := schema.missing_constant(found, names):
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     return found
 
 
-def work(path: Path) -> Work:
-    """Fits of every form to a table, one part: a minute. InputError on a damaged table."""
-    data = read_phase(path)
-    arrays = {"angles": data.angles, "values": data.values}
-    return Work(
-        f"{PHASES}/{path.stem}",
-        (partial(fits_of, data),),
-        lambda found: (content(data, found[0]), arrays),
-        tuple(table_lines(described(data))),
-    )
+def load(path: Path) -> PhaseRecord:
+    """Return a record; RecordError in one line on one that is damaged."""
+    return PhaseRecord(read(path), path)
+
+
+def fits_of(data: PhaseData, angles: tuple[float, float] = ALL_ANGLES, seed: int = SEED) -> list[PhaseFit]:
+    """Fit every form to a table, its moments free and then held, as many as it has numbers for."""
+    holds = {name: ((), MOMENTS[: form.free]) for name, form in FORMS.items()}
+    return [fit_phase(data, name, hold, angles, seed) for name, both in holds.items() for hold in both]
 
 
 def table_lines(data: Mapping[str, Any]) -> list[str]:
@@ -147,11 +183,11 @@ def described(data: PhaseData) -> dict[str, Any]:
     }
 
 
-def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:
-    """What a record says."""
+def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun | None = None) -> dict[str, Any]:
+    """Return what a record says."""
     constants: dict[str, Any] = {}
     phases: dict[str, Any] = {name: {} for name in FORMS}
-    for one in found:
+    for one in fits:
         how = HELD if one.held else FREE
         for place, name in enumerate(one.form.names):
             constants[f"{one.form.name}.{how}.{name}"] = {
@@ -170,56 +206,21 @@ def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:
             "backscattered": one.backscattered,
             "second": float(one.phase.moment(2)),
         }
-    results = [one.best.result for one in found]
     return {
         "title": TITLE,
         "law": PIPELINE,
         "pipeline": PIPELINE,
         "equations": EQUATIONS,
-        "note": NOTE,
+        "note": NOTE + (run.unused() if run else ""),
         "setting": Setting(),
         "constants": constants,
         "phases": phases,
         "data": described(data),
-        "fit": {"result": next((one for one in results if one != "converged"), "converged")},
-        "quality": {"regenerated": {"rms": [one.rms for one in found]}},
+        "fit": {"result": record.first_failure([each.best.result for each in fits])},
+        "quality": quality(fits),
         "truth": {"kind": "table"},
-        "preset": "quick",
-        "seed": SEED,
+        "preset": run.preset if run else "quick",
+        "seed": run.seed if run else SEED,
         "versions": record.versions(),
         "data_digest": data.digest,
     }
-
-
-def table_of(name: str) -> Path | None:
-    """The table that a name of a command means: a .csv, or one that is shipped; None where it means something else."""
-    if name.endswith(".csv"):
-        return Path(name)
-    shipped = fits_folder() / PHASES / f"{name}.csv"
-    return shipped if shipped.exists() else None
-
-
-def load(path: Path) -> PhaseRecord:
-    """A record; RecordError in one line on one that is damaged."""
-    found = record.read_of(path, PIPELINE, "phase functions", SHOWN)
-    if text := _missing(found):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return PhaseRecord(found, path)
-
-
-def find(name: str) -> PhaseRecord:
-    """The record of a name, in ./fits or that is shipped, or of a path; InputError if there is none."""
-    if name.endswith(".json"):
-        return load(Path(name))
-    known = {path.stem: path for one in (fits_folder(), LOCAL) for path in record.available(one / PHASES).values()}
-    if name not in known:
-        raise InputError(
-            f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}"
-        )
-    return load(known[name])
-
-
-def _missing(found: Mapping[str, Any]) -> str | None:
-    names = (f"{form}.{how}.{one}" for form in FORMS for how in (FREE, HELD) for one in FORMS[form].names)
-    missing = next((name for name in names if name not in found["constants"]), None)
-    return f"constants.{missing} must be a table, got nothing" if missing else None

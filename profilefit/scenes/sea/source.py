@@ -1,20 +1,24 @@
-"""Light in water as a file: what a beam brings to a segment of a view ray, and the blur of a scene's water."""
+"""Shader sources of light in water: what a beam brings to a segment of a view ray, and the blur of a scene's water."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
+from profilefit.scenes.sea.law import WaterGaussians, water_gaussians
+from profilefit.scenes.sea.passes import GAUSSIANS
+from profilefit.scenes.sea.scene import read
 from profilefit.shader import emit
 from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
 SEGMENT, BLUR = "sea_segment", "sea_blur"  # what names begin with
-OWN = "segment_"  # in the scene's text
+OWN = "segment_"  # in the GLSL beside
 SEGMENT_NAMES = (
     ("integral(c, s0, t0, m, t1)", "int_0^t1 e^{-c (s0 + m t)} e^{-c (t0 + t)} dt [length]"),
     ("between(begin, end, t1)", "the same of optical ways c (s + t) at both ends [-]"),
@@ -33,30 +37,33 @@ BLUR_NAMES = (
 )
 
 
-class WaterBlur(Protocol):
-    """Of one colour, as `scenes.sea.law.WaterGaussians`: lengths in 1 / c."""
+def source(subject: str, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of the segment, or of the blur of a SEA.toml, in one of `law_file.LANGUAGES`."""
+    if not subject.endswith(".toml"):
+        return export_segment(lang, name)
+    content = read_toml(Path(subject))
+    if (scene := content.get("scene")) != "sea":
+        raise InputError(f"{subject}: scene must be sea, whose water has a text, got {scene!r}")
+    world = read(subject, content).world
+    depth, rates = world.depth * world.slant, world.c.tolist()
+    blurs = [
+        water_gaussians(omega, c * depth, world.lobes, GAUSSIANS)
+        for omega, c in zip(world.omega.tolist(), rates, strict=True)
+    ]
+    return export_blur(blurs, rates, depth, lang, name)
 
-    @property
-    def unscattered(self) -> float: ...
-    @property
-    def variances(self) -> NDArray[np.float64]: ...
-    @property
-    def weights(self) -> NDArray[np.float64]: ...
-    @property
-    def error(self) -> float: ...
 
+def segment_text(lang: str = "glsl", name: str = SEGMENT) -> str:
+    """Return NAME_integral(c, s0, t0, m, t1) and NAME_between(begin, end, t1), ready to include.
 
-def segment_text(source: str, lang: str = "glsl", name: str = SEGMENT) -> str:
-    """NAME_integral(c, s0, t0, m, t1) and NAME_between(begin, end, t1), ready to include.
-
-    source  the sea's glsl/segment.glsl;  lang, name  as for `emit.law_text`
+    lang, name  as for `emit.law_text`
     """
-    parts = [emit.read_text("common"), emit.read_text("near_zero"), source.replace(OWN, emit.PLACEHOLDER)]
-    return emit.filled(parts, name, {}, 0, lang, {})
+    own = emit.text_beside(__name__, "glsl/segment.glsl").replace(OWN, emit.PLACEHOLDER)
+    return emit.filled([emit.read_text("common"), emit.read_text("near_zero"), own], name, {}, 0, lang, {})
 
 
-def blur_text(blurs: Sequence[WaterBlur], c: Sequence[float], lang: str = "glsl", name: str = BLUR) -> str:
-    """Sums of as many Gaussians for red, green and blue, ready to include: `BLUR_NAMES`.
+def blur_text(blurs: Sequence[WaterGaussians], c: Sequence[float], lang: str = "glsl", name: str = BLUR) -> str:
+    """Return sums of as many Gaussians for red, green and blue, ready to include: `BLUR_NAMES`.
 
     c  attenuations [1/m];  lang, name  as for `emit.law_text`;  InputError on sums of unlike numbers
     """
@@ -72,8 +79,8 @@ def blur_text(blurs: Sequence[WaterBlur], c: Sequence[float], lang: str = "glsl"
     return emit.filled(parts, name, constants, blurs[0].weights.size, lang, {})
 
 
-def export_segment(source: str, lang: str = "glsl", name: str | None = None) -> str:
-    """The whole file of the segment in one of `law_file.LANGUAGES`; arguments as of `segment_text`."""
+def export_segment(lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of the segment in one of `law_file.LANGUAGES`; arguments as of `segment_text`."""
     require_language(lang, name)
     title = "what a beam of sun brings to a segment of a view ray in water, and that to the eye, per scattering"
     if lang == "json":
@@ -81,30 +88,21 @@ def export_segment(source: str, lang: str = "glsl", name: str | None = None) -> 
         return json_file({"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)})
     start = name or SEGMENT
     head = [title, *function_lines(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
-    return text_file(head, lang, segment_text(source, TRANSLATED.get(lang, lang), start))
+    return text_file(head, lang, segment_text(TRANSLATED.get(lang, lang), start))
 
 
 def export_blur(
-    blurs: Sequence[WaterBlur], c: Sequence[float], depth: float, lang: str = "glsl", name: str | None = None
+    blurs: Sequence[WaterGaussians], c: Sequence[float], depth: float, lang: str = "glsl", name: str | None = None
 ) -> str:
-    """The whole file of a blur; depth  along the beam [m], others as of `blur_text`."""
+    """Return the whole file of a blur; depth  along the beam [m], others as of `blur_text`."""
     require_language(lang, name)
     title = f"blur of a beam after {depth:.6g} m of water, of red, green and blue"
     worst = max(one.error for one in blurs)
     note = f"off by {worst:.2g} at most of the law's own transform, by the plane's light, at any frequency"
     if lang == "json":
-        told = dict(zip(CHANNELS, _by_channel(blurs, c), strict=True))
-        return json_file(
-            {
-                "law": "sea-blur",
-                "title": title,
-                "note": note,
-                "depth": depth,
-                "unit": "m",
-                "c": list(c),
-                "numbers": told,
-            }
-        )
+        numbers = dict(zip(CHANNELS, _by_channel(blurs, c), strict=True))
+        about = {"law": "sea-blur", "title": title, "note": note}
+        return json_file({**about, "depth": depth, "unit": "m", "c": list(c), "numbers": numbers})
     start = name or BLUR
     rates = ", ".join(f"{one:g}" for one in c)
     head = [title, *function_lines(start, BLUR_NAMES), "channel 0, 1, 2: red, green, blue", ""]
@@ -112,8 +110,8 @@ def export_blur(
     return text_file(head, lang, blur_text(blurs, c, TRANSLATED.get(lang, lang), start))
 
 
-def _by_channel(blurs: Sequence[WaterBlur], c: Sequence[float]) -> list[dict[str, Any]]:
-    """Weights [-] and standard deviations [m] of each colour."""
+def _by_channel(blurs: Sequence[WaterGaussians], c: Sequence[float]) -> list[dict[str, Any]]:
+    """Return weights [-] and standard deviations [m] of each colour."""
     return [
         {
             "unscattered": float(one.unscattered),

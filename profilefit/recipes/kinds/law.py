@@ -1,0 +1,146 @@
+"""Profile laws and samplers: fitted by a recipe, or printed; and comparisons of what the paper leaves unsaid."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from mcml_sim import Orders
+from profilefit.errors import RecipeError
+from profilefit.fitting import staged
+from profilefit.fitting.quality import profile_quality
+from profilefit.laws.base import ProfileLaw
+from profilefit.recipes import catalogue, pipelines, starts
+from profilefit.recipes.catalogue import find_law as find
+from profilefit.recipes.paper.reproduction import readings
+from profilefit.recipes.paper.table1 import printed_halves, table1
+from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
+from profilefit.recipes.pipelines import (
+    QUALITY_ALBEDOS,
+    Pipeline,
+    by_index,
+    described_fit,
+    description,
+    fit_from,
+    inversion_error,
+    judged,
+    printed_laws,
+    read,
+)
+from profilefit.recipes.recipe import Recipe, RingLayout
+from profilefit.recipes.record_folder import Records
+from profilefit.recipes.run import RecipeRun, RecordContent, Work
+from profilefit.recipes.summary import curves, errors_by_name
+from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
+
+__all__ = ["find", "fit", "quality", "read", "request"]
+EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
+
+
+def request(name: str) -> Recipe | None:
+    """Return the recipe of a name or file, None if it is of something else."""
+    return pipelines.request(name, PIPELINES)
+
+
+def fit(recipe: Recipe, run: RecipeRun) -> Work:
+    """Return the record to be made of a recipe."""
+    return pipelines.work(recipe, run, PIPELINES)
+
+
+def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
+    """Measure every set of constants of a law at held-out albedos, and the fitted ones at each index that they span."""
+    alpha = albedo_values(QUALITY_ALBEDOS)
+    table: dict[str, Any] = {"alpha": alpha}
+    for name, one in {**printed_laws(recipe, run), "regenerated": law}.items():
+        measured = asdict(profile_quality(one, alpha))
+        table[name] = {key: value for key, value in measured.items() if key != "alpha"}
+    return table | ({"by_index": by_index(law, judged(recipe))} if recipe.indices else {})
+
+
+def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
+    result, profiles, content, arrays = described_fit(recipe, run, light)
+    content["quality"] = quality(recipe, run, result.law)
+    content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
+    return content, arrays | curves(profiles)
+
+
+def _inverse(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
+    result, profiles, content, arrays = described_fit(recipe, run, light)
+    alpha = albedo_values(QUALITY_ALBEDOS)
+    laws = {"regenerated": result.law}
+    if printed := printed_laws(recipe, run).get("published"):  # corrections are of the profile, not of its inverse
+        laws["published"] = printed
+    measured = {name: {"inversion_error": inversion_error(law, alpha)} for name, law in laws.items()}
+    content["quality"] = {"alpha": alpha, **measured}
+    return content, arrays | curves(profiles) | {"shares": np.asarray(result.rings.xi)}
+
+
+def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
+    rings = recipe.rings
+    if rings is None:
+        raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
+    start = starts.starting_law(recipe, run.out)
+    truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
+    points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
+    profiles, unit = truths[1.0], points[1.0]
+    laws = staged.fit_coefficient_laws(unit, start, recipe.held)
+    by_stage = {
+        name: float(value)
+        for law in laws.values()
+        for name, value in zip(law.names, law.solution.parameters, strict=True)
+    }
+    used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
+    result = fit_from(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
+    content, arrays = description(recipe, run, profiles, result)
+    content["stages"] = {
+        "coefficient_laws": {
+            letter: {
+                "constants": dict(zip(law.names, law.solution.parameters, strict=True)),
+                "standard_error": errors_by_name(law.names, law.covariance),
+                "result": law.solution.result,
+                "condition_number": law.solution.condition_number,
+            }
+            for letter, law in laws.items()
+        },
+        "length_exponents": staged.length_exponents(tuple(points.values())) if len(points) > 1 else {},
+        "per_albedo_failures": {f"{m:g}": sum(r != "converged" for r in p.results) for m, p in points.items()},
+    }
+    content["quality"] = quality(recipe, run, result.law)
+    content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
+    arrays |= {"coefficients": unit.values, "coefficient_errors": unit.standard_error, "r_trim": unit.r_trim}
+    return content, arrays | curves(profiles)
+
+
+def _evidence(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
+    if recipe.truth == "orders" and light is not None:
+        truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
+    else:
+        truth = ExactTruth()
+    laws = _compared_laws(run)
+    found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
+    return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
+
+
+def _compared_laws(run: RecipeRun) -> dict[str, ProfileLaw]:
+    """Return the laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
+    laws, records = {}, Records(run.out)
+    for label, law, name in (
+        ("normalized diffusion, regenerated", "burley", "burley-whole"),
+        ("paper, regenerated as published", "liang", "liang-as-published"),
+        ("paper, regenerated whole", "liang", "liang-whole"),
+    ):
+        path = records.path_or_shipped(name)
+        if path.parent != run.out:
+            run.say(f"compared with the shipped record {name}: {run.out} has none")
+        laws[label] = catalogue.load(law, str(path), folder=records)
+    return laws
+
+
+PIPELINES: dict[str, Pipeline] = {
+    "profile": _profile,
+    "as-published": _as_published,
+    "inverse": _inverse,
+    "evidence": _evidence,
+}

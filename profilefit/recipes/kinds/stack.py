@@ -1,0 +1,482 @@
+"""Stacks of layers under a first one of any thickness: from STACK.toml to a record, and back to three laws.
+
+Records lie in a folder of their own, FITS/stacks: none of them is a law of every albedo.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Medium, Setting, exact
+from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.errors import DamagedRecord, InputError, RecordError
+from profilefit.laws.forward import ForwardHalfSpace
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.recipes import catalogue, record, schema
+from profilefit.recipes.folder import STACKS, fits_folder, is_file
+from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
+from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
+from profilefit.recipes.stack import fit as stacks
+from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
+from profilefit.recipes.stack.photons import USUAL, TracedRings, Tracing
+from profilefit.recipes.toml_tables import Table, Tables
+
+Floats = NDArray[np.float64]
+PIPELINE = "stack"
+TITLE = "Layers under a first one of any thickness"
+EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + (g_i d)^2, c_i = e^(-b_i d / l)"
+NOTE = (
+    "No error of photons: the light is exact. No error by a model of the misfit: at each thickness the law is wrong in "
+    "its own way. Constants that trade against each other have large jackknife errors; together they are the law."
+)
+TRACED_NOTE = (
+    "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
+    "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
+)
+# What shader sources and pictures take from a record besides its laws, by dotted key.
+USED: Fields = {
+    **dict.fromkeys(("unit", "equations", "note"), TEXT),
+    "layers": LIST,
+    "half_spaces": TABLE,
+    **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
+    "quality.regenerated.delta_A": NUMBER,
+    "data_digest": DIGEST,
+}
+# Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
+BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")
+OF_INTERFACES: Fields = {
+    **dict.fromkeys(("quality", "fit", "starts"), LIST),
+    **dict.fromkeys(("quality.*", "fit.*", "starts.*"), TABLE),
+    **{f"quality.*.{name}": NUMBERS for name in BY_THICKNESS},
+    "fit.*.result": TEXT,
+    "fit.*.condition_number": MEASURE,
+    **dict.fromkeys(("fit.*.steps", "starts.*.as_good", "starts.*.count"), COUNT),
+}
+# What `profilefit report` shows of a stack.
+SHOWN: Fields = {
+    **schema.TOLD,
+    "unit": TEXT,
+    "layers": LIST,
+    "layers.*": TABLE,
+    "layers.*.name": TEXT,
+    "layers.*.thickness": MEASURE,
+    **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
+    **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
+    **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
+    "quality.regenerated.delta_A": NUMBER,
+    **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
+    **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
+}
+EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
+NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
+# Of STACK.toml, those that only draw a scene among them.
+KEYS = (
+    *("title", "unit", "illumination", "layers", "start"),
+    *("scene", "surface", "uneven", "pose", "technique", "camera", "light", "choose"),
+)
+
+
+@dataclass(frozen=True)
+class StackRequest:
+    """Content of STACK.toml: a stack under a light. Its name is that of the file.
+
+    starts  of red, green and blue: constants of each interface at which the fit begins; empty where it searches
+    """
+
+    name: str
+    title: str
+    illumination: str
+    stack: LayerStack
+    starts: tuple[Floats, ...] = ()
+
+
+@dataclass(frozen=True)
+class StackRecord:
+    """A record, read. laws  of red, green, blue;  content  all that it says;  digest  sha256 of its file"""
+
+    name: str
+    stack: LayerStack
+    laws: tuple[StackLaw, StackLaw, StackLaw]
+    content: Mapping[str, Any]
+    digest: str
+
+    @property
+    def setting(self) -> Setting:
+        return self.laws[0].setting
+
+
+class StackQuality(NamedTuple):
+    """Errors of a law at one thickness.
+
+    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
+    delta_A  relative error of A [-]
+    """
+
+    rel: float
+    noise: float
+    ks: float
+    delta_A: float
+
+
+def find(name: str, folder: Path) -> StackRecord | None:
+    """Return the laws of a stack by the path of its record or by its name in a folder; None where there is none."""
+    path = record.named(name, folder / STACKS, PIPELINE)
+    return None if path is None else load(path)
+
+
+def request(name: str) -> StackRequest | None:
+    """Return the stack of a file of layers or of a shipped one by its name, None if it is of something else."""
+    path = Path(name)
+    if not name.endswith(".toml"):
+        path = fits_folder() / STACKS / f"{name}.toml"
+        if not is_file(path) or is_file(fits_folder() / path.name):
+            return None
+    elif not is_file(path) or "layers" not in read_toml(path):
+        return None
+    return requested(str(path), read_toml(path))
+
+
+def requested(file: str, content: Table) -> StackRequest:
+    """Return the stack of a file's content, checked; keys of `KEYS` that draw a scene are not looked at."""
+    tables = Tables(file, {"": KEYS})
+    tables.known("", content)
+    stack = read_layers(file, content)
+    name = Path(file).stem
+    if len(stack.names) < 2:
+        raise tables.bad(
+            "", "layers", "two layers or more: one is a half space, as `profilefit export hazard` has it", 1
+        )
+    if not schema.is_line(name):
+        raise InputError(f"{file!r}: the name of a stack must be one printable line")
+    return StackRequest(
+        name,
+        tables.text("", "title", content, TITLE),
+        tables.text("", "illumination", content, "diffuse", ILLUMINATIONS),
+        stack,
+        _starts(tables, content, stack),
+    )
+
+
+def fit(of: StackRequest, run: RecipeRun) -> Work:
+    """Return the record to be made of a stack, a part for each colour that differs: half a minute to two minutes.
+
+    InputError if no law fits.
+    """
+    for medium in of.stack.media:
+        stacks.require(medium)
+    different = list(dict.fromkeys(of.stack.media))
+    parts = []
+    for number, medium in enumerate(different):
+        starts = list(of.starts[of.stack.media.index(medium)]) if of.starts else []
+        parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}")))
+
+    def finish(results: list[Any]) -> RecordContent:
+        colours = zip(CHANNELS, of.stack.media, strict=True)
+        return _content(of, run, {name: results[different.index(medium)] for name, medium in colours}), {}
+
+    return Work(f"{STACKS}/{of.name}", tuple(parts), finish, order=(LAWS, 1, 0))
+
+
+def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, list[float]]:
+    """Measure rel, ks and the relative error of A at thicknesses between those that were fitted [length]."""
+    law, fitted = interface.law, interface.thicknesses
+    d, illumination = np.sqrt(fitted[:-1] * fitted[1:]), law.setting.illumination
+    if interface.is_traced:
+        found = [
+            of_rings(law, at, stacks.rings_of(interface.medium, at, illumination, len(d) + 1 + number, tracing))
+            for number, at in enumerate(d)
+        ]
+    else:
+        found = [_of_exact(interface, float(at)) for at in d]
+    kept = {name: [getattr(each, name) for each in found] for name in ("rel", "ks", "delta_A")}
+    return {"thickness": d.tolist(), **kept}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return all that a record says, of which a report makes no law; RecordError on one that is damaged."""
+    content = of_stack(path)
+    if text := mistyped(content, SHOWN) or _mismatched(content):
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    return content
+
+
+def load(path: Path) -> StackRecord:
+    """Return the laws of a record; RecordError if it is damaged, or if its half spaces have other constants by now."""
+    content = of_stack(path)
+    with damage(path):
+        stack, setting = recorded_stack(str(path), content), record.record_setting(content)
+        if setting.n != stack.media[0].layers[0].n:
+            raise InputError(f"setting.n must be that of its layers, got {setting.n:g}")
+        red, green, blue = (
+            _law(content, channel, medium, _tops(path, medium, setting, content["half_spaces"][channel]))
+            for channel, medium in zip(CHANNELS, stack.media, strict=True)
+        )
+    return StackRecord(path.stem, stack, (red, green, blue), content, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def matching(of: StackRequest, folder: Path) -> StackRecord | None:
+    """Return the record in a folder of these very layers and this light, by whatever name; None if there is none.
+
+    RecordError where that one is damaged; one whose layers cannot be read is passed over, with a DamagedRecord warning.
+    """
+    media = record.plain(of.stack.media)  # to the digits of a record: the mean of an image has more
+    for path in record.available(folder / STACKS).values():
+        try:
+            content = of_stack(path)
+            with damage(path):
+                own, setting = recorded_stack(str(path), content).media, record.record_setting(content)
+        except RecordError as error:
+            text = f"{path} is passed over: {str(error).removeprefix(f'{path}: ')}"
+            warnings.warn(text, DamagedRecord, stacklevel=2)
+            continue
+        if record.plain(own) == media and setting.illumination == of.illumination:
+            return load(path)
+    return None
+
+
+def of_stack(path: Path) -> dict[str, Any]:
+    """Return what a record says; RecordError on one that cannot be read or is of no stack."""
+    content = record.read(path)
+    if content["pipeline"] != PIPELINE:
+        raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
+    return content
+
+
+@contextmanager
+def damage(path: Path) -> Iterator[None]:
+    """Raise what is wrong inside a record as RecordError."""
+    try:
+        yield
+    except RecordError:
+        raise
+    except InputError as error:
+        raise RecordError(f"{path}: is damaged: {str(error).removeprefix(f'{path}: ')}; regenerate it") from None
+    except KeyError as error:
+        raise RecordError(f"{path}: is damaged: {error} is missing; regenerate it") from None
+
+
+def interfaces(content: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
+    """Return the colour and number of each interface of a record, from the surface down, colour by colour."""
+    return ((channel, number) for channel in CHANNELS for number in range(1, len(content["layers"])))
+
+
+def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED) -> LayerStack:
+    """Return the layers of a record; InputError where one of `fields` is of another type, or where no law fits them."""
+    for key, kind in fields.items():
+        value: Any = content
+        for name in key.split("."):
+            if not isinstance(value, Mapping):
+                raise InputError(f"{key} must be {kind.words}, got nothing")
+            value = value[name]
+        if not kind.accepts(value):
+            raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
+    layers = [_recorded_layer(one) for one in content["layers"]]
+    stack = stack_of(Tables(file, {}), layers, content["unit"])
+    for medium in stack.media:
+        stacks.require(medium)
+    return stack
+
+
+def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, str]) -> dict[str, Any]:
+    """Return what the records of a stack say of its layers and light; notes  on exact light, and on traced light."""
+    first = of.stack.media[0].layers[0]
+    is_traced = any(layer.g > 0 for layer in of.stack.media[0].layers)
+    return {
+        "law": pipeline,
+        "pipeline": pipeline,
+        "note": notes[is_traced] + ("" if is_traced else run.unused()),
+        "setting": Setting(of.illumination, n=first.n, g=first.g),
+        "unit": of.stack.unit,
+        "layers": of.stack.layers,
+        "truth": {"kind": "photons" if is_traced else "exact"},
+        "preset": run.preset,
+        "versions": record.versions(),
+    }
+
+
+def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
+    """Measure a law by traced light; rel is of rings from a tenth of the first layer's mean free path."""
+    within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
+    counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
+    rel = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
+    # The mean size of a Gaussian's values is sqrt(2 / pi) of its spread.
+    noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
+    light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
+    ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
+    return StackQuality(
+        float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
+    )
+
+
+def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
+    law, medium = interface.law, interface.medium
+    light = exact.solve(medium.with_first(thickness), law.setting.illumination, stacks.NODES)
+    r = stacks.radii(medium)
+    share = np.asarray(light.cdf(r))
+    near = r[share <= stacks.LAST_SHARE]
+    relative = np.asarray(law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
+    ks = float(np.max(np.abs(np.asarray(law.cdf(r, thickness)) - share)))
+    return StackQuality(float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1)
+
+
+def _starts(tables: Tables, content: Table, stack: LayerStack) -> tuple[Floats, ...]:
+    """Return constants (interfaces, 9) of each colour from a table [start]; InputError on others."""
+    if "start" not in content:
+        return ()
+    table, starts, count = tables.table(content, "start"), [], len(stack.names) - 1
+    tables.known("start", table, CHANNELS)
+    names = StackLaw.constant_names()
+    accepted = f"lists of {', '.join(names)}, one an interface: w in (0, 1), all but u > 0"
+    for channel in CHANNELS:
+        rows = table.get(channel)
+        if not (isinstance(rows, list) and len(rows) == count and all(map(_is_start, rows))):
+            raise tables.bad("start", channel, accepted, rows)
+        starts.append(np.array(rows, float))
+    if any(layer.g > 0 for layer in stack.media[0].layers):
+        raise tables.bad("", "start", "left out where a layer scatters forward", "a table")
+    return tuple(starts)
+
+
+def _is_start(row: Any) -> bool:
+    """Return whether a row holds constants that a law may have."""
+    names = StackLaw.constant_names()
+    if not (isinstance(row, list) and len(row) == len(names) and all(map(schema.is_number, row))):
+        return False
+    own = dict(zip(names, row, strict=True))
+    return own["w"] < 1 and all(np.isfinite(value) and (value > 0 or name == "u") for name, value in own.items())
+
+
+def _channel(illumination: str, medium: Medium, starts: Sequence[Floats], tracing: Tracing) -> dict[str, Any]:
+    """Fit one colour, and return all that is recorded of it."""
+    law, fitted = stacks.fitted(medium, illumination, starts, tracing)
+    constants: dict[str, Any] = {}
+    for number, interface in enumerate(fitted, start=1):
+        errors = stacks.errors(interface)
+        for name, value in interface.law.constants().items():
+            constants[f"{number}.{name}"] = {"published": None, "regenerated": value, "free": True, **errors[name]}
+    return {
+        "constants": constants,
+        "half_spaces": [layer.law.constants() for layer in law.layers],
+        "thicknesses": [interface.thicknesses for interface in fitted],
+        "quality": [quality(interface, tracing) for interface in fitted],
+        "starts": [
+            {
+                "count": len(interface.found),
+                "as_good": sum(each.cost <= 1.01 * interface.best.cost for each in interface.found),
+                "results": sorted({each.result.partition(" in ")[0] for each in interface.found}),
+            }
+            for interface in fitted
+        ],
+        "fit": [
+            {"result": best.result.partition(" in ")[0], "steps": best.steps, "condition_number": best.condition_number}
+            for best in (interface.best for interface in fitted)
+        ],
+        "data_digest": record.digest(
+            *(np.asarray(array) for interface in fitted for light in interface.lights for array in light)
+        ),
+    }
+
+
+def _content(of: StackRequest, run: RecipeRun, channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    results = [fit["result"] for one in channels.values() for fit in one["fit"]]
+    measured = [each for one in channels.values() for each in one["quality"]]
+    rel, ks, of_a = ([value for each in measured for value in each[key]] for key in ("rel", "ks", "delta_A"))
+    digests = "".join(one["data_digest"] for one in channels.values())
+    return {
+        **header(of, run, PIPELINE, (NOTE, TRACED_NOTE)),
+        "title": of.title,
+        "equations": EQUATIONS,
+        "half_spaces": {channel: one["half_spaces"] for channel, one in channels.items()},
+        "constants": {
+            f"{channel}.{name}": value for channel, one in channels.items() for name, value in one["constants"].items()
+        },
+        # One that does not converge has constants that trade against each other.
+        "fit": {"result": record.first_failure(results)},
+        "quality": {"regenerated": {"rel": rel, "ks": ks, "delta_A": max(map(abs, of_a))}},
+        "interfaces": {
+            channel: {key: one[key] for key in ("fit", "quality", "starts", "thicknesses")}
+            for channel, one in channels.items()
+        },
+        "seed": run.seed,
+        "data_digest": hashlib.sha256(digests.encode()).hexdigest(),
+    }
+
+
+def _recorded_layer(layer: Any) -> Table:
+    """Return a layer of a record as a file has it. Its thickness is no image: a record opens no other file."""
+    if not TABLE.accepts(layer):
+        raise InputError(f"layers must be tables, got {schema.shown(layer)}")
+    if not MEASURE.accepts(layer.get("thickness")):
+        raise InputError(f"thickness must be {MEASURE.words}, got {schema.shown(layer['thickness'])}")
+    return {key: value for key, value in layer.items() if value is not None}
+
+
+def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mapping[str, float]]) -> list[LayerLaw]:
+    """Return the half spaces of a medium's layers: today's, which the record's must be, or its own where it scatters
+    forward.
+
+    A stack's constants belong to its half spaces'. InputError where what is recorded is of another kind.
+    """
+    for one in recorded:
+        if not isinstance(one, Mapping) or not all(map(schema.is_number, one.values())):
+            raise InputError(f"half_spaces must be tables of numbers, got {schema.shown(one)}")
+    if len(recorded) != len(medium.layers):
+        raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
+    if any(layer.g > 0 for layer in medium.layers):
+        own = [replace(setting, g=layer.g) for layer in medium.layers]
+        similar = [layer.similar for layer in medium.layers]
+        laws = [
+            ForwardHalfSpace(each, **{name: float(one[name]) for name in ForwardHalfSpace.constant_names()})
+            for each, one in zip(own, recorded, strict=True)
+        ]
+        return [LayerLaw(each, law, one.alpha, one.mfp) for each, law, one in zip(own, laws, similar, strict=True)]
+    hazard = catalogue.load("hazard", setting=setting)
+    constants = hazard.constants()
+    for one in recorded:
+        same = one.keys() == constants.keys()
+        if not (same and np.allclose([one[name] for name in constants], list(constants.values()), rtol=EQUAL)):
+            raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
+    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+
+
+def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequence[LayerLaw]) -> StackLaw:
+    law: LayerLaw | StackLaw = tops[-1]
+    for number in reversed(range(len(tops) - 1)):
+        values = {
+            name: float(content["constants"][f"{channel}.{number + 1}.{name}"]["regenerated"])
+            for name in StackLaw.constant_names()
+        }
+        law = StackLaw(tops[number].setting, tops[number], law, medium.layers[number].thickness, **values)
+    if not isinstance(law, StackLaw):
+        raise RecordError(f"record {content.get('name')!r} is damaged: it has fewer than two layers")
+    return law
+
+
+def _mismatched(content: Mapping[str, Any]) -> str | None:
+    """Return which list must be as long as others, or which constant is missing; None where all are right."""
+    count = len(content["layers"]) - 1
+    for channel in CHANNELS:
+        one = content["interfaces"][channel]
+        for key in ("quality", "fit", "starts"):
+            if len(one[key]) != count:
+                return f"interfaces.{channel}.{key} must be {count}, one an interface, got {len(one[key])}"
+        if any(len({len(each[name]) for name in BY_THICKNESS}) > 1 for each in one["quality"]):
+            return f"interfaces.{channel}.quality must have {', '.join(BY_THICKNESS)} of one length"
+    names = (
+        f"{channel}.{number}.{name}" for channel, number in interfaces(content) for name in StackLaw.constant_names()
+    )
+    return schema.missing_constant(content, names)
