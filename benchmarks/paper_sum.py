@@ -18,9 +18,9 @@ import numpy as np
 
 from benchmarks.stacks import stacks
 from benchmarks.table import show
+from benchmarks.zhao import CORRECTED, PRINTED, Corrections, single_sum
 from mcml_sim import Medium
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.paper import CORRECTED, PRINTED, Corrections, single_sum
 
 SAMPLES = (4, 8, 16, 64)
 IN, OUT, AZIMUTH = (1.0, 0.7, 0.3), (1.0, 0.5, 0.2), 1.0

@@ -20,7 +20,8 @@ from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.layers.truth import LEFT, StackTable
 from profilefit.scenes.stage.exact_law import columns, row, table_text
 from profilefit.scenes.stage.gather import Gather
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
+from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 
@@ -122,14 +123,14 @@ class WithSingle(Technique):
     media  of red, green, blue;  least, most  thickness of the first layer where the map is 0 and 1
     """
 
-    by: Gather
+    by: Technique
     media: tuple[Medium, Medium, Medium]
     least: float
     most: float
     table: Singles
 
     @classmethod
-    def of(cls, by: Gather, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
+    def of(cls, by: Technique, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
         """With its table of exitances, a quadrature of seconds."""
         return cls(by, media, least, most, once_table(media, least, most))
 

@@ -16,7 +16,6 @@ from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
 from profilefit.scenes.sea.hits import first_hit
-from profilefit.scenes.sea.photons import turn
 from profilefit.scenes.sea.reference import Photons, boxes
 from profilefit.scenes.sea.waves import Waves, refracted
 from profilefit.scenes.sea.world import World
@@ -273,6 +272,21 @@ def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
     """Directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
     return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
+
+
+def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
+    """Return unit directions turned by angles of which 1 - c and 1 + c are given; sharp ones keep their precision."""
+    sine, cosine = np.sqrt(below * above), 1.0 - below
+    across, along = sine * np.cos(azimuth), sine * np.sin(azimuth)
+    # Two unit vectors across the direction (Duff et al., J. Comput. Graph. Tech. 6, 2017): no pole to divide by.
+    sign = np.where(dz >= 0, 1.0, -1.0)
+    a = -1.0 / (sign + dz)
+    b = dx * dy * a
+    x = cosine * dx + across * (1.0 + sign * dx * dx * a) + along * b
+    y = cosine * dy + across * sign * b + along * (sign + dy * dy * a)
+    z = cosine * dz - across * sign * dx - along * dy
+    norm = 1.0 / np.sqrt(x * x + y * y + z * z)
+    return x * norm, y * norm, z * norm
 
 
 def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:

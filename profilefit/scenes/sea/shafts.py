@@ -5,7 +5,7 @@ the depth z, q = tilt + a sum of waves. What scatters once toward the eye is the
 infinite irradiance of folds: a ray that crosses the view ray where it has gone t adds its flux dX over |v_x - v_z q|.
 Li et al. (J. Image Graphics 16(8), 1497, 2011) draw lines, then square prisms; a caustic map a depth serves both.
 
-Where single scattering fails, and what to put in its place, is at the end. Lengths in 1 / c, as in `law`.
+Lengths in 1 / c, as in `law`.
 """
 
 from __future__ import annotations
@@ -17,23 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
+from mcml_sim.media.checks import checked_whole, is_number, shown
 from mcml_sim.media.phase import Phase
-from mcml_sim.results.estimate import Estimate
 from profilefit.errors import InputError
 from profilefit.scenes.sea.law import segment_between
-from profilefit.scenes.sea.photons import ByOrder
 
 Floats = NDArray[np.float64]
 FINE = 1 << 16  # rays a period of a quadrature: right to 1e-5
 PIXELS, RAYS_A_PIXEL = 512, 16  # of a caustic map, a period
-# Of the light toward a horizontal eye beyond ct = 2, sun overhead: ln(L / single scattering at the surface) =
-# BRIGHTER_1 omega + BRIGHTER_2 omega^2 - F(omega) ct, F = 1 - FADES_1 omega - FADES_2 omega^2. Fitted to photons of one
-# and three terms of mean cosine 0.924, omega 0.1 ... 0.8 and ct 2 ... 6: rms 2.8 %, at most 7.3 %; errors beside.
-FADES = (0.878, 0.186)
-FADES_ERRORS = (0.020, 0.030)
-BRIGHTER = (1.20, 0.97)
-BRIGHTER_ERRORS = (0.08, 0.12)
 
 
 @dataclass(frozen=True)
@@ -192,45 +183,6 @@ def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) ->
         sums = np.concatenate([[0.0], np.cumsum(np.bincount(pixel, weights, pixels))]) / rays
         found.append(bundle.period * (turns * sums[-1] + np.interp(rest * pixels, np.arange(pixels + 1), sums)))
     return np.array(found)
-
-
-def share_once(found: ByOrder, omega: float) -> Estimate:
-    """Of the radiance toward an eye, what single scattering is [-], by photons of `trace_view`; its error by groups."""
-    whole = found.at(omega)
-    once = omega * found.groups[0, 1]
-    value = once / np.asarray(whole.value)
-    return Estimate(value, value * whole.standard_error / whole.value, whole.effective_samples)
-
-
-def scaled_once(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """Horizontal radiance, sun overhead, of single scattering in water whose forward peak counts as unscattered [1/sr].
-
-    f = <P_2> of the phase function (g^2 of one term); c' = c (1 - omega f), b' = b (1 - f), p' = p / (1 - f) (Joseph,
-    Wiscombe & Weinman, J. Atmos. Sci. 33, 2452, 1976); by the sun's irradiance.
-    """
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    kept = 1.0 - some * float(phase.moment(2))
-    return (some * float(phase.pdf(0.0)) / kept * np.exp(-kept * depth))[()]
-
-
-def fading(omega: ArrayLike) -> Any:
-    """K / c = F(omega) [-] with which radiance toward a horizontal eye falls off beyond ct = 2, sun overhead."""
-    some = _albedo(omega)
-    return (1.0 - FADES[0] * some - FADES[1] * some**2)[()]
-
-
-def deep_radiance(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """All of that radiance for omega <= 0.8 and ct 2 ... 6 [1/sr], by the sun's irradiance; off by 7 % at most."""
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    rise = BRIGHTER[0] * some + BRIGHTER[1] * some**2
-    return (some * float(phase.pdf(0.0)) * np.exp(rise - fading(some) * depth))[()]
-
-
-def _albedo(omega: ArrayLike) -> Floats:
-    some = checked_numbers("omega", omega, "an albedo in [0, 1]")
-    if not np.all((some >= 0) & (some <= 1)):
-        raise InputError(f"omega must be an albedo in [0, 1], got {shown(omega)}")
-    return some
 
 
 def _scattered(view: ViewRay, q: Floats, phase: Phase) -> Floats:

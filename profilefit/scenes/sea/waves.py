@@ -111,6 +111,7 @@ class Waves:
         """As many times as high about its mean, and as steep and as curved."""
         return replace(self, amplitudes=self.amplitudes * factor)
 
+    @cached_property
     def texels(self) -> NDArray[np.float32]:
         """(1, n, 4) for glsl/waves.glsl: whole waves in the tile along x and y, amplitude [m], phase [turns]."""
         whole = np.round(self.vectors * self.tile / (2.0 * np.pi))

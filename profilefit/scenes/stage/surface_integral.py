@@ -108,14 +108,14 @@ def refined(
 
 
 def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
-    """(h, w, 3) radiant exitance of a picture in diffuse light: the reference; Lambert's where nothing scatters."""
+    """Return radiant exitance (h, w, 3) in diffuse light: the reference; Lambert's where nothing scatters."""
     light = gathered(*seen(buffers), mfp, table).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
 
 def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:
-    """What half the pixel's side changes in `exitance_of`, over its mean [-], at some pixels of an even-sized picture.
+    """Return what half the pixel's side changes in `exitance_of`, at some pixels of a picture of even size.
 
     fine  the same picture with pixels of half the side
     """
@@ -123,9 +123,7 @@ def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFU
     inside = np.argwhere(surface.coarsened(2).mask)
     chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
     mean, difference = refined(surface, view, mfp, table, chosen)
-    share = np.abs(difference) / np.mean(mean)
-    half, most = np.quantile(share, (0.5, 0.9)).tolist()
-    return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
+    return TruthError.of(np.abs(difference) / np.mean(mean))
 
 
 def own_share(curves: Curves, across: Floats, along: Floats) -> Floats:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, FurWay
+from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, LayerTechnique
 from profilefit.studies.stability.cause import Cause
 from profilefit.studies.stability.cells import Cells, Mask, Verdict
 
 Floats = NDArray[np.float64]
 UNION, HITS, SHADOW = "shadow over the cone's", "rms of hits over L", "shadow of a cone"  # quantities
 WAY, ANGLE, LAYERS, ASIDE, ROOT = "way", "θ", "N", "d/r0", "r0"  # axes
-SHELLS: tuple[FurWay, ...] = (FITTED, LINEAR, QUADRATIC)  # the way of a cell, by its place
-SLABS: tuple[FurWay, ...] = (SWEPT, SWEPT_TWO)
+SHELLS: tuple[LayerTechnique, ...] = (FITTED, LINEAR, QUADRATIC)  # the way of a cell, by its place
+SLABS: tuple[LayerTechnique, ...] = (SWEPT, SWEPT_TWO)
 SLENDER, COVER = 20.0, 0.16  # L / r0, r0^2 n of what is looked at
 # Fitted shells are held to be right from so many layers on, times L / r0 and times L tan(theta) / r0: fewer need an
 # exponent that is far from the cone's, or leave gaps.
@@ -25,7 +25,7 @@ GAPS = 0.1  # share of a strand whose discs are apart, of which its shadow is to
 EDGE = 0.1  # of d / r0 - 1, where acos(r0 / d) and the root have lost digits
 
 
-def filled(way: FurWay, degrees: Floats, layers: Floats) -> NDArray[np.bool_]:
+def filled(way: LayerTechnique, degrees: Floats, layers: Floats) -> NDArray[np.bool_]:
     """Where shells are held to be right."""
     tangent = np.tan(np.radians(degrees))
     return np.asarray((way == FITTED) & (layers >= SLENDER * np.maximum(FULL, FILLED * tangent)))
@@ -36,7 +36,7 @@ def moved(degrees: Floats, layers: Floats) -> Floats:
     return np.asarray(SLENDER * np.tan(np.radians(degrees)) / layers * COVER**0.5)
 
 
-def gap_share(way: FurWay, degrees: float, layers: int) -> float:
+def gap_share(way: LayerTechnique, degrees: float, layers: int) -> float:
     """Of a strand's height, where a ray may pass between a disc and the next one [-]."""
     t = np.arange(layers + 1) / layers
     radius = 1.0 - t ** way.exponent_of(layers, SLENDER)
