@@ -240,7 +240,7 @@ def cost() -> Rows:
         for turn in range(-1, TURNS):  # the first is compiled, and not counted
             for way in COSTS:
                 each = [surface.layered(view, way, layers) for layers in (few, many)]
-                times = [renderer.time(lambda one=one: renderer.run(one)) for one in each]
+                times = [renderer.time(one) for one in each]
                 if turn >= 0:
                     taken[way.name].append((times[1] - times[0]) / (many - few))
     shell = np.array(taken[COSTS[0].name])

@@ -53,7 +53,7 @@ def over_layers(
     each = [(way, surface.layered(view, way, count)) for way in ways for count in layers]
     with Renderer(context, size) as renderer:
         heights = [np.maximum(renderer.image(one)[..., 3].ravel(), 0.0) for _, one in each]
-        times = [[renderer.time(lambda one=one: renderer.run(one)) for _, one in each] for _ in range(turns)]
+        times = [[renderer.time(one) for _, one in each] for _ in range(turns)]
     return [
         ChartPoint(way.name, one.uniforms["layers"], float(np.sqrt(np.mean((found - true) ** 2))), own)
         for (way, one), found, own in zip(each, heights, zip(*times, strict=True), strict=True)

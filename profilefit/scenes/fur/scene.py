@@ -53,11 +53,11 @@ class FurRender(NamedTuple):
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
 
-        def time(count: int) -> float:
-            passes = self._passes(by, count)
-            return self.renderer.time(lambda: self.renderer.run(*passes))
-
-        return self.judge.points(by.name, layers, lambda count: self.picture(by, count), time, turns)
+        draw, time = (
+            (lambda count: self.picture(by, count)),
+            (lambda count: self.renderer.time(*self._passes(by, count))),
+        )
+        return self.judge.points(by.name, layers, draw, time, turns)
 
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:
         return self.surface.layered(self.view, by, layers), self.shade

@@ -187,7 +187,7 @@ class Caustics:
         self.renderer.run(find)
         fragments = self.renderer.fragments(deposit)
         self.renderer.run(fold)  # compiled
-        milliseconds = self.renderer.time(lambda: self.renderer.run(*passes))
+        milliseconds = self.renderer.time(*passes)
         light = np.roll(self.renderer.read(self.map)[..., 0].astype(float), self.drift, axis=1)
         if splat is Splat.WIREFRAME:
             light /= light.mean()

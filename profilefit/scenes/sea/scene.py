@@ -40,13 +40,11 @@ class SeaRender(NamedTuple):
 
     def time(self, kind: str, samples: int) -> float:
         """Return the milliseconds of a view's pass, which was drawn before."""
-        view, renderer = self._view(kind, samples), self.passes.renderer
-        return renderer.time(lambda: renderer.run(view))
+        return self.passes.renderer.time(self._view(kind, samples))
 
     def light(self) -> dict[str, float]:
         """Draw all maps of light, and return the milliseconds of the floor's, and of those in depths."""
-        renderer = self.passes.renderer
-        return {name: renderer.time(lambda own=own: renderer.run(*own)) for name, own in self.passes.light.items()}
+        return {name: self.passes.renderer.time(*own) for name, own in self.passes.light.items()}
 
     def points(self, kind: str, numbers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of samples; time is of the view's pass."""

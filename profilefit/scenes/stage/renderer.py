@@ -1,9 +1,8 @@
-"""Passes as values, and the one renderer that compiles them, runs them over named maps and takes their time."""
+"""Passes as values, and the one renderer that compiles them and runs them over named maps."""
 
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Self
@@ -14,7 +13,7 @@ import numpy as np
 from profilefit.errors import ShaderError
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.world import Mesh
-from profilefit.shader.context import check_errors, program
+from profilefit.shader.context import check_errors, fragments, program, seconds
 
 VERSION = "#version 330\n"
 POINTS, LINES, TRIANGLES = moderngl.POINTS, moderngl.LINES, moderngl.TRIANGLES
@@ -26,10 +25,6 @@ FLAGS = {REPLACE: moderngl.NOTHING, NEAREST: moderngl.DEPTH_TEST, SUM: moderngl.
 ATTRIBUTES = {"position": 3, "normal": 3, "uv": 2}  # numbers of a vertex, in the order of `Mesh.vertices`
 ANISOTROPY = 8.0
 MOST_SENT = 64  # arrays and meshes that stay on the GPU: of more, those are released that were used longest ago
-# Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
-# Mesa's llvmpipe does, and the clock on the wall is right.
-TRUSTED = 0.5
-LONGEST_QUERY = 4.0  # seconds: the query counts nanoseconds in 32 bits
 
 
 class Smooth(NamedTuple):
@@ -46,7 +41,7 @@ class Pass:
     """Draw of one shader into maps; by default of a fragment shader over all of them.
 
     Attributes:
-        name: of the shader, in messages and in `Renderer.compile_milliseconds`.
+        name: of the shader, in messages and in `Renderer.compiled`.
         reads: by sampler the name of a map, an array (rows, columns, channels), an image, or another renderer's map.
         writes: the map that is filled, or several of one size.
         source: GLSL of the fragments, without a version line.
@@ -81,7 +76,7 @@ class Renderer:
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
         """Take a context and the columns and rows of every map that `declare` does not state otherwise."""
         self.context, self.size = context, size
-        self.compile_milliseconds: dict[str, float] = {}
+        self.compiled: list[str] = []  # names of shaders
         self._formats: dict[str, tuple[tuple[int, int], int]] = {}
         self._maps: dict[str, moderngl.Texture] = {}
         self._targets: dict[tuple[tuple[str, ...], bool], moderngl.Framebuffer] = {}
@@ -131,22 +126,11 @@ class Renderer:
 
     def fragments(self, one: Pass) -> int:
         """Run a pass, and return the number of fragments that it draws."""
-        query = self.context.query(samples=True)
-        with query:
-            self._run(one)
-        return int(query.samples)
+        return fragments(self.context, lambda: self._run(one))
 
-    def time(self, work: Callable[[], object]) -> float:
-        """Return the milliseconds of some work, by the driver's clock where it agrees with the one on the wall."""
-        query = self.context.query(time=True)
-        self.context.finish()
-        start = time.perf_counter()
-        with query:
-            work()
-        self.context.finish()
-        wall = time.perf_counter() - start
-        by_driver = query.elapsed / 1e9
-        return 1e3 * (by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall)
+    def time(self, *passes: Pass) -> float:
+        """Run passes, and return their milliseconds."""
+        return 1e3 * seconds(self.context, lambda: self.run(*passes))
 
     def release(self) -> None:
         """Free all that the renderer has on the GPU; the context is its owner's."""
@@ -189,9 +173,8 @@ class Renderer:
     def _shader(self, one: Pass) -> _Shader:
         key = one.source, one.vertex
         if key not in self._shaders:
-            start = time.perf_counter()
             self._shaders[key] = _Shader(self.context, one)
-            self.compile_milliseconds[one.name] = 1e3 * (time.perf_counter() - start)
+            self.compiled.append(one.name)
         return self._shaders[key]
 
     def _target(self, names: tuple[str, ...], has_depth: bool) -> moderngl.Framebuffer:

@@ -26,6 +26,7 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Technique, combination
 from profilefit.scenes.stage.world import Part, Scene
+from profilefit.shader.context import seconds
 
 Floats = NDArray[np.float64]
 DEFAULT = Sampling()
@@ -128,7 +129,7 @@ class Stage:
         passes: str = "scatter",
         fixed_alpha: ArrayLike | None = None,
     ) -> list[float]:
-        """Return the milliseconds of each repeat, by `Renderer.time`; all is compiled before.
+        """Return the milliseconds of each repeat, by `seconds`; all is compiled before.
 
         Args:
             law, mfp, sampling, fixed_alpha: of `scatter`.
@@ -148,7 +149,7 @@ class Stage:
                 self._scatter(by, mfp, sampling, fixed_alpha)
 
         work()
-        return [self.renderer.time(work) for _ in range(repeats)]
+        return [1e3 * seconds(self.context, work) for _ in range(repeats)]
 
     def release(self) -> None:
         """Free all that the stage has on the GPU; the context is its owner's."""
