@@ -79,5 +79,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return what an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

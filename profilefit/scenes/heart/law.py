@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kernel:
-    """sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k): variances (N,), rising [length^2]; weights (N,) or (N, c) [-]."""
+    """Kernel sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k): variances (N,), rising [length^2]; weights (N,) or (N, c) [-]."""
 
     variances: Floats
     weights: Floats

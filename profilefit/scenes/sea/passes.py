@@ -31,7 +31,7 @@ GLOW, DEPTHS = 128, 32  # cosines and depths of the sky's and the floor's light
 CONE = 512  # angles of that light to the vertical
 
 
-class Irradiance(NamedTuple):
+class SeaIrradiance(NamedTuple):
     """Light of red, green and blue (3,).
 
     Attributes:
@@ -155,7 +155,7 @@ class SeaPasses:
         source = "".join((*map(read_text, ("common", "near_zero")), *map(_text, SOURCES)))
         return Pass("view", reads, VIEW, source, given)
 
-    def _irradiance(self, kind: str) -> Irradiance:
+    def _irradiance(self, kind: str) -> SeaIrradiance:
         world = self.world
         entered, sky = np.array(world.sun) * self._floor.entered, np.array(world.sky) * world.diffuse_in
         inside, weight = window(world)
@@ -163,7 +163,7 @@ class SeaPasses:
         from_sun = np.exp(-optical(world, kind, np.array(world.depth * world.slant))[2])
         first, back = entered * from_sun + sky * on_floor, np.array(world.reflectance) * mirrored(world, kind)
         more = first * back / (1.0 - back)
-        return Irradiance(entered, sky, on_floor, more, (first + more) * np.array(world.reflectance))
+        return SeaIrradiance(entered, sky, on_floor, more, (first + more) * np.array(world.reflectance))
 
     def _of_kind(self, kind: str) -> tuple[Singles, Singles, Singles]:
         """Return tables of what the water leaves, of the blur of the floor's light, and of what sky and floor add."""

@@ -145,8 +145,13 @@ def read(file: str, content: Table) -> SeaRequest:
     if "source" not in water:
         raise tables.bad("water", "source", "a text that says where a and b are from", None)
     tables.text("water", "source", water)
+    numbers: dict[str, Any] = {
+        key: tables.whole("technique", key, named, default, least, most)
+        for key, (least, most, default) in RANGES.items()
+    }
     found = SeaRequest(
         **request.view(tables, content, _camera, DEFAULTS, _toward),
+        **numbers,
         a=tables.three("water", "a", water, (0.0,) * 3, 0.0, MOST_WATER),
         b=tables.three("water", "b", water, (0.0,) * 3, 0.0, MOST_WATER),
         lobes=_lobes(tables, water),
@@ -161,10 +166,6 @@ def read(file: str, content: Table) -> SeaRequest:
         reflectance=tables.three("floor", "reflectance", floor, REFLECTANCE, 0.0, 1.0),
         kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
         splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
-        **{
-            key: tables.whole("technique", key, named, default, least, most)
-            for key, (least, most, default) in RANGES.items()
-        },
     )
     if found.texels * found.slices > MOST_ROWS:
         accepted = f"so many that texels times slices is {MOST_ROWS} at most"

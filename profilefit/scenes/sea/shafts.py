@@ -52,13 +52,13 @@ class Bundle:
                 raise InputError(f"waves must be (slope, whole number a period, phase), got {shown(one)}")
 
     def slope(self, x: Floats) -> Floats:
-        """q at X [-]."""
+        """Return q at X [-]."""
         turn = 2.0 * np.pi / self.period
         return self.tilt + sum((a * np.sin(turn * n * x + phase) for a, n, phase in self.waves), np.zeros_like(x))
 
     @property
     def most(self) -> float:
-        """|q - tilt| of no ray is larger."""
+        """Largest |q - tilt| of any ray."""
         return float(sum(abs(a) for a, _, _ in self.waves))
 
 
@@ -81,7 +81,7 @@ class ViewRay:
 
 
 def determinant(gradient: ArrayLike, depth: ArrayLike) -> Any:
-    """Area of a thin prism of rays by that at the surface [-]: det(1 + z Q) = 1 + z tr Q + z^2 det Q.
+    """Return the area of a thin prism of rays by that at the surface [-]: det(1 + z Q) = 1 + z tr Q + z^2 det Q.
 
     gradient  (..., 2, 2) dq / d(X, Y) [1/length];  depth  z [length].  Its irradiance is the sun's over |this|; < 0
     behind a fold.
@@ -93,7 +93,7 @@ def determinant(gradient: ArrayLike, depth: ArrayLike) -> Any:
 
 
 def by_quadrature(bundle: Bundle, view: ViewRay, phase: Phase, fine: int = FINE) -> float:
-    """Radiance that is scattered once into the view ray, by the sun's irradiance and by b [length/sr]: the truth.
+    """Return the radiance scattered once into the view ray, by the sun's irradiance and b [length/sr]: the reference.
 
     The sum over many prisms, which is second order in their width wherever the view ray ends.
     """
@@ -101,7 +101,7 @@ def by_quadrature(bundle: Bundle, view: ViewRay, phase: Phase, fine: int = FINE)
 
 
 def by_lines(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
-    """The same of `count` lines a period, each the flux of its cell: those that the view ray meets."""
+    """Return that radiance by `count` lines a period, each the flux of its cell: those that the view ray meets."""
     x, flux = _rays(bundle, view, count, middle=True)
     q = bundle.slope(x)
     met = _met(view, x, q)
@@ -113,7 +113,7 @@ def by_lines(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
 
 
 def by_prisms(bundle: Bundle, view: ViewRay, phase: Phase, count: int, is_spread: bool = True) -> float:
-    """The same of `count` prisms a period between neighbouring rays, each with the integral over its chord.
+    """Return that radiance by `count` prisms a period between neighbouring rays, each integrated over its chord.
 
     is_spread  a prism's flux stays as its area changes with depth; False is one irradiance in all of it, which makes
                light where prisms widen, and loses it where they meet
@@ -144,7 +144,7 @@ def by_prisms(bundle: Bundle, view: ViewRay, phase: Phase, count: int, is_spread
 def by_slices(
     bundle: Bundle, view: ViewRay, phase: Phase, count: int, pixels: int = PIXELS, has_slopes: bool = True
 ) -> float:
-    """The same of `count` caustic maps, each halfway through a piece of the view ray; a horizontal ray has one map.
+    """Return that radiance by `count` caustic maps, each in the middle of a piece of the ray; one if it is horizontal.
 
     The piece is laid onto the map along the sun: what is seen there is the mean over its pixels, times the integral of
     the segment. has_slopes  the map also holds the mean direction of its light, for the phase function; False takes
@@ -168,7 +168,7 @@ def by_slices(
 
 
 def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) -> Floats:
-    """(2, n): flux between 0 and x (n,) at a depth [length], as a caustic map's running sum has it, and flux times q.
+    """Return (2, n) flux from 0 to x (n,) at a depth [length], as a caustic map's running sum has it, and flux times q.
 
     Over a period it is a period.
     """
@@ -186,21 +186,21 @@ def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) ->
 
 
 def _scattered(view: ViewRay, q: Floats, phase: Phase) -> Floats:
-    """Phase function of rays toward the eye times the way along a ray by depth, 1 / cosine [1/sr]: by flux a level."""
+    """Return the phase function toward the eye times the way along a ray by depth, 1 / cosine [1/sr]."""
     slant = np.sqrt(1.0 + q * q)
     cosine = -(view.direction[0] * q + view.direction[2]) / slant
     return np.asarray(phase.pdf(np.clip(cosine, -1.0, 1.0)) * slant)
 
 
 def _met(view: ViewRay, x: Floats, q: Floats) -> Floats:
-    """Way t along the view to where it meets the ray that entered at X; inf where both are parallel."""
+    """Return the way t along the view to where it meets the ray that entered at X; inf where both are parallel."""
     across = view.direction[0] - view.direction[2] * q
     with np.errstate(divide="ignore", invalid="ignore"):
         return (x + view.z * q - view.x) / across
 
 
 def _rays(bundle: Bundle, view: ViewRay, count: int, middle: bool) -> tuple[Floats, float]:
-    """X of all rays that may meet the view, as edges or middles of cells, and the flux of a cell [length]."""
+    """Return X of all rays that may meet the view, as edges or middles of cells, and the flux of a cell [length]."""
     number = checked_whole("count", count, lowest=1, highest=10**7)
     ends: Sequence[float] = (view.x, view.x + view.direction[0] * view.length)
     depths = (view.z, view.z + view.direction[2] * view.length)

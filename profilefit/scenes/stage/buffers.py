@@ -91,9 +91,9 @@ class Buffers:
     @classmethod
     def of_maps(cls, maps: Iterable[Singles], pixel: float, is_perspective: bool) -> Buffers:
         """Return the G-buffer of four maps (h, w, 4), in the order of `SURFACE`."""
-        vectors, fourth = zip(*((one[..., :3], one[..., 3]) for one in maps), strict=True)
-        thickness, visibility, mask, roughness = fourth
-        return cls(*vectors, mask, thickness, pixel, is_perspective, visibility, roughness)
+        one, two, three, four = maps
+        vectors = one[..., :3], two[..., :3], three[..., :3], four[..., :3]
+        return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
 
 
 def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], what: str) -> None:

@@ -65,7 +65,7 @@ class Judge:
 
     def rmse(self, picture: NDArray[np.floating]) -> float:
         """Return the root mean square error of a picture (h, w, 3), over the reference's mean [-]."""
-        return float(np.sqrt(max(np.mean(self._squares(picture)[self.mask]), 0.0)) / self.mean)
+        return float(np.sqrt(np.maximum(np.mean(self._squares(picture)[self.mask]), 0.0)) / self.mean)
 
     def relative_error(self, picture: NDArray[np.floating]) -> Floats:
         """Return a map (h, w) of root mean squares over the channels, over the same mean [-]; NaN where none counts.

@@ -267,8 +267,10 @@ class _Vertices:
         return self._arrays[by]
 
     def release(self) -> None:
-        for one in (*self._arrays.values(), self._vertices, self._triangles):
-            one.release()
+        for array in self._arrays.values():
+            array.release()
+        self._vertices.release()
+        self._triangles.release()
 
 
 def float_texture(

@@ -1,4 +1,4 @@
-"""What a scene's file requests of the stage: samples, camera and light; and the picture drawn, beside its reference."""
+"""Request of a scene's file: samples, camera and light; and the picture drawn, beside its reference."""
 
 from __future__ import annotations
 

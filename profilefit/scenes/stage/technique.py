@@ -50,7 +50,7 @@ class Frame:
 
     @property
     def alpha_uniform(self) -> tuple[float, ...]:
-        """`fixed_alpha` as shaders take it, in which a number below 0 stands for None."""
+        """Value of `fixed_alpha` as shaders take it, in which a number below 0 stands for None."""
         return (-1.0,) * 3 if self.fixed_alpha is None else tuple(self.fixed_alpha)
 
     @property
