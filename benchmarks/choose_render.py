@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
-from profilefit.scenes.skin.law import albedo_of
 from profilefit.scenes.skin.passes import SeparableFilter
+from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.buffers import Buffers, step_edge
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage

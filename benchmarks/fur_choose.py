@@ -20,7 +20,7 @@ from benchmarks.table import show
 from mcml_sim.files.text_file import as_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit.scenes.fur.truth import random_patch
-from profilefit.scenes.fur.ways import WAYS, FurTrial, FurWay, error_of, trial
+from profilefit.scenes.fur.ways import WAYS, FurTrial, LayerTechnique, error_of, trial
 from profilefit.studies.choose.fur import RandomFur, cheapest
 
 FURS, SEED = 50, 2024
@@ -88,7 +88,7 @@ def judged(fur: Fur, seed: int) -> Judged:
     return Judged(fur, way.name, layers, error_of(trials, way, layers), _least(trials, way, layers, fur.tolerance))
 
 
-def _least(trials: Sequence[FurTrial], way: FurWay, layers: int, tolerance: float) -> int:
+def _least(trials: Sequence[FurTrial], way: LayerTechnique, layers: int, tolerance: float) -> int:
     """Return the least number within the tolerance and next to others that are, from one that nearly is."""
     while error_of(trials, way, layers) > tolerance:
         layers += 1

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.fur_patches import spaced_patch, tufted_patch
 from profilefit.fitting.solver import differences, solve
 from profilefit.scenes.fur.law import shadow, shared_shadow, visibility
-from profilefit.scenes.fur.truth import Patch, cast, random_patch, spaced_patch, struck, tufted_patch
+from profilefit.scenes.fur.truth import Patch, cast, random_patch, struck
 
 Floats = NDArray[np.float64]
 Rows = list[tuple[str | float, ...]]

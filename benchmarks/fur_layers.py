@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.law import MOST_LAYERS, shell_shadow
-from profilefit.scenes.fur.passes import FurPasses, FurSurface
+from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays
 from profilefit.scenes.fur.ways import LINEAR as SHELLS
 from profilefit.scenes.fur.ways import MOST, SWEPT, SWEPT_TWO, WAYS, FurTrial, error_of, least_layers, trial
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
 from profilefit.studies.tradeoff.fur import DEGREES, DENSITY, RADIUS
 
@@ -232,13 +233,14 @@ def _errors(made: Floats, logs: Floats, of: NDArray[np.intp]) -> Floats:
 
 def cost() -> Rows:
     """Return the time of a layer over a shell's, where a ray meets next to nothing; by OpenGL, ends over turns."""
-    patch, (few, many) = random_patch(1.0, 0.01, 1.0, 6.0), COST_LAYERS
-    view, _ = patch_view(patch, 0.25 * np.pi, (256, 256))
+    patch, (few, many), size = random_patch(1.0, 0.01, 1.0, 6.0), COST_LAYERS, (256, 256)
+    (view, _), surface = patch_view(patch, 0.25 * np.pi, size), FurSurface.of_patch(patch)
     taken: dict[str, list[float]] = {way.name: [] for way in COSTS}
-    with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (256, 256)) as passes:
+    with opened() as context, Renderer(context, size) as renderer:
         for turn in range(-1, TURNS):  # the first is compiled, and not counted
             for way in COSTS:
-                times = [passes.milliseconds(passes.layered(view, way, layers)) for layers in (few, many)]
+                each = [surface.layered(view, way, layers) for layers in (few, many)]
+                times = [renderer.time(one) for one in each]
                 if turn >= 0:
                     taken[way.name].append((times[1] - times[0]) / (many - few))
     shell = np.array(taken[COSTS[0].name])

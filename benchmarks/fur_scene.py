@@ -14,10 +14,11 @@ from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.fur import law, scene
 from profilefit.scenes.fur.chart import patch_view
-from profilefit.scenes.fur.passes import FurPasses, FurSurface
+from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WAYS
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
 from profilefit.studies.tradeoff import fur as tradeoff
 from profilefit.studies.tradeoff.points import Panel
@@ -35,12 +36,13 @@ COLOURS = {LINEAR.name: GREY, QUADRATIC.name: VERMILION, FITTED.name: ORANGE, SW
 def unions() -> Rows:
     """Return the share of rays that meet a strand's discs, over the cone's shadow; its closed form, and error."""
     patch, found = Patch(np.array([[1.0, 1.0]]), SIDE, ROOT, 1.0), Rows()
-    with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (RAYS, RAYS)) as passes:
+    surface = FurSurface.of_patch(patch)
+    with opened() as context, Renderer(context, (RAYS, RAYS)) as renderer:
         for way in (LINEAR, QUADRATIC):
             for degrees, layers in UNIONS:
                 theta = float(np.radians(degrees))
                 view, _ = patch_view(patch, theta, (RAYS, RAYS))
-                share = float(np.mean(passes.hits(view, way, layers)[..., 3] >= 0.0))
+                share = float(np.mean(renderer.image(surface.layered(view, way, layers))[..., 3] >= 0.0))
                 drawn = share * SIDE**2 / float(law.shadow(ROOT, 1.0, theta))
                 expected = law.shell_shadow(layers, float(way.exponent or 1.0), ROOT, 1.0, theta)
                 found.append((way.name, degrees, layers, drawn, expected, drawn / expected - 1.0))
@@ -60,9 +62,10 @@ def gamma() -> Rows:
     found: Rows = []
     with opened() as context:
         for fine in FINER:
-            with scene.bench(context, replace(tradeoff.request(), supersampling=fine)) as drawn:
-                white, mask = drawn.exposure, drawn.mask
-                off = (drawn.averaged(srgb_codes(white * drawn.fine)) - srgb_codes(white * drawn.truth))[mask]
+            with scene.reference_render(context, replace(tradeoff.request(), supersampling=fine)) as drawn:
+                white, judge = drawn.judge.exposure, drawn.judge
+                encoded = scene.averaged(srgb_codes(white * drawn.fine), fine)
+                off = (encoded - srgb_codes(white * judge.reference))[judge.mask]
                 most = float(np.percentile(-off, 99.0))
                 found.append((fine**2, float(off.mean()), float(np.sqrt(np.mean(off**2))), most))
     return found
@@ -77,9 +80,9 @@ def lobes() -> Rows:
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
     """Draw the example's truth and the five ways, three beside three, and error over time toward six angles."""
-    with scene.bench(context, tradeoff.request()) as found:
-        each = [found.truth, *(found.averaged(found.rays(way, SHOWN)[0]) for way in WAYS)]
-        larger = [np.kron(to_srgb(one[::-1], found.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
+    with scene.reference_render(context, tradeoff.request()) as drawn:
+        judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in WAYS)]
+        larger = [np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
     rows = [np.concatenate(row, axis=1) for row in (larger[:3], larger[3:])]
     image.imsave(folder / "render-fur.png", np.concatenate(rows))
     _charts(panels, device, folder / "render-fur-cost.png")

@@ -20,14 +20,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 import profilefit
+from benchmarks import heart_trials as trials
 from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
+from benchmarks.heart_fit import GRID, Errors, SplitLight, errors, fitted
 from benchmarks.table import show
 from mcml_sim.files.text_file import read_toml
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import stack
 from profilefit.recipes.stack.gaussians import shared_gaussians
-from profilefit.scenes.heart import chart, scene, trials
-from profilefit.scenes.heart.fit import GRID, Errors, SplitLight, errors, fitted
+from profilefit.scenes.heart import chart, scene
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
 from profilefit.scenes.stage.buffers import INSIDE
@@ -86,7 +87,9 @@ def rows(own: Errors, judged: Errors) -> list[tuple[str, ...]]:
 
 def choices(lights: list[SplitLight], units: list[float]) -> list[tuple[str, ...]]:
     """Count how often what the screen misses says rightly whether an atlas is needed: numbers of scenes."""
-    needs = [AtlasNeed(light.rms(light.screen), light.rms(light.truth + light.missed), TOLERANCE) for light in lights]
+    needs = [
+        AtlasNeed(light.rms(light.screen), light.rms(light.truth + light.occlusion), TOLERANCE) for light in lights
+    ]
     said, broken = np.array([(one.verdict == "atlas", one.is_broken) for one in needs]).T
     clear = np.array([light.hidden > NEAR * one for light, one in zip(lights, units, strict=True)])
     hidden = broken & ~clear
@@ -130,7 +133,7 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
     light, found, told = scene.light_of(request().stack, COUNT), {}, []
     with opened() as context:
         for size in SIZES:
-            with scene.bench(context, request(size), light, JUDGED) as own:
+            with scene.reference_render(context, request(size), light, JUDGED) as own:
                 found[size] = chart.ways(own, request(size), WAYS, TURNS)
                 frames = chart.frames(own, ("split", "texture"), TURNS, request().sampling)
             name = f"{size[0]} x {size[1]}"
@@ -147,7 +150,7 @@ def finer() -> list[tuple[str, ...]]:
     """Return errors as the atlas is refined."""
     found = []
     light = scene.light_of(request().stack, COUNT)
-    with opened() as context, scene.bench(context, request(), light, JUDGED) as own:
+    with opened() as context, scene.reference_render(context, request(), light, JUDGED) as own:
         for texel in FINER:
             with own.with_texels(texel) as of:
                 cells = (f"{chart.error(of, kind):.3g}" for kind in ("texture", "split"))
@@ -162,9 +165,9 @@ def edges() -> list[tuple[str, ...]]:
     """
     light, columns, rows = scene.light_of(request().stack, COUNT), *request().size
     size = (SUPER * columns, SUPER * rows)
-    with opened() as context, scene.bench(context, request(size), light, 1) as own:
-        stage, mfp = own.judge.stage, own.judge.mfp
-        fine = stage.render(own.way("split"), mfp, request().sampling).astype(float)
+    with opened() as context, scene.reference_render(context, request(size), light, 1) as own:
+        stage, mfp = own.stage, own.light.mfp
+        fine = stage.render(own.technique("split"), mfp, request().sampling).astype(float)
         inside = stage.buffers().mask > INSIDE
     covered = inside.reshape(rows, SUPER, columns, SUPER).mean(axis=(1, 3))
     outline = (covered > 0) & (covered < 1)

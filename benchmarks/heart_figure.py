@@ -11,8 +11,8 @@ from matplotlib import image
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.heart import chart, scene
+from profilefit.scenes.stage.judge import EXPOSURE
 from profilefit.scenes.stage.picture import ChartPoint, to_srgb
-from profilefit.scenes.stage.request import EXPOSURE
 from profilefit.shader import opened
 
 COLOURS = {"split": BLUE, "texture": VERMILION, "screen": GREEN, "none": GREY}
@@ -74,13 +74,13 @@ def map_figure(errors: Mapping[str, np.ndarray], texels: Sequence[float], views:
 def heart_picture(request: scene.HeartRequest, path: Path) -> None:
     """Draw the truth, and the heart by each way, side by side."""
     light = scene.light_of(request.stack, request.gaussians)
-    with opened() as context, scene.bench(context, request, light) as own:
+    with opened() as context, scene.reference_render(context, request, light) as own:
         judge, pictures = own.judge, []
         for kind in PICTURED:
-            by = own.way(kind)
-            exitance = judge.stage.scatter(by, judge.mfp, chart.SURE)
-            radiance = judge.stage.render(by, judge.mfp, chart.SURE)
+            by, mfp = own.technique(kind), light.mfp
+            exitance = own.stage.scatter(by, mfp, chart.SURE)
+            radiance = own.stage.render(by, mfp, chart.SURE)
             if not pictures:
-                pictures.append(radiance + (judge.truth - exitance) / np.pi)
+                pictures.append(radiance + (judge.reference - exitance) / np.pi)
             pictures.append(radiance)
     image.imsave(path, np.concatenate([to_srgb(one[::-1], EXPOSURE) for one in pictures], axis=1))

@@ -29,8 +29,8 @@ from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
+from profilefit.scenes.stage.judge import EXPOSURE
 from profilefit.scenes.stage.picture import to_srgb
-from profilefit.scenes.stage.request import EXPOSURE
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
@@ -114,13 +114,13 @@ def head_picture(file: Path) -> None:
     table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
     laws, pictures = scene.laws_of(request.stack), []
     with opened() as context, Stage(context, request.size) as stage:
-        judge = scene.judged(stage, request, table)
+        judge = scene.reference(stage, request, table)
         for kind in PICTURED:
             way = scene.technique(replace(request, kind=kind), laws)
             sampling = replace(request.sampling, samples=64)
             radiance = stage.render(way.by, way.mfp, sampling, way.alpha)
             if not pictures:
-                off = judge.truth - stage.scatter(way.by, way.mfp, sampling, way.alpha)
+                off = judge.reference - stage.scatter(way.by, way.mfp, sampling, way.alpha)
                 pictures.append(radiance + off / np.pi)
             pictures.append(radiance)
     image.imsave(file, np.concatenate([to_srgb(one[::-1], EXPOSURE) for one in pictures], axis=1))

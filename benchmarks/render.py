@@ -44,7 +44,7 @@ def errors(context: moderngl.Context, options: argparse.Namespace) -> dict:
         render_errors.report("Laws", works, found, "separable")
         other = render_errors.measured(judge, varied, samples, seeds, turns)
         render_errors.report("Radii", varied, other, "burley, importance blue, longest")
-        own = judge.truth_error
+        own = judge.own_error
         if own:
             print("the reference's own error, median, 90 %, RMS:", *(f"{value:.1e}" for value in own))
     if options.figure:
@@ -119,7 +119,7 @@ def _drawn(
         render_pictures.report(judge, rows)
         if options.figure:
             render_pictures.draw(judge, rows, options.figure, titles, _device(context))
-        return {"reference_error": judge.truth_error, "pictures": render_pictures.as_json(judge, rows)}
+        return {"reference_error": judge.own_error, "pictures": render_pictures.as_json(judge, rows)}
 
 
 def _device(context: moderngl.Context) -> str:

@@ -108,7 +108,7 @@ def draw(judge: Judged, rows: Sequence[Sequence[Shot]], path: Path, titles: Sequ
     for ax in axes.ravel():
         ax.set_axis_off()
     for pair, row, title in zip(axes.reshape(len(rows), 2, columns), rows, titles, strict=True):
-        _picture(pair[0, 0], judge.truth, "exact")
+        _picture(pair[0, 0], judge.reference, "exact")
         _note(pair[1, 0], title)
         for upper, lower, one in zip(pair[0, 1:], pair[1, 1:], row, strict=True):
             _picture(upper, one.exitance, f"{one.label}\n{one.samples} {one.unit}, {one.milliseconds:.0f} ms")
@@ -127,8 +127,8 @@ def _picture(ax: Axes, exitance: Floats, title: str) -> None:
 
 
 def _difference(ax: Axes, judge: Judged, one: Shot):
-    mean = float((judge.truth[judge.mask] @ LUMINANCE).mean())
-    difference = np.where(judge.mask, (one.exitance - judge.truth) @ LUMINANCE, 0.0) / mean
+    mean = float((judge.reference[judge.mask] @ LUMINANCE).mean())
+    difference = np.where(judge.mask, (one.exitance - judge.reference) @ LUMINANCE, 0.0) / mean
     ax.set_title(f"RMSE {judge.rmse(one.exitance):.3f}, FLIP {judge.flip(one.exitance):.3f}", fontsize=7, pad=2)
     end = SCALE * LEVELS / (LEVELS - 1)
     return ax.imshow(difference[::-1], cmap=STEPS, vmin=-end, vmax=end, interpolation="nearest")

@@ -21,8 +21,8 @@ from benchmarks.table import show
 from mcml_sim import Setting, exact
 from profilefit.laws.base import ProfileLaw
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, styled
-from profilefit.scenes.skin.law import albedo_of
 from profilefit.scenes.skin.scene import head_scene
+from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.request import HEAD
 from profilefit.scenes.stage.world import Camera, unit
@@ -174,8 +174,8 @@ def _radiance(judge: Judged, one: Shot) -> Floats:
 
 def _difference(judge: Judged, one: Shot) -> Floats:
     """Return (h, w) luminance less that of the exact picture, over its mean [-]; 0 where nothing scatters."""
-    mean = float((judge.truth[judge.mask] @ LUMINANCE).mean())
-    return np.where(judge.mask, (one.exitance - judge.truth) @ LUMINANCE, 0.0) / mean
+    mean = float((judge.reference[judge.mask] @ LUMINANCE).mean())
+    return np.where(judge.mask, (one.exitance - judge.reference) @ LUMINANCE, 0.0) / mean
 
 
 def report(found: Sequence[Shot]) -> None:

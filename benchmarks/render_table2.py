@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from benchmarks.render_laws import Contender
 from benchmarks.table import show
+from profilefit.scenes.skin.chart import covered, covering
 from profilefit.scenes.skin.scene import Head
-from profilefit.scenes.stage.stage import PASSES, Stage, covered, covering
+from profilefit.scenes.stage.stage import PASSES, Stage
 from profilefit.studies.choose.cost import COVERED, PUBLISHED, YARDSTICK_TAPS
 from profilefit.studies.tradeoff.stopwatch import Ratio
 

@@ -18,9 +18,8 @@ from profilefit.scenes.skin.scene import FACE, Head, head_scene
 from profilefit.scenes.stage import surface_integral
 from profilefit.scenes.stage.buffers import Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.picture import TruthError
-from profilefit.scenes.stage.request import EXPOSURE
+from profilefit.scenes.stage.judge import EXPOSURE, Judge
+from profilefit.scenes.stage.picture import UNKNOWN, TruthError
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface_integral import exitance_of, own_error
 from profilefit.scenes.stage.world import Rgb
@@ -32,15 +31,21 @@ CLOSE = replace(FACE, target=(14.0, 24.0, 50.0), height=60.0)
 REFERENCE = Path(surface_integral.__file__)  # a kept answer is that of another code if this file has changed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Judged(Judge):
-    """View and its exact answer; truth_error is the answer's own, by `own_error`, None if not measured."""
+    """Stage that has drawn the view, mean free paths [mm], and the exact answer."""
 
-    truth_error: TruthError | None
+    stage: Stage
+    mfp: Rgb
+
+    @property
+    def own_error(self) -> TruthError | None:
+        """Error of the exact answer, None if not measured."""
+        return None if self.truth_error is UNKNOWN else self.truth_error
 
     def flip(self, exitance: NDArray[np.floating]) -> float:
         """Return the mean of FLIP over the translucent pixels (Andersson et al. 2020) [0, 1], at 67 pixels a degree."""
-        pair = (np.ascontiguousarray(shown(image), np.float32) for image in (self.truth, exitance))
+        pair = (np.ascontiguousarray(shown(image), np.float32) for image in (self.reference, exitance))
         difference, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)
         return float(np.mean(difference[::-1][self.mask]))  # `shown` has row 0 at the top
 
@@ -67,9 +72,9 @@ def judged(
     with Stage(context, size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()
-        error = None if quick else _own_error(context, scene, mfp, setting, size)
+        error = UNKNOWN if quick else _own_error(context, scene, mfp, setting, size)
         truth = _kept(kept, buffers, mfp, setting)
-        yield Judged(stage, mfp, truth, buffers.mask > 0.5, error)
+        yield Judged(truth, buffers.mask > 0.5, error, stage=stage, mfp=mfp)
 
 
 def shown(exitance: NDArray[np.floating]) -> Floats:

@@ -4,7 +4,7 @@
     python -m benchmarks.sea --only beam haze              # some of them, by their names
     python -m benchmarks.sea --pictures fits/evidence      # the scene beside its truth, and its chart, only
 
-Photons are those of `profilefit.scenes.sea.photons`, Petzold's phase function the three terms of its record; errors of
+Photons are those of `benchmarks.sea_photons`, Petzold's phase function the three terms of its record; errors of
 closed forms are relative, those of pictures root mean squares over the mean of the light. Times are of this machine's
 OpenGL, of three turns and more the least or the 16th percentile.
 """
@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import sea_chart as chart
 from benchmarks.sea_figure import cost_figure, picture
+from benchmarks.sea_filter import adaptive_filter
+from benchmarks.sea_photons import trace_beam
 from benchmarks.table import Listed, Rows, parser_of, show_all
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.scenes.sea import hits
-from profilefit.scenes.sea.bench import bench
+from profilefit.scenes.sea import chart, hits
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.photons import trace_beam
-from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons
+from profilefit.scenes.sea.reference import caustic_photons
 from profilefit.scenes.sea.request import lobes_of
+from profilefit.scenes.sea.scene import reference_render
 from profilefit.scenes.sea.truth import caustic_boxes
 from profilefit.scenes.sea.waves import Waves
 from profilefit.scenes.sea.world import World
@@ -175,7 +175,7 @@ def splats() -> Rows:
 
 def kinds() -> Rows:
     """Judge the example by each kind and number of samples, then by other maps of light; and name the device."""
-    with opened() as context, bench(context, tradeoff.request(), PATHS) as found:
+    with opened() as context, reference_render(context, tradeoff.request(), PATHS) as found:
         points = tradeoff.view(found).points
         maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
         device = renderer(context)
@@ -247,7 +247,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the scene, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
-        with opened() as context, bench(context, tradeoff.request(), PATHS) as found:
+        with opened() as context, reference_render(context, tradeoff.request(), PATHS) as found:
             picture(found, given.pictures / "render-sea.png")
             cost_figure(tradeoff.view(found), renderer(context), given.pictures / "render-sea-cost.png")
         return

@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
-from profilefit.scenes.stage.picture import ChartPoint, Drawn
+from profilefit.scenes.stage.picture import ChartPoint, RenderResult
 
 LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured
 
 
-def scene_figures(drawn: Drawn, device: str) -> dict[str, bytes]:
+def scene_figures(drawn: RenderResult, device: str) -> dict[str, bytes]:
     """Return PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart"."""
     files = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
     if len(drawn.chart) > 1:
@@ -35,7 +35,7 @@ def _png(picture: NDArray[np.uint8]) -> bytes:
 
 
 @styled
-def _error_map(drawn: Drawn) -> bytes:
+def _error_map(drawn: RenderResult) -> bytes:
     rows, columns = drawn.error.shape
     figure = canvas(0.4 + 5.6 * rows / columns, 7.0)
     ax = figure.subplots()
@@ -81,7 +81,7 @@ def _written(figure: Figure) -> bytes:
     return written.getvalue()
 
 
-def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
+def scene_lines(drawn: RenderResult, device: str) -> Iterator[str]:
     """Yield what is printed: a line for each number of samples, then a whole frame, and the truth's own error."""
     for point in drawn.chart:
         what = f"{point.label}, {point.samples} samples"
@@ -96,7 +96,7 @@ def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
     yield f"errors are root mean squares of {drawn.of}, over its mean; times are of {device}"
 
 
-def content(drawn: Drawn, device: str) -> dict[str, Any]:
+def content(drawn: RenderResult, device: str) -> dict[str, Any]:
     """Return the numbers for --json and a file: errors over the mean of the truth [-], times in ms."""
     return {
         "device": device,

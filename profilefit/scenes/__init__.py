@@ -9,6 +9,7 @@ from mcml_sim.cli.lazy import attributes
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
     from profilefit.scenes import fur, heart, layers, sea
+    from profilefit.scenes.skin.chart import covering
     from profilefit.scenes.skin.law import Separable
     from profilefit.scenes.skin.material import translucent
     from profilefit.scenes.skin.passes import SeparableFilter
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from profilefit.scenes.stage.exact_law import ExactLaw
     from profilefit.scenes.stage.pattern import Sampling
     from profilefit.scenes.stage.picture import srgb_codes, to_srgb
-    from profilefit.scenes.stage.stage import Stage, covering
+    from profilefit.scenes.stage.stage import Stage
     from profilefit.scenes.stage.step_edge import step_response
     from profilefit.scenes.stage.surface import seen
     from profilefit.scenes.stage.surface_integral import gathered
@@ -34,7 +35,8 @@ else:
             "ExactLaw": "stage.exact_law",
             "Sampling": "stage.pattern",
             **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.picture"),
-            **dict.fromkeys(("Stage", "covering"), "stage.stage"),
+            "Stage": "stage.stage",
+            "covering": "skin.chart",
             "step_response": "stage.step_edge",
             "seen": "stage.surface",
             "gathered": "stage.surface_integral",
@@ -85,5 +87,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return what an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -23,6 +24,10 @@ void main() {
     gl_Position = vec4(where, 0.0, 1.0);
 }
 """
+# Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
+# Mesa's llvmpipe does, and the clock on the wall is right.
+TRUSTED = 0.5
+LONGEST_QUERY = 4.0  # seconds: the query counts nanoseconds in 32 bits
 # Where a driver names a line: "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (Apple, ANGLE).
 PLACE = re.compile(r"\b0[:(](\d+)")
 
@@ -71,6 +76,27 @@ def check_errors(context: moderngl.Context, where: str) -> None:
     error = context.error
     if error != "GL_NO_ERROR":
         raise ShaderError(f"OpenGL error {error} in {where} ({renderer(context)})")
+
+
+def seconds(context: moderngl.Context, work: Callable[[], object]) -> float:
+    """Return the time of some work [s], by the driver's clock where it agrees with the one on the wall."""
+    query = context.query(time=True)
+    context.finish()
+    start = time.perf_counter()
+    with query:
+        work()
+    context.finish()
+    wall = time.perf_counter() - start
+    by_driver = float(query.elapsed) / 1e9
+    return by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall
+
+
+def fragments(context: moderngl.Context, work: Callable[[], object]) -> int:
+    """Return the number of fragments that some work draws."""
+    query = context.query(samples=True)
+    with query:
+        work()
+    return int(query.samples)
 
 
 def renderer(context: moderngl.Context) -> str:

@@ -374,3 +374,73 @@ def test_second_homes_are_seen(tmp_path):
     (tmp_path / "bad" / "fits.py").write_text("def f():\n    from scipy import optimize as o\n    import emcee as e\n")
     assert imports_of(tmp_path, ["bad"], "emcee") == {"bad.fits": {"emcee"}, "bad.walks": {"emcee.moves.DEMove"}}
     assert imports_of(tmp_path, ["bad"], "scipy.optimize") == {"bad.fits": {"scipy.optimize"}}
+
+
+# A scene is a folder with these files, its GLSL beside them, and the physics they need, a noun a file.
+FIVE_NAMES = {"law", "truth", "passes", "scene", "chart"}
+SCENES = ("skin", "layers", "heart", "sea", "fur")
+RENDERER, TIMER = "profilefit/scenes/stage/renderer.py", "profilefit/shader/context.py"
+# Objects of a context, that only a renderer makes; and Python's clocks.
+OF_A_CONTEXT = {
+    *("texture", "framebuffer", "simple_framebuffer", "depth_renderbuffer", "renderbuffer", "buffer"),
+    *("program", "vertex_array", "simple_vertex_array", "scope", "compute_shader", "sampler"),
+}
+CLOCKS = {"time", "timeit", "datetime"}
+
+
+def missing_names(folder: Path) -> set[str]:
+    """Names of a scene's five files that its folder lacks."""
+    return FIVE_NAMES - {path.stem for path in folder.glob("*.py")}
+
+
+def renders(path: Path) -> set[str]:
+    """What a file has of a renderer or a timer of its own: calls on a context, clocks, queries of OpenGL."""
+    found = set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found |= {name.split(".")[0] for name in imported_names(node, "", False)} & CLOCKS
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            found |= {node.func.attr} & OF_A_CONTEXT
+            if node.func.attr == "query" and {key.arg for key in node.keywords} & {"time", "samples", "primitives"}:
+                found.add("query")
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_has_its_five_names_and_no_renderer(name):
+    folder = ROOT / "profilefit" / "scenes" / name
+    assert missing_names(folder) == set()
+    assert {path.name: own for path in folder.rglob("*.py") if (own := renders(path))} == {}
+
+
+def test_every_scene_is_one_of_the_shelf():
+    rooms = {path.parent.name for path in (ROOT / "profilefit" / "scenes").glob("*/__init__.py")}
+    assert rooms == {"stage", *SCENES}
+
+
+def test_one_renderer_and_one_timer_of_the_gpu():
+    """Only the renderer has objects of a context on the stage; queries of OpenGL stand in one file of the package."""
+    stage = {path for path in (ROOT / "profilefit" / "scenes" / "stage").rglob("*.py") if renders(path)}
+    assert stage == {ROOT / RENDERER}
+    package = [path for path in (ROOT / "profilefit").rglob("*.py") if "query" in renders(path)]
+    assert package == [ROOT / TIMER]
+    assert not renders(ROOT / RENDERER) & CLOCKS
+
+
+def test_a_scene_with_a_renderer_of_its_own_is_seen(tmp_path):
+    """Negative control: a folder that lacks names, and files that draw and time by themselves."""
+    (tmp_path / "law.py").write_text("def f(tree, x): return tree.query(x, 2)\n")
+    assert missing_names(tmp_path) == FIVE_NAMES - {"law"}
+    assert renders(tmp_path / "law.py") == set()
+    for name, text, seen in (
+        ("a", "def f(context): return context.framebuffer([])\n", {"framebuffer"}),
+        ("b", "from time import perf_counter\n", {"time"}),
+        ("c", "def f(context): return context.query(time=True)\n", {"query"}),
+        (
+            "d",
+            "import time\ndef f(stage): return stage.time(), stage.context.texture((1, 1), 4)\n",
+            {"time", "texture"},
+        ),
+    ):
+        (tmp_path / f"{name}.py").write_text(text)
+        assert renders(tmp_path / f"{name}.py") == seen

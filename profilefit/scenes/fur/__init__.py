@@ -12,5 +12,5 @@ __all__ = ["best_exponent", "shell_shadow", "visibility"]
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return what an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

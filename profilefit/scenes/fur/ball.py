@@ -1,4 +1,4 @@
-"""Strands on a ball, and rays against each of them: the truth of the picture.
+"""Strands on a ball, and rays against each of them: the reference of the picture.
 
 A force leans the tips: a strand's axis goes from its foot R f to R f + L (f + F), as shells do that each move along the
 normal and the force (Fang et al., section 2), so that the shell at t L is a ball of radius R + t L about t L F.
@@ -32,13 +32,13 @@ class FurView(NamedTuple):
 
     @classmethod
     def of(cls, camera: Camera, size: tuple[int, int]) -> FurView:
-        """In perspective; size  columns and rows."""
+        """Return rays in perspective; size  columns and rows."""
         right, up, back = camera.view()[:3, :3]
         half = 0.5 * camera.height / camera.distance
         return cls(np.array(camera.eye, float), -back, right * half * size[0] / size[1], up * half)
 
     def rays(self, size: tuple[int, int]) -> tuple[Floats, Floats]:
-        """Starts and unit directions (rows, columns, 3) through the middles of pixels, row 0 at the bottom."""
+        """Return starts and unit directions (rows, columns, 3) through the middles of pixels, row 0 at the bottom."""
         x, y = ((2.0 * np.arange(count) + 1.0) / count - 1.0 for count in size)
         aside = x[None, :, None] * self.right + y[:, None, None] * self.up
         if self.parallel:
@@ -47,7 +47,7 @@ class FurView(NamedTuple):
         return np.broadcast_to(self.eye, ways.shape), ways / np.linalg.norm(ways, axis=-1, keepdims=True)
 
     def places(self, points: Floats) -> Floats:
-        """x and y (n, 2) at which points (n, 3) are seen."""
+        """Return x and y (n, 2) at which points (n, 3) are seen."""
         away = points - self.eye
         deep = np.ones(len(points)) if self.parallel else away @ self.forward
         return np.stack([away @ one / (one @ one) / deep for one in (self.right, self.up)], axis=-1)
@@ -55,7 +55,7 @@ class FurView(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """Alike cones, feet (k, 3) in unit directions from the middle of a ball of radius `ball`.
+    """Equal cones, feet (k, 3) in unit directions from the middle of a ball of radius `ball`.
 
     radius, length  of a strand;  force  by which the tips lean, by the length [-]
     """
@@ -68,11 +68,11 @@ class Ball:
 
     @property
     def axes(self) -> Floats:
-        """From foot to tip (k, 3), by the length."""
+        """Vectors (k, 3) from foot to tip, by the length."""
         return self.feet + np.array(self.force)
 
     def cast(self, view: FurView, size: tuple[int, int]) -> Floats:
-        """First hits (rows, columns, 4): foot and height over the length; of the skin its normal and `SKIN`; `NOTHING`.
+        """Return first hits (rows, columns, 4): foot and height over the length; of skin normal and `SKIN`; `NOTHING`.
 
         Each strand against every ray of the rectangle that it is seen in: |q + m s| = r0 (1 - t), in float64.
         """
@@ -100,7 +100,7 @@ class Ball:
         found[seen] = np.concatenate([place, np.full((*seen.shape, 1), SKIN)], axis=-1)[seen]
 
     def _boxes(self, view: FurView, size: tuple[int, int]) -> NDArray[np.intp]:
-        """Columns and rows (k, 2, 2), from and to, in which strands are seen: of cubes about roots, and of tips."""
+        """Return columns and rows (k, 2, 2), from and to, where strands are seen: of cubes about roots, and of tips."""
         roots, tips = self.ball * self.feet, self.ball * self.feet + self.length * self.axes
         corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) * self.radius
         points = np.concatenate([roots[:, None] + corners, tips[:, None]], axis=1)
@@ -111,7 +111,7 @@ class Ball:
         return np.clip(whole, 0, np.array(size)[:, None]).astype(np.intp)
 
     def _met(self, foot: Floats, start: Floats, way: Floats) -> tuple[Floats, Floats]:
-        """Distances (...) along rays to a strand, inf where it is not met, and heights there over the length."""
+        """Return distances (...) along rays to a strand, inf where it is not met, and heights there over the length."""
         axis = self.length * (foot + np.array(self.force))
         tall = axis @ foot
         away = start - self.ball * foot
@@ -137,13 +137,13 @@ class Ball:
 def random_ball(
     count: int, ball: float, radius: float, length: float, force: tuple[float, float, float], seed: int
 ) -> Ball:
-    """So many feet, independent of each other, evenly over the ball."""
+    """Return a ball with so many feet, independent of each other, evenly over it."""
     feet = np.random.default_rng([seed, 2]).normal(size=(count, 3))
     return Ball(feet / np.linalg.norm(feet, axis=1, keepdims=True), ball, radius, length, force)
 
 
 def nearest_feet(feet: Floats, texels: int) -> list[NDArray[np.float32]]:
-    """Maps (texels, texels, 4) of the nearest foot, and of the next: of each texel of an octahedron's net.
+    """Return maps (texels, texels, 4) of the nearest foot, and of the next, for each texel of an octahedron's net.
 
     Where x + y + z is 1 of magnitudes, the lower half folded outward; glsl/ball.glsl reads it.
     """

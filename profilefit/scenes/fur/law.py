@@ -32,7 +32,7 @@ LEAST_X, MOST_X = 0.64, 6.4  # N r0 / L for which an exponent is fitted
 
 
 class Exponent(NamedTuple):
-    """The exponent that is best for N layers: p = 1 + size x^power, x = N r0 / L.
+    """Exponent that is best for N layers: p = 1 + size x^power, x = N r0 / L.
 
     By the least mean square of ln(shadow of the shells / shadow of the cone), weighed by sin cos of the angle, 0 to 80
     degrees; L / r0 of 10, 20 and 50 (`fitted`), which differ by their errors.
@@ -65,7 +65,7 @@ FEET = {"apart": Feet(2.06, 1.49, 1, 0.12, 0.04), "tufts": Feet(2.16, 1.23, -1, 
 
 
 def shadow(radius: ArrayLike, length: ArrayLike, theta: ArrayLike, lean: tuple[float, float] = (0.0, 0.0)) -> Any:
-    """Area A that a cone hides of the skin [length^2].
+    """Return the area A that a cone hides of the skin [length^2].
 
     radius, length  > 0;  theta  of the view to the normal in [0, pi / 2) [rad], toward +x; these broadcast
     lean            of the tip along x and y, by the length [-]
@@ -87,7 +87,7 @@ def visibility(
     z: ArrayLike,
     lean: tuple[float, float] = (0.0, 0.0),
 ) -> Any:
-    """Chance that a ray meets no strand above a height [-]: exp(-n (1 - z / L)^2 A(theta)).
+    """Return the chance that a ray meets no strand above a height [-]: exp(-n (1 - z / L)^2 A(theta)).
 
     density  strands a unit of area >= 0 [1/length^2];  z  in [0, length];  others as of `shadow`; all broadcast
 
@@ -107,7 +107,7 @@ def visibility(
 
 
 def feet_factor(feet: str, thick: ArrayLike) -> Any:
-    """kappa [-] of `Feet`, by which the density in `visibility` is multiplied.
+    """Return kappa [-] of `Feet`, by which the density in `visibility` is multiplied.
 
     feet  "apart" or "tufts";  thick  r0 sqrt(n) (1 - z / L) in [0, 1]
     """
@@ -121,7 +121,7 @@ def feet_factor(feet: str, thick: ArrayLike) -> Any:
 
 
 def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: float = 0.0) -> float:
-    """Area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
+    """Return the area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
 
     eye, lamp  angles to the normal in [0, pi / 2);  turn  between them about the normal in [0, pi] [rad]
 
@@ -142,7 +142,7 @@ def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: f
 def shell_shadow(
     layers: int, exponent: float, radius: float, length: float, theta: float, lean: tuple[float, float] = (0.0, 0.0)
 ) -> float:
-    """Shadow of a strand's discs on N shells, over that of the cone [-]: the area of their union, exactly.
+    """Return the shadow of a strand's discs on N shells, over that of the cone [-]: the area of their union, exactly.
 
     Discs whose middles are on a line cover, at x along it, half the width sqrt(max_i r_i^2 - (x - x_i)^2): but for x^2
     the largest of straight lines, whose envelope is a convex hull.
@@ -157,7 +157,7 @@ def shell_shadow(
 
 
 def best_exponent(x: ArrayLike) -> Any:
-    """The exponent p that is best for N layers [-], x = N r0 / L in [0.64, 6.4]; InputError beyond.
+    """Return the exponent p that is best for N layers [-], x = N r0 / L in [0.64, 6.4]; InputError beyond.
 
     No exponent fills the gaps of fewer layers; of more it is 1. It is the best for coverage; a shaded picture has its
     own.
@@ -169,7 +169,7 @@ def best_exponent(x: ArrayLike) -> Any:
 
 
 def occlusion(density: float, radius: float, length: float, z: float, lean: float = 0.0) -> float:
-    """Share of even light from above that comes to a height [-]: the mean of `visibility`, weighed by the cosine.
+    """Return the share of even light from above that comes to a height [-]: the mean of `visibility` by the cosine.
 
     Arguments as of `visibility`, numbers; a square of the cosine that is even, times an even angle about the normal.
     """
@@ -182,7 +182,7 @@ def occlusion(density: float, radius: float, length: float, z: float, lean: floa
 
 
 def lobe_mean(exponent: ArrayLike) -> Any:
-    """Mean of sin^p over all directions [-], by which a lobe of Kajiya and Kay (1989) is as bright for every p >= 0."""
+    """Return the mean of sin^p over all directions [-], by which a Kajiya-Kay lobe is as bright for every p >= 0."""
     p = checked_numbers("exponent", exponent, "a number >= 0")
     if not np.all((p >= 0) & np.isfinite(p)):
         raise InputError(f"exponent must be a finite number >= 0, got {shown(exponent)}")
@@ -190,25 +190,25 @@ def lobe_mean(exponent: ArrayLike) -> Any:
 
 
 def misfit(layers: int, exponent: float, slender: float) -> float:
-    """Mean square of ln(shadow of the shells / shadow of the cone), weighed by sin cos, over 0 to 80 degrees."""
+    """Return the mean square of ln(shadow of shells / shadow of the cone), weighed by sin cos, over 0 to 80 degrees."""
     return float(np.sum(_missed(layers, exponent, slender) ** 2))
 
 
 def best_of(layers: int, slender: float) -> float:
-    """The exponent of the least misfit."""
+    """Return the exponent of the least misfit."""
     at = differences(lambda p: _missed(layers, float(p[0]), slender), STEP, LARGEST)
     return float(solve(at, np.array([FIRST]), (1.0, LARGEST), tolerance=TOLERANCE).parameters[0])
 
 
 def _missed(layers: int, exponent: float, slender: float) -> Floats:
-    """ln(shadow of the shells / shadow of the cone) at each angle, times the root of its share of the weight."""
+    """Return ln(shadow of the shells / shadow of the cone) at each angle, times the root of its share of the weight."""
     logs = np.log([shell_shadow(layers, exponent, 1.0 / slender, 1.0, float(angle)) for angle in ANGLES])
     weight = np.sin(ANGLES) * np.cos(ANGLES)
     return logs * np.sqrt(weight / weight.sum())
 
 
 def fitted(slender: Sequence[float] = SLENDER) -> tuple[Exponent, Exponent]:
-    """Constants of p = 1 + size x^power by least squares of ln(p - 1), and their errors.
+    """Fit p = 1 + size x^power by least squares of ln(p - 1), and return the constants and their errors.
 
     The errors are the standard deviations of constants fitted to one slenderness each: what the law leaves out.
     """
@@ -226,7 +226,7 @@ def fitted(slender: Sequence[float] = SLENDER) -> tuple[Exponent, Exponent]:
 
 
 def _union(middle: Floats, radius: Floats) -> float:
-    """Area of discs whose middles (n,), rising, are on a line."""
+    """Return the area of discs whose middles (n,), rising, are on a line."""
     seen = radius > 0
     x, r = middle[seen], radius[seen]
     if x.size == 0 or x[-1] == x[0]:
@@ -254,7 +254,7 @@ def _union(middle: Floats, radius: Floats) -> float:
 
 
 def _sector(u: Floats) -> Floats:
-    """Area of a unit disc left of u, less a constant."""
+    """Return the area of a unit disc left of u, less a constant."""
     return u * np.sqrt((1.0 - u) * (1.0 + u)) + np.arcsin(u)
 
 

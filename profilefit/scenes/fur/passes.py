@@ -1,11 +1,9 @@
-"""The passes of fur: the first strand that each pixel's ray meets, by layers, and the radiance of such hits."""
+"""Passes of fur: the first strand that each pixel's ray meets, by layers, and the radiance of such hits."""
 
 from __future__ import annotations
 
-import time
 from typing import Any, NamedTuple, Self
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -16,9 +14,10 @@ from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.request import Shading
 from profilefit.scenes.fur.truth import Patch
-from profilefit.scenes.fur.ways import FurWay
-from profilefit.scenes.stage.buffers import Maps, Singles, pixels
-from profilefit.scenes.stage.technique import RADIANCE, FullScreen, Pass
+from profilefit.scenes.fur.ways import LayerTechnique
+from profilefit.scenes.stage.buffers import Singles
+from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.technique import RADIANCE
 from profilefit.scenes.stage.world import Light, Rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
@@ -31,7 +30,7 @@ BACKGROUND = (0.02, 0.02, 0.02)
 
 
 class FurSurface(NamedTuple):
-    """What strands stand on: its GLSL, its maps of the nearest feet and the next, its uniforms, and the strands."""
+    """Surface that strands stand on: its GLSL, its maps of the nearest feet and the next, uniforms, and strands."""
 
     text: str
     maps: list[Singles]
@@ -42,90 +41,38 @@ class FurSurface(NamedTuple):
 
     @classmethod
     def of_ball(cls, ball: Ball) -> Self:
-        """A texel is a strand's radius over `FINE` on average, up to `MOST_TEXELS` of a side."""
+        """Return a ball's, a texel of which is a strand's radius over `FINE` on average, up to `MOST_TEXELS` a side."""
         texels = min(int(np.ceil(FINE * np.sqrt(4.0 * np.pi) * ball.ball / ball.radius)), MOST_TEXELS)
-        maps, given = nearest_feet(ball.feet, texels), {"ball": ball.ball}
-        return cls(strand_text("surface.glsl", "ball.glsl"), maps, given, ball.radius, ball.length, ball.force)
+        text, maps = strand_text("surface.glsl", "ball.glsl"), nearest_feet(ball.feet, texels)
+        return cls(text, maps, {"ball": ball.ball}, ball.radius, ball.length, ball.force)
 
     @classmethod
     def of_patch(cls, patch: Patch, fine: float = FINE) -> Self:
-        """fine  texels of a strand's radius, up to `MOST_TEXELS` of a side."""
+        """Return a patch's, with so many texels of a strand's radius, up to `MOST_TEXELS` a side."""
         texels = min(int(np.ceil(fine * patch.side / patch.radius)), MOST_TEXELS)
-        given = {"side": patch.side}
-        maps = nearest_ways(patch, texels)
-        return cls(
-            strand_text("surface.glsl", "plane.glsl"), maps, given, patch.radius, patch.length, (*patch.lean, 0.0)
-        )
+        text, maps = strand_text("surface.glsl", "plane.glsl"), nearest_ways(patch, texels)
+        return cls(text, maps, {"side": patch.side}, patch.radius, patch.length, (*patch.lean, 0.0))
 
-
-class FurPasses:
-    """Both passes, for pictures of one size. Release it, or use it in a `with`."""
-
-    def __init__(self, context: moderngl.Context, surface: FurSurface, size: tuple[int, int]) -> None:
-        self.context, self.surface, self.size = context, surface, size
-        self.maps = Maps(context, size)
-        self._compiled: dict[str, FullScreen] = {}
-
-    def hits(self, view: FurView, way: FurWay, layers: int) -> Singles:
-        """(rows, columns, 4) as of `Ball.cast`, row 0 at the bottom."""
-        self.run(self.layered(view, way, layers))
-        return pixels(self.maps.map(HITS))
-
-    def layered(self, view: FurView, way: FurWay, layers: int) -> Pass:
-        """What fills `HITS`."""
-        count, surface = checked_whole("layers", layers, 1), self.surface
-        nearest, following = surface.maps
+    def layered(self, view: FurView, by: LayerTechnique, layers: int) -> Pass:
+        """Return the pass that fills `HITS` (rows, columns, 4) with first hits, as of `Ball.cast`."""
+        count, (nearest, following) = checked_whole("layers", layers, 1), self.maps
         given = {
-            **surface.uniforms,
+            **self.uniforms,
             **_view(view),
             "parallel": float(view.parallel),
-            "force": _floats(surface.force),
-            "radius": surface.radius,
-            "tall": surface.length,
-            "exponent": 1.0 if way.tested else way.exponent_of(count, surface.length / surface.radius),
+            "force": _floats(self.force),
+            "radius": self.radius,
+            "tall": self.length,
+            "exponent": 1.0 if by.tested else by.exponent_of(count, self.length / self.radius),
             "layers": count,
-            "tested": way.tested,
+            "tested": by.tested,
         }
-        source = surface.text + text_beside(__name__, "glsl/fur.frag")
+        source = self.text + text_beside(__name__, "glsl/fur.frag")
         return Pass("fur", {"nearest_map": nearest, "next_map": following}, HITS, source, given)
-
-    def run(self, one: Pass) -> None:
-        """Fills the map that it writes."""
-        if one.name not in self._compiled:
-            self._compiled[one.name] = FullScreen(self.context, one)
-        self._compiled[one.name].run(one, self.maps)
-
-    def milliseconds(self, *of: Pass) -> float:
-        """Time of passes that were run before, one after the other."""
-        self.context.finish()
-        start = time.perf_counter()
-        for one in of:
-            self.run(one)
-        self.context.finish()
-        return 1e3 * (time.perf_counter() - start)
-
-    def radiance(self, one: Pass, hits: NDArray[np.floating] | None = None) -> Floats:
-        """(rows, columns, 3) by `Shade.of`, of hits in place of those that were drawn last if some are given."""
-        if hits is not None:
-            self.maps.map(HITS).write(np.ascontiguousarray(hits, np.float32).tobytes())
-        self.run(one)
-        return pixels(self.maps.map(RADIANCE))[..., :3].astype(float)
-
-    def release(self) -> None:
-        for one in self._compiled.values():
-            one.release()
-        self._compiled.clear()
-        self.maps.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.release()
 
 
 class Coat(NamedTuple):
-    """How a ball's fur is lit and coloured; density  strands of the skin [1/length^2], colours are reflectances."""
+    """Light and colour of a ball's fur; density  strands of the skin [1/length^2], colours are reflectances."""
 
     ball: Ball
     density: float
@@ -136,7 +83,7 @@ class Coat(NamedTuple):
     shading: Shading
 
     def shade(self, view: FurView) -> Pass:
-        """From `HITS` to the radiance that the eye sees, linear."""
+        """Return the pass from `HITS` to the radiance that the eye sees, linear."""
         shading, ball = self.shading, self.ball
         table, widest = _occlusion(self)
         peak = lobe_mean(shading.exponents) if shading.normalised else 1.0 / (4.0 * np.pi)
@@ -164,12 +111,12 @@ class Coat(NamedTuple):
 
 
 def strand_text(*more: str) -> str:
-    """glsl/strand.glsl, and other texts beside it, as a shader reads them."""
+    """Return glsl/strand.glsl, and other sources beside it, as a shader reads them."""
     return read_text("common") + "".join(text_beside(__name__, f"glsl/{one}") for one in ("strand.glsl", *more))
 
 
 def nearest_ways(patch: Patch, texels: int) -> list[Singles]:
-    """Maps (texels, texels, 4) of the ways from a texel's middle to the nearest foot, and to the next."""
+    """Return maps (texels, texels, 4) of the ways from a texel's middle to the nearest foot, and to the next."""
     if len(patch.leans) > 1:
         raise InputError(f"lean must be one of all strands where they are drawn, got {len(patch.leans)}")
     middle = (np.arange(texels) + 0.5) / texels * patch.side
@@ -183,7 +130,7 @@ def nearest_ways(patch: Patch, texels: int) -> list[Singles]:
 
 
 def _occlusion(coat: Coat) -> tuple[Singles, float]:
-    """Table (LEANS, HEIGHTS, 1), and its largest lean: a ball's is that of any place on it."""
+    """Return a table (LEANS, HEIGHTS, 1), and its largest lean: a ball's is that of any place on it."""
     ball, force = coat.ball, float(np.linalg.norm(coat.ball.force))
     # |F_t| / (1 + F_n) is largest where the force is at right angles to the axis.
     widest = max(force / np.sqrt(1.0 - force**2), 1e-6)

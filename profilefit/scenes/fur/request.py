@@ -1,4 +1,4 @@
-"""What a file requests of a furred ball, FUR.toml: strands, technique, shading, camera and light."""
+"""Request of a furred ball, FUR.toml: strands, technique, shading, camera and light."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.media.checks import is_number
-from profilefit.errors import InputError
 from profilefit.recipes.toml_tables import Table, Tables
-from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, FurWay
+from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.request import Viewpoint, ViewRequest
+from profilefit.scenes.stage.request import Defaults, Viewpoint, ViewRequest
 from profilefit.scenes.stage.world import Rgb
 
 TABLES = {
@@ -26,11 +25,10 @@ DENSITY, RADIUS, LENGTH, BALL = 0.64, 0.5, 10.0, 30.0
 FORCE, COLOUR, SKIN, SEED = (0.0, -0.4, 0.0), (0.55, 0.38, 0.22), (0.35, 0.22, 0.16), 1
 KINDS = ("swept", "shells")
 TOLERANCE = 0.05
-SAMPLES = 22
 STRANDS = 2
 SUPERSAMPLING = 4
 EXPONENTS, SHIFTS, STRENGTHS, RIM = (60.0, 12.0), (-0.1, 0.2), (0.1, 0.15), (0.0, 0.5, 4.0)
-VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
+VIEW, DEFAULTS = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0), Defaults(samples=22)
 LARGEST = 150.0  # of the ball, and of strands [mm]
 SLENDEREST = 140.0  # the ball's radius over a strand's: what a map of them resolves
 MOST_STRANDS = 1 << 16
@@ -39,7 +37,7 @@ MOST_FORCE = 0.9
 
 @dataclass(frozen=True)
 class Shading:
-    """How strands reflect, after Fang et al.: two lobes of Kajiya and Kay, and a rim.
+    """Reflection of strands after Fang et al.: two lobes of Kajiya and Kay, and a rim.
 
     exponents, shifts, strengths  of the two lobes [-]: shift is the tangent of the angle by which one is turned
     normalised  whether a lobe's mean over all half vectors is its strength; else that is its peak, as published
@@ -55,7 +53,7 @@ class Shading:
 
 @dataclass(frozen=True)
 class FurRequest(ViewRequest):
-    """What a file requests; of `ViewRequest`, `sampling` says how many layers.
+    """Picture of a furred ball that a file requests; its samples are layers.
 
     density        strands of the skin [1/mm^2];  radius, length  of a strand [mm], along the skin's normal
     force          of the tips, by the length [-];  ball  its radius [mm];  colour, skin  reflectances
@@ -71,26 +69,26 @@ class FurRequest(ViewRequest):
     colour: Rgb
     skin: Rgb
     seed: int
-    way: FurWay
+    way: LayerTechnique
     tolerance: float
     shading: Shading
     supersampling: int
 
     @property
     def count(self) -> int:
-        """Strands."""
+        """Number of strands."""
         return max(round(self.density * 4.0 * np.pi * self.ball**2), 1)
 
 
 def read(file: str, content: Table) -> FurRequest:
-    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
     for key in ("title", "unit"):
         tables.text("", key, content, "mm")
     fur, named, shaded = (tables.table(content, name, {}) for name in ("fur", "technique", "shading"))
     found = FurRequest(
-        **request.view(tables, {**content, "technique": {"samples": SAMPLES, **named}}, VIEW),
+        **request.view(tables, content, VIEW.camera, DEFAULTS),
         density=tables.number("fur", "density", fur, DENSITY),
         radius=tables.number("fur", "radius", fur, RADIUS, LARGEST),
         length=tables.number("fur", "length", fur, LENGTH, LARGEST),
@@ -108,7 +106,7 @@ def read(file: str, content: Table) -> FurRequest:
     return found
 
 
-def _way(tables: Tables, named: Table) -> FurWay:
+def _way(tables: Tables, named: Table) -> LayerTechnique:
     kind = tables.text("technique", "kind", named, KINDS[0], KINDS)
     swept = kind == KINDS[0]
     if (other := "exponent" if swept else "strands") in named:
@@ -120,7 +118,7 @@ def _way(tables: Tables, named: Table) -> FurWay:
         return FITTED
     if not (is_number(exponent) and 0 < exponent <= 100):
         raise tables.bad("technique", "exponent", f'a number > 0 and <= 100, or "{FITTED.name}"', exponent)
-    return FurWay(f"shells, p = {exponent:g}", float(exponent))
+    return LayerTechnique(f"shells, p = {exponent:g}", float(exponent))
 
 
 def _shading(tables: Tables, shaded: Table) -> Shading:
@@ -175,5 +173,4 @@ def _require_fur(tables: Tables, of: FurRequest) -> None:
             f"so long that the eye is {1.1 * reach:.4g} mm from the ball's middle",
             of.camera.distance,
         )
-    if not any((*of.light.irradiance, *of.ambient)):
-        raise InputError(f"{of.file}: [light] irradiance and ambient must not both be 0: nothing would be seen")
+    of.require_light()

@@ -1,4 +1,4 @@
-"""Fur by rays: against cones, exactly; against their discs on shells; and against cones inside slabs.
+"""Rays against fur: against cones, exactly; against their discs on shells; and against cones inside slabs.
 
 Strands stand on a patch that repeats. A ray comes from an eye toward +x at an angle theta to the normal, and goes down
 toward -x; what it finds is the height of its first hit, 0 where it meets the skin. Lengths are in one unit.
@@ -19,12 +19,11 @@ from profilefit.scenes.fur.law import MOST_LAYERS
 
 Floats = NDArray[np.float64]
 MOST_STRANDS = 1 << 20
-MOST_PACKING = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Alike cones, upright or leaning, feet (k, 2) within a square of this side, which repeats.
+    """Equal cones, upright or leaning, feet (k, 2) within a square of this side, which repeats.
 
     radius, length  of a strand;  lean  of the tip along x and y, by the length [-]: of all, or of each (k, 2)
     """
@@ -47,80 +46,41 @@ class Patch:
 
     @property
     def leans(self) -> Floats:
-        """Of all strands (1, 2), or of each (k, 2)."""
+        """Lean of all strands (1, 2), or of each (k, 2)."""
         return np.atleast_2d(np.asarray(self.lean, float))
 
     @property
     def density(self) -> float:
-        """Strands a unit of area."""
+        """Number of strands per unit of area."""
         return len(self.feet) / self.side**2
 
 
 def random_patch(
     density: float, radius: float, length: float, side: float, seed: int = 0, lean: tuple[float, float] = (0.0, 0.0)
 ) -> Patch:
-    """Feet that are independent of each other; as many as the density says on average, 1 at least."""
-    count, rng = _counted(density, side), np.random.default_rng([seed, 0])
+    """Return feet that are independent of each other; as many as the density says on average, 1 at least."""
+    count, rng = strand_count(density, side), np.random.default_rng([seed, 0])
     return Patch(rng.random((count, 2)) * side, side, radius, length, lean)
 
 
-def spaced_patch(density: float, radius: float, length: float, side: float, packing: float, seed: int = 0) -> Patch:
-    """As many upright strands, none nearer to another one than d: packing n d^2 in [0, 0.6], 0.7 being jammed.
-
-    Darts are thrown anywhere, one by one, and stay where all that stayed before are d away.
-    """
-    count, rng = _counted(density, side), np.random.default_rng([seed, 2])
-    if not (is_number(packing) and 0 <= packing <= MOST_PACKING):
-        raise InputError(f"packing must be a number in [0, {MOST_PACKING:g}], got {shown(packing)}")
-    apart = float(np.sqrt(packing / count)) * side
-    feet = np.empty((0, 2))
-    while len(feet) < count:
-        thrown = rng.random((2 * (count - len(feet)) + 16, 2)) * side
-        if len(feet):
-            thrown = thrown[cKDTree(feet, boxsize=side).query(thrown)[0] >= apart]
-        falls = np.zeros(len(thrown), bool)
-        pairs = cKDTree(thrown, boxsize=side).query_pairs(apart, output_type="ndarray") if len(thrown) else []
-        for first, later in sorted(map(tuple, pairs), key=lambda pair: (pair[1], pair[0])):
-            falls[later] |= not falls[first]
-        feet = np.concatenate([feet, thrown[~falls]])[:count]
-    return Patch(feet, side, radius, length)
-
-
-def tufted_patch(
-    density: float, radius: float, length: float, side: float, each: int, spread: float, seed: int = 0
-) -> Patch:
-    """As many upright strands in tufts of so many each, anywhere within discs of radius `spread`, which are anywhere.
-
-    Discs may overlap; tufts are as many as the density says on average, 1 at least.
-    """
-    many, tufts = checked_whole("each", each, 1), _counted(density / max(each, 1), side)
-    if not (is_number(spread) and 0 <= spread < np.inf):
-        raise InputError(f"spread must be a finite length >= 0, got {shown(spread)}")
-    rng = np.random.default_rng([seed, 3])
-    turn, away = 2.0 * np.pi * rng.random((tufts, many)), spread * np.sqrt(rng.random((tufts, many)))
-    middles = rng.random((tufts, 1, 2)) * side
-    feet = middles + away[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    return Patch(np.mod(feet.reshape(-1, 2), side), side, radius, length)
-
-
-def _counted(density: float, side: float) -> int:
+def strand_count(density: float, side: float) -> int:
     if not (is_number(density) and 0 < density < np.inf and 0 < density * side * side <= MOST_STRANDS):
         raise InputError(f"density must be a number > 0 of {MOST_STRANDS} strands at most, got {shown(density)}")
     return max(round(density * side * side), 1)
 
 
 def rays(patch: Patch, count: int, seed: int = 0) -> Floats:
-    """Where rays (count, 2) come through the level of the tips, all over the patch."""
+    """Return where rays (count, 2) come through the level of the tips, all over the patch."""
     return np.random.default_rng([seed, 1]).random((checked_whole("count", count, 1), 2)) * patch.side
 
 
 def cast(patch: Patch, theta: float, start: Floats) -> Floats:
-    """Height of the first hit (n,) of rays that start (n, 2) at the level of the tips, against the cones themselves."""
+    """Return heights of first hits (n,) of rays that start (n, 2) at the level of the tips, against cones."""
     return struck(patch, theta, start)[0]
 
 
 def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """`cast`, and the strand that is met (n,), -1 where none is.
+    """Return `cast`, and the strand that is met (n,), -1 where none is.
 
     A cone that is met is within its radius and half a step of one of the places along a ray that are tried, at most a
     root apart; what is met above the lower end of a step needs no further one.
@@ -148,7 +108,7 @@ def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[n
 
 
 def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: float) -> Floats:
-    """The same against discs on N shells of radius r0 (1 - t^p)."""
+    """Return those heights against discs on N shells of radius r0 (1 - t^p)."""
     count = checked_whole("layers", layers, 1, MOST_LAYERS)
     trees, found = _trees(patch), np.zeros(len(start))
     left = np.arange(len(start))
@@ -164,7 +124,7 @@ def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: 
 
 
 def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int = 1) -> Floats:
-    """The same against the cone that is nearest to the middle of a ray's way through each of N slabs, from the top.
+    """Return those heights against the cone nearest to the middle of a ray in each of N slabs, from the top.
 
     tested  strands, the nearest ones;  a cone counts wherever the ray comes into it, within the slab or not
 
@@ -185,7 +145,7 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
 
 
 def _trees(patch: Patch) -> Callable[[float], cKDTree]:
-    """Of the strands' axes at a height, less how far the first one has moved from its foot: `_at`'s places."""
+    """Return a function from height to a tree of the strands' axes, less how far the first one has moved: `_at`'s."""
     apart = patch.leans - patch.leans[0]
 
     def at(z: float) -> cKDTree:
@@ -203,7 +163,7 @@ def _wrapped(patch: Patch, place: Floats) -> Floats:
 
 
 def _heights(patch: Patch, place: Floats, strand: NDArray[np.intp], z: float, theta: float) -> Floats:
-    """Heights (n,) where rays come into strands (n,), the image next to `_at`'s places (n, 2) at a height z; or 0."""
+    """Return heights (n,) where rays come into strands (n,), next to `_at`'s places (n, 2) at a height z; or 0."""
     one = len(patch.leans) == 1
     away = place - patch.feet[strand] - (0.0 if one else (patch.leans[strand] - patch.leans[0]) * z)
     away -= patch.side * np.round(away / patch.side)
@@ -213,18 +173,18 @@ def _heights(patch: Patch, place: Floats, strand: NDArray[np.intp], z: float, th
 
 
 def _rate(patch: Patch, theta: float) -> Floats:
-    """How far a ray moves from the strands' axes a unit of height that it goes down (1 or k, 2)."""
+    """Return how far a ray moves from the strands' axes a unit of height that it goes down (1 or k, 2)."""
     return patch.leans - np.array([np.tan(theta), 0.0])
 
 
 def _at(patch: Patch, theta: float, start: Floats, z: float) -> Floats:
-    """Where rays are at a height, as seen from the foot of the first strand if its axis is there: within the patch."""
+    """Return where rays are at a height, seen from the first strand's foot if its axis is there: within the patch."""
     found = start - patch.leans[0] * patch.length + _rate(patch, theta)[0] * (patch.length - z)
     return _wrapped(patch, found)
 
 
 def _first(patch: Patch, away: Floats, rate: Floats) -> Floats:
-    """How far down rays come into a cone (...), inf where they do not; away  (..., 2) from its tip, at its level.
+    """Return how far down rays meet a cone (...), inf where they do not; away  (..., 2) from its tip, at its level.
 
     |g + m s| = k s, k = r0 / L: the first root in [0, L].
     """

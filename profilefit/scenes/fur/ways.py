@@ -1,4 +1,4 @@
-"""Ways to draw fur in layers, and what each is wrong by toward rays of one angle: the least layers to an error."""
+"""Techniques of fur in layers, and their errors toward rays of one angle: the least layers to an error."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ MOST = 256  # layers of a picture
 LEAST_SHARE = 1e-3  # of a goal, that an error of 0 is taken for
 
 
-class FurWay(NamedTuple):
-    """Shells of a threshold's exponent, or swept slabs, each of which tests so many of the nearest strands.
+class LayerTechnique(NamedTuple):
+    """Technique by shells of a threshold's exponent, or by swept slabs that test some of the nearest strands each.
 
     exponent  of shells; None is the one that is fitted to N r0 / L;  tested  0 of shells
     """
@@ -31,15 +31,15 @@ class FurWay(NamedTuple):
     tested: int = 0
 
     def exponent_of(self, layers: int, slender: float) -> float:
-        """p of N shells, L / r0 of the strands; of fewer layers than it is fitted to that of the fewest, of more 1."""
+        """Return p of N shells, L / r0 of the strands; below the fitted range that of its end, above it 1."""
         if self.exponent is not None:
             return self.exponent
         x = layers / slender
         return 1.0 if x > MOST_X else float(best_exponent(max(x, LEAST_X)))
 
 
-LINEAR, QUADRATIC, FITTED = FurWay("linear", 1.0), FurWay("quadratic", 2.0), FurWay("fitted")
-SWEPT, SWEPT_TWO = FurWay("swept", tested=1), FurWay("swept, two strands", tested=2)
+LINEAR, QUADRATIC, FITTED = LayerTechnique("linear", 1.0), LayerTechnique("quadratic", 2.0), LayerTechnique("fitted")
+SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two strands", tested=2)
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
 
 
@@ -66,7 +66,7 @@ ERRORS, THICK = (0.01, 0.1), (0.2, 0.6)  # rms and r0 sqrt(n) that they are fitt
 
 
 def swept_layers(goal: float, density: float, radius: float, aside: float, tested: int = 1) -> int:
-    """Swept slabs for an error, by `SweptError`, whose scatter is a factor of 1.3 in the error, 1.2 in the layers.
+    """Return the swept slabs for an error, by `SweptError`; scatter is a factor of 1.3 in error, 1.2 in layers.
 
     goal    root mean square error of the heights of hits over the length, 0.01 to 0.1 [-]
     aside   of a ray from the tips to the skin, |L tan(theta) - lean| > 0;  density [1/length^2], radius [length]
@@ -99,8 +99,8 @@ class FurTrial:
     def __post_init__(self) -> None:
         object.__setattr__(self, "true", cast(self.patch, self.theta, self.start))
 
-    def heights(self, way: FurWay, layers: int) -> Floats:
-        """Of first hits (n,) by so many layers."""
+    def heights(self, way: LayerTechnique, layers: int) -> Floats:
+        """Return heights of first hits (n,) by so many layers."""
         patch = self.patch
         if way.tested:
             return by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
@@ -108,23 +108,23 @@ class FurTrial:
         return by_shells(patch, self.theta, self.start, layers, exponent)
 
     @lru_cache  # noqa: B019, a trial lives as long as what it is asked for
-    def error(self, way: FurWay, layers: int) -> float:
-        """Root mean square of the heights' errors over the length [-]."""
+    def error(self, way: LayerTechnique, layers: int) -> float:
+        """Return the root mean square of the heights' errors over the length [-]."""
         return float(np.sqrt(np.mean((self.heights(way, layers) - self.true) ** 2)) / self.patch.length)
 
 
 def trial(patch: Patch, theta: float, count: int, seed: int = 0) -> FurTrial:
-    """So many rays, anywhere on the patch."""
+    """Return so many rays, anywhere on the patch."""
     return FurTrial(patch, theta, rays(patch, count, seed))
 
 
-def error_of(trials: Sequence[FurTrial], way: FurWay, layers: int) -> float:
-    """Root mean square over trials of as many rays each [-]."""
+def error_of(trials: Sequence[FurTrial], way: LayerTechnique, layers: int) -> float:
+    """Return the root mean square over trials of as many rays each [-]."""
     return float(np.sqrt(np.mean([one.error(way, layers) ** 2 for one in trials])))
 
 
 def least_layers(error: Callable[[int], float], goal: float, most: int = MOST, coarse: int = MOST + 1) -> int | None:
-    """The fewest layers whose error is within a goal, to one in `coarse`; None if no number up to `most` is.
+    """Return the fewest layers whose error is within a goal, to one in `coarse`; None if no number up to `most` is.
 
     By doubling, and then where a power of N through both ends has it: where an error rises again with N, as that of
     quadratic shells does, the first place. InputError on a goal that is not > 0.

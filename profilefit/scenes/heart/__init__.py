@@ -16,5 +16,5 @@ __all__ = ["balance", "crossover_of", "screen_share", "split", "surface_blur"]
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return what an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

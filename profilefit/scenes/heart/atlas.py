@@ -22,8 +22,9 @@ from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
 from profilefit.scenes.heart.truth import Elements
-from profilefit.scenes.stage.buffers import INSIDE, Singles, Targets, pixels
-from profilefit.scenes.stage.technique import FullScreen, Pass, Unwraps, maps
+from profilefit.scenes.stage.buffers import INSIDE, Singles
+from profilefit.scenes.stage.renderer import Pass, Read, Renderer
+from profilefit.scenes.stage.technique import Unwraps, maps
 from profilefit.scenes.stage.world import Mesh, Part
 from profilefit.shader.emit import text_beside
 
@@ -38,22 +39,21 @@ SUMS = ("sum_map", "other_sum_map")
 
 
 class Atlas:
-    """Targets of one size, over which one part of a stage's scene is laid out. Release it, or use it in a `with`."""
+    """Maps of one size, over which one part of a stage's scene is laid out. Release it, or use it in a `with`."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], margin: int):
-        """size  columns, rows [texels];  margin  around the charts, which blurs reach into [texels]"""
+        """Take a context, columns and rows, and the margin around charts, which blurs reach into [texels]."""
         if not 0 < 2 * margin < min(size):
             raise InputError(f"margin must be texels from 1 to less than half of {min(size)}, got {margin!r}")
-        self.context, self.size, self.margin = context, size, margin
-        self.targets = Targets(context, size)
-        self._passes: dict[str, FullScreen] = {}
+        self.size, self.margin = size, margin
+        self.renderer = Renderer(context, size)
         self._links: Singles | None = None
         self._shortest = 0.0  # what a texel leads at least, but for those at poles [mm]
         self.texel = 0.0  # mean side of a texel, once a surface was drawn [mm]
 
     @property
     def links(self) -> Singles:
-        """(rows, columns, 3) places whose light texels have; `draw` comes first."""
+        """Places (rows, columns, 3) whose light texels have; `draw` comes first."""
         if self._links is None:
             raise InputError("atlas must have a surface: draw comes first")
         return self._links
@@ -65,54 +65,48 @@ class Atlas:
         return 1.0 - 2.0 * self.margin / columns, 1.0 - 2.0 * self.margin / rows
 
     def draw(self, stage: Unwraps, part: Part) -> None:
-        """Irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
+        """Draw irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
         if self._links is None:
             _require_charts(part.mesh)
-        stage.unwrap(part, self.targets.surface, self.inset)
+        self.renderer.run(stage.unwrapping(part, self.inset))
         if self._links is None:
-            place = pixels(self.targets.map("position_map"))
+            place = self.read("position_map")
             inside = place[..., 3] > INSIDE
             self._require_apart(part.mesh, inside)
             self._links = links(place[..., :3].astype(float), inside, self.margin)
-        self._run(self._filled("position_map"))
-        self._run(self._pass("stretch", STRETCH, "position_map", FILLED))
+        self.renderer.run(self._filled("position_map"), self._pass("stretch", STRETCH, "position_map", FILLED))
         if not self.texel:
             stretch = self.read(STRETCH)
             sides = stretch[stretch[..., 2] > INSIDE, :2].astype(float)
             self._shortest = float(np.quantile(sides, SHORTEST))
             self.texel = float(np.sqrt(np.mean(np.prod(sides, axis=1))))
 
-    def blur(self, kernel: Kernel) -> moderngl.Texture:
-        """sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel, with margins; until the next blur."""
-        self._run(self._pass("begin", LIGHT, "irradiance_map", STRETCH))
+    def blur(self, kernel: Kernel) -> None:
+        """Draw `BLURRED`: sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel, with margins."""
+        self.renderer.run(self._pass("begin", LIGHT, "irradiance_map", STRETCH))
         weights = np.broadcast_to(np.atleast_2d(kernel.weights.T).T, (kernel.variances.size, 3))
-        self.targets.into(SUMS[1]).clear()
+        self.renderer.clear(SUMS[1])
         done = 0.0
         for number, (variance, weight) in enumerate(zip(kernel.variances.tolist(), weights, strict=True)):
-            for one in self._gaussian(done, variance):
-                self._run(one)
+            self.renderer.run(*self._gaussian(done, variance))
             done = variance
             into, before = SUMS[number % 2], SUMS[1 - number % 2]
             add = self._pass("add", into, weight=tuple(map(float, weight)))
-            self._run(replace(add, reads={LIGHT: LIGHT, "sum_map": before}))
-        self._run(self._filled(SUMS[(kernel.variances.size - 1) % 2], BLURRED))
-        return self.targets.map(BLURRED)
+            self.renderer.run(replace(add, reads={LIGHT: LIGHT, "sum_map": before}))
+        self.renderer.run(self._filled(SUMS[(kernel.variances.size - 1) % 2], BLURRED))
 
     def read(self, name: str) -> Singles:
-        """(rows, columns, 4) of a map, row 0 at the bottom."""
-        return pixels(self.targets.map(name))
+        """Return a map (rows, columns, 4), row 0 at the bottom."""
+        return self.renderer.read(name)
 
     def elements(self) -> Elements:
-        """The surface that is drawn, each texel's light and area."""
+        """Return the surface that is drawn, each texel's light and area."""
         place, stretch, light = (self.read(name).astype(float) for name in ("position_map", STRETCH, "irradiance_map"))
         inside = place[..., 3] > INSIDE
         return Elements(place[inside][:, :3], stretch[inside][:, 3], light[inside][:, :3], self.texel)
 
     def release(self) -> None:
-        for one in self._passes.values():
-            one.release()
-        self.targets.release()
-        self._passes.clear()
+        self.renderer.release()
 
     def __enter__(self) -> Self:
         return self
@@ -121,7 +115,7 @@ class Atlas:
         self.release()
 
     def _require_apart(self, mesh: Mesh, inside: NDArray[np.bool_]) -> None:
-        """InputError where two triangles lie on one texel, or two charts nearer than their margins are wide."""
+        """Raise InputError where two triangles lie on one texel, or two charts nearer than their margins are wide."""
         places = (0.5 + (mesh.uv - 0.5) * self.inset) * self.size
         flat = places[mesh.triangles]
         (ax, ay), (bx, by) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
@@ -146,7 +140,7 @@ class Atlas:
                 )
 
     def _gaussian(self, done: float, variance: float) -> Iterator[Pass]:
-        """From one variance to another [mm^2], in as many parts as it takes for each to stay within the margin."""
+        """Yield passes from one variance to another [mm^2], in so many parts that each stays within the margin."""
         widest, sigma = self.margin / REACH, np.sqrt(variance - done)
         parts = int(np.ceil((sigma / (widest * self._shortest)) ** 2))
         for number in range(parts):
@@ -157,21 +151,16 @@ class Atlas:
                 yield self._pass("blur", LIGHT, FILLED, STRETCH, along=along, **given)
 
     def _filled(self, name: str, into: str = FILLED) -> Pass:
-        """A map with its margins."""
-        reads: dict[str, str | Singles | moderngl.Texture] = {LIGHT: name, "link_map": self.links}
+        """Return the pass that fills a map's margins."""
+        reads: dict[str, Read] = {LIGHT: name, "link_map": self.links}
         return replace(self._pass("fill", into), reads=reads)
 
     def _pass(self, name: str, into: str, *reads: str, **uniforms: object) -> Pass:
         return Pass(name, maps(*reads), into, text_beside(__name__, f"glsl/{name}.frag"), uniforms)
 
-    def _run(self, one: Pass) -> None:
-        if one.source not in self._passes:
-            self._passes[one.source] = FullScreen(self.context, one)
-        self._passes[one.source].run(one, self.targets)
-
 
 def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tuple[int, int], int]:
-    """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin.
+    """Return columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin.
 
     step  of which columns and rows within the margin are multiples, as `most` is
     As fine as it takes for charts to lie two such margins and a texel apart.
@@ -193,7 +182,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
 
 
 def _require_charts(mesh: Mesh) -> None:
-    """InputError on a mesh that cannot be laid out."""
+    """Raise InputError on a mesh that cannot be laid out."""
     count = len(mesh.position)
     if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):
         raise InputError(f"mesh must have a finite uv at each of {count} vertices, got an array of {mesh.uv.shape}")
@@ -207,7 +196,7 @@ def _require_charts(mesh: Mesh) -> None:
 
 
 def _apart(mesh: Mesh, inner: Floats) -> float:
-    """Least gap between the boxes of two charts [texels]."""
+    """Return the least gap between the boxes of two charts [texels]."""
     count = len(mesh.position)
     first, second, third = mesh.triangles.T
     edges = np.concatenate([first, second]), np.concatenate([second, third])

@@ -1,4 +1,4 @@
-"""The balance of texture and screen: a kernel split by scale, and the screen's share of what is far.
+"""Balance of texture and screen: a kernel split by scale, and the screen's share of what is far.
 
 Yang et al. blend light that was blurred in texture space and on the screen by a balance function that their text
 does not give. Here R = R_near + R_far: Gaussians narrower than a crossover are blurred on the screen, which has all
@@ -23,14 +23,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kernel:
-    """sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k): variances (N,), rising [length^2]; weights (N,) or (N, c) [-]."""
+    """Kernel sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k): variances (N,), rising [length^2]; weights (N,) or (N, c) [-]."""
 
     variances: Floats
     weights: Floats
 
     @property
     def energy(self) -> Floats:
-        """Of each channel [-]."""
+        """Integral over the plane, of each channel [-]."""
         return np.sum(self.weights, axis=0)
 
 
@@ -39,14 +39,14 @@ CROSSOVER = 0.6
 
 
 class NearFar(NamedTuple):
-    """The two parts of a kernel; their weights are those of the whole one."""
+    """Parts of a kernel; their weights are those of the whole one."""
 
     near: Kernel
     far: Kernel
 
 
 def split(kernel: Kernel, crossover: float) -> NearFar:
-    """Gaussians with sigma below a crossover [length], and the others; either may be empty."""
+    """Return Gaussians with sigma below a crossover [length], and the others; either may be empty."""
     if not crossover >= 0:
         raise InputError(f"crossover must be a length >= 0, got {crossover!r}")
     is_near = np.sqrt(kernel.variances) < crossover
@@ -55,7 +55,7 @@ def split(kernel: Kernel, crossover: float) -> NearFar:
 
 
 def crossover_of(texel: float, pixel: float, constant: float = CROSSOVER) -> float:
-    """Where to split: constant * texel * sqrt(texel / pixel), the mean sides of what both spaces have [length].
+    """Return where to split: constant * texel * sqrt(texel / pixel), the mean sides of what both spaces have [length].
 
     The coarser the atlas, the more is left to the screen; less, the coarser the screen is itself.
     """
@@ -65,7 +65,7 @@ def crossover_of(texel: float, pixel: float, constant: float = CROSSOVER) -> flo
 
 
 def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: Kernel, at: ArrayLike) -> Floats:
-    """Of the light that a kernel gathers at points, the share that comes from what is seen [-], (m,) or (m, c).
+    """Return the share (m,) or (m, c) of the light that a kernel gathers at points which comes from what is seen [-].
 
     points, areas, seen  (n, 3), (n,), (n,) of the whole surface, seen 0 or 1;  at  (m, 3)
     """
@@ -79,8 +79,8 @@ def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: K
     return some / np.maximum(whole, np.finfo(float).tiny)
 
 
-def missed(elements: Elements, seen: ArrayLike, kernel: Kernel, at: ArrayLike, own: ArrayLike) -> Floats:
-    """What the screen by itself is wrong by for what it does not see: (m, 3), in the irradiance's unit.
+def occlusion_error(elements: Elements, seen: ArrayLike, kernel: Kernel, at: ArrayLike, own: ArrayLike) -> Floats:
+    """Return the error of a screen-space gather that is caused by hidden surface: (m, 3), in the irradiance's unit.
 
     seen  (n,) of the elements, 0 or 1;  at, own  (m, 3) points that gather, and their irradiance
     Light of what is seen less that of all, each over its share of the kernel: as gathers on a screen have it.
@@ -102,7 +102,7 @@ def missed(elements: Elements, seen: ArrayLike, kernel: Kernel, at: ArrayLike, o
 
 
 def balance(near: ArrayLike, far_on_screen: ArrayLike, far_in_atlas: ArrayLike, share: ArrayLike, threshold: float):
-    """The light of both parts: what is near, and what is far by the screen where its share is above the threshold.
+    """Return the light of both parts: near, and far by the screen where its share is above the threshold.
 
     All broadcast; a smooth weight would mix in a gather that misses light, which is wrong in all of it.
     """

@@ -1,4 +1,4 @@
-"""Where a surface goes on beyond the edge of its chart: for each texel of an atlas's margin a place inside.
+"""Links beyond the edges of charts: for each texel of an atlas's margin the place inside where the surface goes on.
 
 A chart ends where a seam was cut; the surface does not. From the edge outwards, texel by texel, a step goes on from the
 last places: in space, and what of the surface lies nearest is where it ends, across a seam on its other side, over a
@@ -20,7 +20,7 @@ REACH = 0.75  # of a texel, along its row and its column, and off its plane: wha
 
 
 def links(position: Floats, inside: NDArray[np.bool_], margin: int) -> Singles:
-    """(rows, columns, 3): column and row of the place whose light a texel has, fractional, and 1; 0 where none.
+    """Return (rows, columns, 3): column and row of the place whose light a texel has, fractional, and 1; 0 where none.
 
     position  (rows, columns, 3) [length], of the texels that are inside a chart;  margin  how far links go [texels]
     """
@@ -73,7 +73,7 @@ def _stepped(
     position: Floats,
     frames: Floats,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The next place in the atlas after two that are `linked`, its point, and whether it is inside a chart."""
+    """Return the next place in the atlas after two that are `linked`, its point, and whether it is inside a chart."""
     to = 2.0 * one - two
     nearest = np.rint(to).astype(int)
     good = linked & (np.max(np.abs(one - two), axis=1) < 2.0) & _has(inside, nearest)
@@ -89,7 +89,7 @@ def _has(known: NDArray[np.bool_], at: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _frames(position: Floats, inside: NDArray[np.bool_]) -> Floats:
-    """(rows, columns, 2, 3): how far one row and one column lead [length]; central where both neighbours are inside."""
+    """Return (rows, columns, 2, 3) steps of one row and one column [length]; central where both neighbours are in."""
     frames = np.zeros((*inside.shape, 2, 3))
     for axis in (0, 1):
         ahead, behind = (np.roll(position, -shift, axis) for shift in (1, -1))
@@ -104,7 +104,7 @@ def _frames(position: Floats, inside: NDArray[np.bool_]) -> Floats:
 
 
 def _coordinates(frames: Floats, off: Floats) -> Floats:
-    """Of an offset in the plane of a texel, rows and columns."""
+    """Return rows and columns of an offset in the plane of a texel."""
     gram = frames @ np.swapaxes(frames, -1, -2)
     scale = np.trace(gram, axis1=-2, axis2=-1)
     safe = gram + 1e-9 * np.where(scale > 0, scale, 1.0)[:, None, None] * np.eye(2)
@@ -112,7 +112,7 @@ def _coordinates(frames: Floats, off: Floats) -> Floats:
 
 
 def _along(frames: Floats, off: Floats) -> Floats:
-    """The part of an offset in the plane of a texel, which its coordinates may not tell at a pole."""
+    """Return the part of an offset in the plane of a texel, which its coordinates may not tell at a pole."""
     normal = np.cross(frames[:, 0], frames[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1.0)

@@ -35,14 +35,14 @@ WINDING = 0.05, 9.0  # how far they wind [radius], and how often [1/radius]
 
 
 def surface(kind: str, size: float, steepness: float) -> Mesh:
-    """By one of `KINDS`. size  radius, or period of bumps [length];  steepness  amplitude of those, in their period"""
+    """Return the mesh of one of `KINDS`: size  radius or period [length];  steepness  amplitude over the period [-]."""
     if kind == "bumps":
         return bumps(size, steepness * size, PERIODS * size)
     return {"heart": heart, "ball": ball}[kind](size)
 
 
 def off_edges(kind: str, size: float, points: Floats, sigma: float) -> NDArray[np.bool_]:
-    """(...) of points (..., 3): all but those so near to a sheet's edge that no blur knows what comes from beyond."""
+    """Return (...) whether points (..., 3) are so far from a sheet's edge that blurs know what comes from beyond."""
     if kind != "bumps":
         return np.ones(points.shape[:-1], bool)
     side = PERIODS * size
@@ -50,7 +50,7 @@ def off_edges(kind: str, size: float, points: Floats, sigma: float) -> NDArray[n
 
 
 def ball(radius: float, rows: int = 96, columns: int = 192) -> Mesh:
-    """A sphere about the origin: u its longitude, v from its south pole up [length]."""
+    """Return a sphere about the origin: u its longitude, v from its south pole up [length]."""
     u, v = parameters(rows, columns)
     turn, height = 2.0 * np.pi * u, np.pi * (v - 0.5)
     across = np.cos(height)
@@ -59,14 +59,14 @@ def ball(radius: float, rows: int = 96, columns: int = 192) -> Mesh:
 
 
 def bumps(period: float, amplitude: float, side: float, rows: int = 200) -> Mesh:
-    """A square sheet that faces +z, z = amplitude cos(2 pi x / period) [length]."""
+    """Return a square sheet that faces +z, z = amplitude cos(2 pi x / period) [length]."""
     u, v = parameters(rows, rows)
     x, y = side * (u - 0.5), side * (v - 0.5)
     return sheet(np.stack([x, y, amplitude * np.cos(2.0 * np.pi * x / period)], axis=-1), u, v)
 
 
 def heart(radius: float, rows: int = 64) -> Mesh:
-    """A closed surface like a heart, about so large from its middle: chambers, the groove between them, and vessels.
+    """Return a closed surface like a heart, about so large from its middle: chambers, a groove between them, vessels.
 
     Six charts, three in a row, with gaps between them. Its shape is made up.
     """
@@ -91,7 +91,7 @@ def heart(radius: float, rows: int = 64) -> Mesh:
 
 
 def _wall(towards: Floats) -> Floats:
-    """Points (..., 3) of the wall in directions (..., 3), of about unit radius."""
+    """Return points (..., 3) of the wall in directions (..., 3), of about unit radius."""
     x, y = towards[..., 0], towards[..., 1]
     apex = np.clip(-y, 0.0, 1.0)
     out = 1.0 + 0.12 * _bump(towards, (-0.55, 0.55, 0.45), 0.5) + 0.16 * _bump(towards, (0.6, 0.5, 0.1), 0.45)
@@ -111,7 +111,7 @@ def _bump(towards: Floats, at: tuple[float, float, float], width: float) -> Floa
 
 
 def _from_arc(towards: Floats, start: tuple[float, float, float], end: tuple[float, float, float]) -> Floats:
-    """Chords from directions to the nearest of an arc's."""
+    """Return chords from directions to the nearest of an arc's."""
     ways = unit(np.linspace(unit(start), unit(end), 60))
     tangents, ends = np.diff(ways, axis=0), ways[:-1]
     nearest = np.full(towards.shape[:-1], np.inf)

@@ -1,4 +1,4 @@
-"""The passes of a heart: both parts of a kernel on the screen, the far one in the atlas, and their balance."""
+"""Passes of a heart: both parts of a kernel on the screen, the far one in the atlas, and their balance."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from profilefit.laws.gaussians import MediumGaussians
 from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel, split
 from profilefit.scenes.stage.gather import Gather
+from profilefit.scenes.stage.renderer import Pass, Read
 from profilefit.scenes.stage.technique import (
     EXITANCE,
     LAW,
     Frame,
     LawText,
-    Pass,
     Technique,
     Unwraps,
     maps,
@@ -34,13 +34,13 @@ ATLAS, SCREEN = 1e30, -1.0  # thresholds: no share is above the one, all are abo
 
 
 def kernel_of(sums: Sequence[MediumGaussians], units: Sequence[float]) -> Kernel:
-    """Of sums that share their variances, over the light that comes back; units of their x [mm]."""
+    """Return the kernel of sums that share their variances, over the light that comes back; units of their x [mm]."""
     variances = np.array(sums[0].variance) * units[0] ** 2
     return Kernel(variances, np.array([one.weight for one in sums]).T)
 
 
 def gather_of(part: Kernel, mfp: Sequence[float]) -> Gather:
-    """Samples of a part of a kernel, its weights scaled to sum to 1; mfp  of red, green and blue [mm]."""
+    """Return samples of a part of a kernel, its weights scaled to sum to 1; mfp  of red, green and blue [mm]."""
     total = part.energy
     shares = part.weights / np.where(total > 0, total, 1.0) + np.where(total > 0, 0.0, 1.0 / len(part.variances))
     sums = [
@@ -52,7 +52,7 @@ def gather_of(part: Kernel, mfp: Sequence[float]) -> Gather:
 
 @dataclass(frozen=True, eq=False)
 class Balanced(Technique):
-    """A kernel in two parts: near on the screen, far in texture space but where the screen sees enough of it.
+    """Kernel in two parts: near on the screen, far in texture space but where the screen sees enough of it.
 
     near, far  samples of either, None where there is none or it is not asked for;  energies  of both (2, 3) [-]
     atlas      whose light is blurred by the far part each time, after `part` was drawn into it; without a part it keeps
@@ -78,7 +78,7 @@ class Balanced(Technique):
         threshold: float,
         mfp: Sequence[float] = (1.0,) * 3,
     ) -> Balanced:
-        """Of a kernel split at a crossover [mm]; mfp  what `scatter` is told, the unit of the samples' texts [mm].
+        """Return a kernel split at a crossover [mm]; mfp  what `scatter` takes, the unit of the samples' sources [mm].
 
         With crossover 0 and a threshold of `ATLAS` all is texture space, with an endless one all is the screen's.
         """
@@ -96,7 +96,7 @@ class Balanced(Technique):
 
     def passes(self, frame: Frame) -> Sequence[Pass]:
         surface = maps("place_map", "position_map", "irradiance_map", "reflectance_map")
-        reads = {**surface, "atlas_map": self.atlas.targets.map(BLURRED)}
+        reads: dict[str, Read] = {**surface, "atlas_map": self.atlas.renderer.map(BLURRED)}
         found: list[Pass] = []
         for part, into in ((self.near, NEAR), (self.far, FAR)):
             reads[into] = "irradiance_map" if part is None else into

@@ -1,4 +1,4 @@
-"""A heart of layers under one lamp: HEART.toml, drawn in texture space, on the screen, or by a split of both."""
+"""Heart of layers under one lamp: HEART.toml, drawn in texture space, on the screen, or by a split of both."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage import request
 from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.picture import Drawn, TruthError
-from profilefit.scenes.stage.request import Shown, Viewpoint, ViewRequest
+from profilefit.scenes.stage.picture import RenderResult, TruthError
+from profilefit.scenes.stage.request import Viewpoint, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import evenly, world
-from profilefit.scenes.stage.technique import Lambert, Technique
+from profilefit.scenes.stage.technique import Lambert, Technique, TechniquePair, alone
 from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ SEEN = 3.0  # height of a view, in the size of what is seen
 
 @dataclass(frozen=True)
 class HeartRequest(ViewRequest):
-    """What a file requests.
+    """Picture of a heart that a file requests.
 
     surface    its kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period
     roughness  of the one lobe that is mirrored, GGX [-]
@@ -75,7 +75,7 @@ class HeartRequest(ViewRequest):
 
     @property
     def media(self) -> tuple[Medium, Medium, Medium]:
-        """Of red, green, blue."""
+        """Stacks of red, green, blue."""
         return self.stack.stack.media
 
     @cached_property
@@ -84,12 +84,12 @@ class HeartRequest(ViewRequest):
 
     @property
     def pixel(self) -> float:
-        """Its side at the target [mm]."""
+        """Side of a pixel at the target [mm]."""
         return self.camera.height / self.size[1]
 
 
 class Scattering(NamedTuple):
-    """Of a stack, red, green and blue: what is drawn with, and what it is held against.
+    """Light of a stack, red, green and blue: that of the picture, and that of its reference.
 
     kernel  of as many Gaussians as a technique has;  exact  of so many that they are the exact light [mm^2]
     colour  A [-]
@@ -101,12 +101,12 @@ class Scattering(NamedTuple):
 
     @property
     def mfp(self) -> Rgb:
-        """What the stage is told: a length that no Gaussian's light falls below for being too short to see [mm]."""
+        """Lengths (3,) that the stage takes, so that no Gaussian's light counts as too short to see [mm]."""
         return (float(np.sqrt(self.kernel.variances[-1])),) * 3
 
 
 def read(file: str, content: Table) -> HeartRequest:
-    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
     stack = requested(file, content)
@@ -121,9 +121,9 @@ def read(file: str, content: Table) -> HeartRequest:
     count = named.get("gaussians", GAUSSIANS)
     if type(count) is not int or not 1 <= count <= MOST:
         raise tables.bad("technique", "gaussians", f"a whole number in 1 ... {MOST}", count)
-    view = request.view(tables, content, Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * size))
+    seen = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * size)
     found = HeartRequest(
-        **view,
+        **request.view(tables, content, seen.camera),
         stack=stack,
         surface=kind,
         size_mm=size,
@@ -141,43 +141,46 @@ def read(file: str, content: Table) -> HeartRequest:
     return found
 
 
-def draw(context: moderngl.Context, of: HeartRequest) -> Drawn:
-    """The picture, its truth, error and cost: a minute, half of it for exact light if no record has these layers."""
-    with bench(context, of, light_of(of.stack, of.gaussians)) as found:
-        way = found.way(of.kind)
-        return request.drawn(found.judge, of, Shown(of.kind, way, way), found.truth_error)
+def draw(context: moderngl.Context, of: HeartRequest) -> RenderResult:
+    """Draw the picture beside its reference: a minute, half of it for exact light if no record has these layers."""
+    with reference_render(context, of, light_of(of.stack, of.gaussians)) as drawn:
+        return request.rendered(drawn.stage, drawn.judge, of, drawn.pair(of.kind))
 
 
 @dataclass(frozen=True)
-class Bench:
-    """A scene that is drawn, with its atlas and its truth. pixel  its side where the camera looks at [mm]"""
+class HeartRender:
+    """Scene that is drawn, with its judge, its atlas and its light; pixel  side of one at the target [mm]."""
 
+    stage: Stage
     judge: Judge
-    truth_error: TruthError
     atlas: Atlas
     part: Part
     light: Scattering
     pixel: float
 
-    def way(self, kind: str) -> Technique:
-        """By one of `KINDS`."""
+    def technique(self, kind: str) -> Technique:
+        """Return the technique of one of `KINDS`."""
         if kind == NONE:
             return Lambert()
         at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel))
         return Balanced.of(self.atlas, self.part, self.light.kernel, at, ATLAS, self.light.mfp)
 
+    def pair(self, kind: str) -> TechniquePair:
+        """Return that technique with what the stage takes."""
+        return alone(kind, self.technique(kind), self.light.mfp)
+
     @contextmanager
-    def with_texels(self, texel: float) -> Iterator[Bench]:
-        """The same, its atlas of another mean side of texels [mm]."""
+    def with_texels(self, texel: float) -> Iterator[HeartRender]:
+        """Open the same with an atlas of another mean side of texels [mm]."""
         size, margin = atlas_size(self.part.mesh, texel, MOST_TEXELS)
-        with Atlas(self.atlas.context, size, margin) as atlas:
-            atlas.draw(self.judge.stage, self.part)
+        with Atlas(self.stage.context, size, margin) as atlas:
+            atlas.draw(self.stage, self.part)
             yield replace(self, atlas=atlas)
 
 
 @contextmanager
 def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
-    """A stage that has drawn what is requested, and its one part."""
+    """Open a stage that has drawn what is requested, and its one part."""
     part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
@@ -187,10 +190,10 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
 
 
 @contextmanager
-def bench(
+def reference_render(
     context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = request.MOST_PIXELS
-) -> Iterator[Bench]:
-    """All that ways to draw a request are measured with, at so many pixels at most."""
+) -> Iterator[HeartRender]:
+    """Open the passes and the reference image of a request, judged at so many pixels at most."""
     size, margin = atlas_size(of.mesh, of.texel, MOST_TEXELS)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
         buffers = stage.buffers()
@@ -204,35 +207,39 @@ def bench(
             judged = np.zeros_like(judged)
             judged[chosen] = True
             inside = judged
-        truth, error = truth_of(stage, part, places, inside, light)
-        yield Bench(Judge(stage, light.mfp, truth, judged), error, atlas, part, light, of.pixel)
+        reference, error = _reference(stage, part, places, inside, light)
+        judge = Judge(reference, judged, error)
+        yield HeartRender(stage, judge, atlas, part, light, of.pixel)
 
 
-def truth_of(
+def _reference(
     stage: Stage, part: Part, places: Floats, inside: NDArray[np.bool_], light: Scattering
 ) -> tuple[Floats, TruthError]:
-    """(h, w, 3) radiant exitance of what the stage drew, from the whole surface; and what a coarser one changes.
+    """Return radiant exitance (h, w, 3) from the whole surface, and what a coarser surface changes.
 
-    places  (h, w, 3) of the pixels in the world [mm];  inside  (h, w), where it is summed: elsewhere it is Lambert's
+    Args:
+        stage: that has drawn the scene.
+        part: the surface.
+        places: (h, w, 3) of the pixels in the world [mm].
+        inside: (h, w), where light is summed: elsewhere it is Lambert's.
+        light: of the stack.
     """
     buffers = stage.buffers()
     own, exact = buffers.irradiance[inside].astype(float), light.exact
-    found: list[Floats] = []
+    sums: list[Floats] = []
     for most in (FINE, FINE // 2):
         size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
         with Atlas(stage.context, size, margin) as fine:
             fine.draw(stage, part)
             gathered = summed(fine.elements(), exact.variances, exact.weights, places[inside], own)
-            found.append(np.multiply(light.colour, gathered))
-    truth = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
-    truth[inside] = found[0]
-    share = np.abs(found[1] - found[0]) / np.mean(found[0])
-    half, most_of = np.quantile(share, (0.5, 0.9)).tolist()
-    return truth, TruthError(half, most_of, float(np.sqrt(np.mean(share**2))))
+            sums.append(np.multiply(light.colour, gathered))
+    reference = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
+    reference[inside] = sums[0]
+    return reference, TruthError.of(np.abs(sums[1] - sums[0]) / np.mean(sums[0]))
 
 
 def light_of(stack: StackRequest, count: int) -> Scattering:
-    """Of a record of these very layers, in ./fits or that is shipped; solved and fitted now where there is none."""
+    """Return the light of a record of these very layers, in ./fits or shipped; solved and fitted now where none is."""
     media = stack.stack.media
     for folder in (LOCAL, fits_folder()):
         found = matching(stack, folder)

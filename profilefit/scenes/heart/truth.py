@@ -1,4 +1,4 @@
-"""What light that scatters under a whole surface comes to, hidden parts included: the sum over all pairs of points.
+"""Light that scatters under a whole surface, hidden parts included: the sum over all pairs of points.
 
 On a sphere there is an oracle without any sum: there a Gaussian of the chord is von Mises and Fisher's function of the
 angle, with kappa = radius^2 / v (`sphere_blur`).
@@ -29,7 +29,7 @@ def surface_blur(
     weights: ArrayLike,
     at: ArrayLike | None = None,
 ) -> Floats:
-    """sum_j E_j area_j sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k), d the straight distance: (n,) or (n, c).
+    """Return sum_j E_j area_j sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k), d the straight distance: (n,) or (n, c).
 
     points, areas  (n, 3), (n,) of a surface, as fine as the narrowest Gaussian [length, length^2]
     irradiance     (n,) or (n, c) [-];  variances, weights  v (N,) [length^2] and w (N,) or (N, c) [-]
@@ -77,7 +77,7 @@ class Elements(NamedTuple):
     spacing: float
 
     def within(self, side: float) -> Elements:
-        """The same, those in each cube of a side as one about their middle: area and light stay."""
+        """Return the surface with elements in each cube of a side as one about their middle: area and light stay."""
         if side <= self.spacing:
             return self
         cells = np.floor((self.points - self.points.min(axis=0)) / side).astype(np.int64)
@@ -91,7 +91,7 @@ class Elements(NamedTuple):
 
 
 def summed(elements: Elements, variances: ArrayLike, weights: ArrayLike, at: ArrayLike, own: ArrayLike) -> Floats:
-    """`surface_blur` at points (m, 3) for Gaussians of any width: (m, c).
+    """Return `surface_blur` at points (m, 3) for Gaussians of any width: (m, c).
 
     own  (m, c) irradiance of those points, which is what Gaussians narrower than the elements leave there
     """
@@ -107,7 +107,7 @@ def summed(elements: Elements, variances: ArrayLike, weights: ArrayLike, at: Arr
 
 
 def sphere_blur(radius: float, cosine: ArrayLike, variances: ArrayLike, weights: ArrayLike) -> Floats:
-    """The same on a sphere under E = 1 + cosine, exactly, at points of these cosines to the light [-].
+    """Return `surface_blur` of a sphere under E = 1 + cosine, exactly, at points of these cosines to the light [-].
 
     A Gaussian of the chord has the integral 1 - e^{-2 kappa}, and shrinks the cosine by coth kappa - 1 / kappa.
     """

@@ -1,4 +1,4 @@
-"""Where layers matter, and what each way of drawing them costs: points and maps, for a report to draw."""
+"""Error against cost of each technique for layers, and error of one half space: points and maps for a report."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from profilefit.recipes.stack.gaussians import medium_gaussians
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, of_gaussians, of_table, once
-from profilefit.scenes.layers.scene import LayersRequest, Way, judged, laws_of, technique
+from profilefit.scenes.layers.scene import LayersRequest, laws_of, reference, technique
 from profilefit.scenes.layers.truth import StackTable
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.technique import TechniquePair, alone
 
 Floats = NDArray[np.float64]
 TABLE, GAUSSIANS = "exact table", "gaussians"
 
 
 class Split(NamedTuple):
-    """Where the light of one direction goes that comes back [-]: shares of what arrives.
+    """Shares of the light of one direction that come back, of what arrives [-].
 
     single  scattered once;  multiple  scattered more often;  mirror  thrown back by the surface
     """
@@ -38,7 +39,7 @@ class Split(NamedTuple):
 
 
 def split(medium: Medium, illumination: str = "searchlight") -> Split:
-    """Single : multiple : mirrored light of a stack of one index, exact; of g > 0 the similar stack's whole.
+    """Return single : multiple : mirrored light of a stack of one index, exact; of g > 0 the similar stack's whole.
 
     illumination  "searchlight", along the normal, or "diffuse"
     """
@@ -55,7 +56,7 @@ def split(medium: Medium, illumination: str = "searchlight") -> Split:
 def one_half_space_errors(
     thicknesses: Sequence[float], mfps: Sequence[float], above: float = 0.95, below: float = 0.98, n: float = 1.4
 ) -> Floats:
-    """Error of the one half space nearest to two layers, as a share of white: (thicknesses, mfps).
+    """Return the error of the one half space nearest to two layers, as a share of white: (thicknesses, mfps).
 
     thicknesses  of the first layer, mfps of what lies below, both in mean free paths of the first
     above, below  albedos [-];  n  of both. Root mean square near a step edge of diffuse light; exact.
@@ -71,28 +72,32 @@ def one_half_space_errors(
 def ways(
     stage: Stage, request: LayersRequest, table: StackTable, samples: Mapping[str, Sequence[int]], turns: int = TURNS
 ) -> dict[str, list[ChartPoint]]:
-    """Error and cost of each kind of technique with each of its numbers of samples, of the scene that is requested.
+    """Return error and cost of each kind of technique with each of its numbers of samples, of the scene requested.
 
-    samples  of the kinds of a file, of `TABLE`, exact light by tables of each thickness, and of "gaussians:N", N
-             Gaussians fitted at the thickness of the file
+    Args:
+        stage: that draws the scene.
+        request: of the scene.
+        table: exact light of its stack.
+        samples: of the kinds of a file, of `TABLE`, exact light by tables of each thickness, and of "gaussians:N", N
+            Gaussians fitted at the thickness of the file.
+        turns: how often each is timed.
     """
-    judge, laws = judged(stage, request, table), laws_of(request.stack)
-    found = {}
-    for kind, numbers in samples.items():
-        way = _way(kind, request, table, laws)
-        found[kind] = points(way.judged(judge), way.label, way.by, request.sampling, numbers, turns)
-    return found
+    judge, laws = reference(stage, request, table), laws_of(request.stack)
+    return {
+        kind: points(stage, judge, _technique(kind, request, table, laws), request.sampling, numbers, turns)
+        for kind, numbers in samples.items()
+    }
 
 
-def _way(kind: str, request: LayersRequest, table: StackTable, laws: tuple[StackLaw, ...]) -> Way:
+def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple[StackLaw, ...]) -> TechniquePair:
     light = request.stack.illumination
     plates = [plate_of(medium, light) for medium in request.media]
     if kind == TABLE:
-        return Way(kind, of_table(table, plates), request.mfp)
+        return alone(kind, of_table(table, plates), request.mfp)
     name, _, count = kind.partition(":")
     if name == GAUSSIANS:
         sums = [medium_gaussians(medium, light, int(count)) for medium in request.media]
-        return Way(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
+        return alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     return technique(replace(request, kind=kind), laws)
 
 

@@ -35,19 +35,19 @@ class RingShares:
 
     @classmethod
     def of(cls, edges: Floats, energy: ArrayLike, error: ArrayLike) -> RingShares:
-        """edges  (rings,) of which the first is 0;  energy, error  (rings,), those beyond the last edge at the end."""
+        """Return shares of energy and errors (rings,), the last beyond the last edge; edges  (rings,), from 0."""
         middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
         value = np.asarray(energy, float)
         return cls(middle, value / value.sum(), np.asarray(error, float) / value.sum())
 
     def beyond(self, d: Floats, share: Floats | None = None) -> Floats:
-        """F(d), the share from beyond an edge at each distance (m,)."""
+        """Return F(d), the share from beyond an edge at each distance (m,)."""
         across = np.arccos(np.minimum(d[:, None] / self.radius, 1.0)) / np.pi
         return (self.share if share is None else share) @ across.T
 
 
 class OneHalfSpace(NamedTuple):
-    """The half space nearest to a stack.
+    """Half space that is nearest to a stack.
 
     alpha  whose reflectance is the stack's [-];  mfp  with which it is nearest near an edge of light [length]
     error  root mean square there of what it is wrong by, as a share of white [-];  reflectance  A of both [-]
@@ -61,7 +61,7 @@ class OneHalfSpace(NamedTuple):
 
 @lru_cache(maxsize=32)
 def one_half_space(medium: Medium, illumination: str = "diffuse", within: float = 4.0) -> OneHalfSpace:
-    """One half space in place of a stack: by exact light, near a step edge, up to so many mean free paths from it.
+    """Return one half space in place of a stack, by exact light up to so many mean free paths from a step edge.
 
     InputError as of `exact.solve`, and where no half space reflects as much. Seconds.
     """
@@ -88,12 +88,12 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
 
 
 def places(mfp: float, within: float) -> Floats:
-    """Distances from an edge that are judged, up to so many mean free paths [length]."""
+    """Return distances from an edge that are judged, up to so many mean free paths [length]."""
     return within * mfp * (np.arange(PLACES) + 0.5) / PLACES
 
 
 def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
-    """The mean free path of a half space, whose rings are in it, that makes the difference at an edge least."""
+    """Return the mean free path of a half space, whose rings are in it, that makes the difference at an edge least."""
 
     def quartile(rings: RingShares) -> float:
         return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))

@@ -1,4 +1,4 @@
-"""The closed forms of a stack of layers: light scattered once, exactly, and all of it by the fitted `stack_law`.
+"""Closed forms of a stack of layers: light scattered once, exactly, and all of it by the fitted `stack_law`.
 
     from mcml_sim import Layer, Medium
     from profilefit.scenes import layers
@@ -68,7 +68,7 @@ def single_scattering(
     azimuth: ArrayLike,
     phases: Sequence[Phase] | None = None,
 ) -> float | Floats:
-    """Radiance outside [1/sr] of light scattered once, for unit irradiance on a plane across the beam. All broadcast.
+    """Return radiance outside [1/sr] of light scattered once, for unit irradiance across the beam. All broadcast.
 
     cos_in, cos_out  cosines of the beam and of the eye's ray to the normal, outside, in (0, 1] [-]
     azimuth          between the planes of the two propagation directions; 0 is onward [rad]
@@ -78,7 +78,9 @@ def single_scattering(
     """
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
-    given = _phases_of(medium) if phases is None else tuple(phases)
+    if phases is None:  # of clear glass any
+        phases = [HenyeyGreenstein(layer.g if layer.mu_s > 0 else 0.0) for layer in medium.layers]
+    given = tuple(phases)
     if len(given) != len(medium.layers) or not all(isinstance(one, Phase) for one in given):
         raise InputError(f"phases must be {len(medium.layers)} phase functions, one a layer, got {shown(phases)}")
     into, out = _cosine("cos_in", cos_in), _cosine("cos_out", cos_out)
@@ -112,14 +114,14 @@ class Plate(NamedTuple):
     error: float
 
     def transmitted(self, thickness: ArrayLike) -> Floats:
-        """T [-] through a part of that thickness [length]; a thinner one than its skins counts as these."""
+        """Return T [-] through a part of that thickness [length]; a thinner one than its skins counts as these."""
         depth = self.rate * np.maximum(np.asarray(thickness, float) - self.skins, 0.0) + self.offset
         return self.strength / np.sinh(depth)
 
 
 @lru_cache(maxsize=32)
 def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
-    """The two constants of a stack, fitted to the exact transmittance of five plates. A second; InputError as of
+    """Fit the two constants of a stack to the exact transmittance of five plates. A second; InputError as of
     `exact.solve`.
 
     Within .5 % where the last layer is no darker than alpha = 0.8; light through darker ones is little: a plate of two
@@ -146,13 +148,8 @@ def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
     return Plate(rate, skins, strength, offset, float(np.max(np.abs(np.expm1(best.residuals)))))
 
 
-def _phases_of(medium: Medium) -> tuple[Phase, ...]:
-    """Henyey and Greenstein's phase function of each layer that scatters, and any in clear glass."""
-    return tuple(HenyeyGreenstein(layer.g if layer.mu_s > 0 else 0.0) for layer in medium.layers)
-
-
 def beams(medium: Medium, cosine: Floats) -> list[Beam]:
-    """Light that arrives at a cosine outside, layer by layer, as interfaces divide it; reflections of any order."""
+    """Return light that arrives at a cosine outside, by layer, as interfaces divide it; reflections of any order."""
     indices = [medium.n_above, *(layer.n for layer in medium.layers)]
     if not medium.is_half_space:
         indices.append(medium.n_below)
@@ -181,12 +178,12 @@ def beams(medium: Medium, cosine: Floats) -> list[Beam]:
 
 
 def _passed(mirror: Floats, deeper: Floats) -> Floats:
-    """Share that passes an interface, with what goes to and fro between it and what lies deeper."""
+    """Return the share that passes an interface, with what goes to and fro between it and what lies deeper."""
     return np.where(mirror < 1.0, (1.0 - mirror) / np.where(mirror < 1.0, 1.0 - mirror * deeper, 1.0), 0.0)
 
 
 def _kept(layer: Layer, cosine: Floats) -> Floats:
-    """Share that crosses the layer [-]; none where it is infinite, or where no light of that direction gets there."""
+    """Return the share that crosses the layer [-]; 0 where it is infinite, or no light of that direction gets there."""
     if np.isinf(layer.thickness):
         return np.zeros_like(cosine)
     depth = layer.mu_t * layer.thickness
@@ -194,7 +191,7 @@ def _kept(layer: Layer, cosine: Floats) -> Floats:
 
 
 def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) -> Floats:
-    """alpha / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
+    """Return alpha / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
     reached = (one.cosine > 0) & (other.cosine > 0)
     into, out = np.where(reached, one.cosine, 1.0), np.where(reached, other.cosine, 1.0)
     depth = layer.mu_t * layer.thickness if np.isfinite(layer.thickness) else np.inf
@@ -211,7 +208,7 @@ def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) 
 
 
 def _spent(depth: float, rate: Floats) -> Floats:
-    """int_0^depth e^{-rate t} dt, also where the rate is 0, or the depth infinite."""
+    """Return int_0^depth e^{-rate t} dt, also where the rate is 0, or the depth infinite."""
     if np.isinf(depth):
         return 1.0 / rate
     fast = np.where(rate > 0, rate, 1.0)

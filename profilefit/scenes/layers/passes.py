@@ -1,4 +1,4 @@
-"""The passes of layered objects: samples of a stack's law with the thickness of each pixel; light scattered once.
+"""Passes of layered objects: samples of a stack's law with the thickness of each pixel; light scattered once.
 
 The G-buffer's `reflectance_map` holds a share of the way from the least thickness of the first layer to the most.
 """
@@ -20,7 +20,8 @@ from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.layers.truth import LEFT, StackTable
 from profilefit.scenes.stage.exact_law import columns, row, table_text
 from profilefit.scenes.stage.gather import Gather
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
+from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 
@@ -35,7 +36,7 @@ RULE = 24  # directions of its quadrature, for slope and azimuth each
 
 
 def thickness_text(least: float, most: float) -> str:
-    """GLSL of the thickness at a pixel, an expression of `surface`."""
+    """Return GLSL of the thickness at a pixel, an expression of `surface`."""
     return f"mix({literal(least)}, {literal(most)}, surface.r)"
 
 
@@ -66,14 +67,14 @@ float {LAW}_cumulated(float x, {LAW}_Shape s) {{
 
 
 def of_stack(laws: Sequence[StackLaw], least: float, most: float, plates: Sequence[Plate]) -> StackGather:
-    """Samples of a stack's law with the thickness at each pixel."""
+    """Return samples of a stack's law with the thickness at each pixel."""
     shape = f"{LAW}_shape(float(c), {thickness_text(least, most)})"
     law = LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)")
     return StackGather(law, tuple(plates))
 
 
 def of_table(table: StackTable, plates: Sequence[Plate]) -> StackGather:
-    """Samples of exact light by tables, the nearest of ROWS thicknesses at each pixel: what a closed form saves."""
+    """Return samples of exact light by tables, of the nearest of ROWS thicknesses at each pixel."""
     values = np.repeat(np.linspace(0.0, 1.0, ROWS), len(CHANNELS))
     curves, (t, x) = table.curves(values), columns()
     every = np.broadcast_to(x, (values.size, x.size))
@@ -88,7 +89,7 @@ def of_table(table: StackTable, plates: Sequence[Plate]) -> StackGather:
 
 
 def _radii(t: Floats, x: Floats, share: Floats) -> Floats:
-    """x at which all but e^-t of the light is within; beyond what a table tells, as it goes on."""
+    """Return x at which all but e^-t of the light is within; beyond what a table tells, as it goes on."""
     depth = -np.log(np.maximum(1.0 - share, LEFT))
     told = np.searchsorted(depth, depth[-1])  # the first column with all that is told
     ln = np.interp(t, depth[: told + 1], np.log(x[: told + 1]))
@@ -100,14 +101,14 @@ def _radii(t: Floats, x: Floats, share: Floats) -> Floats:
 
 
 def of_gaussians(sums: Sequence[MediumGaussians], plates: Sequence[Plate]) -> StackGather:
-    """Samples of sums of Gaussians, of red, green and blue, which are of one thickness everywhere."""
+    """Return samples of sums of Gaussians, of red, green and blue, which are of one thickness everywhere."""
     text = gaussians_text(sums, name=LAW)
     law = LawText("gaussians", text, {}, f"{LAW}_shape(float(c))", f"{LAW}_reflectance(shape)")
     return StackGather(law, tuple(plates))
 
 
 def of_half_space(law: ProfileLaw) -> Gather:
-    """Samples of one half space everywhere, that of the stage's `fixed_alpha`, with the reflectance of the law."""
+    """Return samples of one half space everywhere, that of the stage's `fixed_alpha`, with the law's reflectance."""
     shape = f"{LAW}_shape(fixed_alpha[c])"
     return Gather(LawText(prefix(law), law_text(law, name=LAW), {}, shape, f"{LAW}_reflectance(shape)"))
 
@@ -122,15 +123,15 @@ class WithSingle(Technique):
     media  of red, green, blue;  least, most  thickness of the first layer where the map is 0 and 1
     """
 
-    by: Gather
+    by: Technique
     media: tuple[Medium, Medium, Medium]
     least: float
     most: float
     table: Singles
 
     @classmethod
-    def of(cls, by: Gather, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
-        """With its table of exitances, a quadrature of seconds."""
+    def of(cls, by: Technique, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
+        """Return the technique with its table of exitances, a quadrature of seconds."""
         return cls(by, media, least, most, once_table(media, least, most))
 
     def passes(self, frame: Frame) -> Sequence[Pass]:
@@ -149,7 +150,7 @@ class WithSingle(Technique):
 
 
 def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
-    """(SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines 0 to 1 along rows."""
+    """Return (SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines 0 to 1 along rows."""
     cosine = np.maximum(np.linspace(0.0, 1.0, COSINES), GRAZING)
     thickness = np.linspace(least, most, SHARES)
     rows = [[once(one.with_first(max(d, LEAST * one.layers[0].mfp)), cosine) for one in media] for d in thickness]
@@ -157,7 +158,7 @@ def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
 
 
 def once(medium: Medium, cosine: Floats) -> Floats:
-    """Share of the light of each direction, cosines (m,), that leaves above after one scattering [-]."""
+    """Return the share of the light of each direction, cosines (m,), that leaves above after one scattering [-]."""
     node, weight = np.polynomial.legendre.leggauss(RULE)
     mu, of_mu = 0.5 * (node + 1.0), 0.5 * weight
     turn, of_turn = 0.5 * np.pi * (node + 1.0), np.pi * weight  # both sides of the plane are alike
@@ -166,14 +167,14 @@ def once(medium: Medium, cosine: Floats) -> Floats:
 
 
 def diffusely_once(medium: Medium) -> float:
-    """The same of diffuse light [-]."""
+    """Return the share of diffuse light that leaves above after one scattering [-]."""
     node, weight = np.polynomial.legendre.leggauss(RULE)
     cosine = 0.5 * (node + 1.0)
     return float(np.sum(weight * cosine * once(medium, cosine)))
 
 
 def alike_error(medium: Medium) -> float:
-    """What it costs to have light scattered once leave like all other light, in all directions alike.
+    """Return the error of having light scattered once leave like all other light, equally in all directions.
 
     Mean over diffuse light and diffusely placed eyes of |pi L - its exitance|, as a share of white [-]. No root mean
     square: where nothing refracts a few grazing directions would be all of it.

@@ -1,8 +1,8 @@
-"""A head of layers: STACK.toml with a light and a camera, drawn in any pose with nothing worked out before for it."""
+"""Head of layers: STACK.toml with a light and a camera, drawn in any pose with nothing worked out before for it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import moderngl
@@ -23,13 +23,11 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
-from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.gather import Gather
-from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.picture import Drawn
-from profilefit.scenes.stage.request import Shown, ViewRequest
+from profilefit.scenes.stage.judge import Judge, surface_judge
+from profilefit.scenes.stage.picture import RenderResult
+from profilefit.scenes.stage.request import ViewRequest
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_integral import exitance_of, own_error
+from profilefit.scenes.stage.technique import TechniquePair, alone
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
 Floats = NDArray[np.float64]
@@ -48,7 +46,7 @@ COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is
 
 @dataclass(frozen=True)
 class LayersRequest(ViewRequest):
-    """What a file requests.
+    """Picture of a layered head that a file requests.
 
     least, most  thickness of the first layer where values (rows, columns) are 0 and 1 [mm];  row 0 at the top
     single       whether light scattered once leaves in its own directions
@@ -64,17 +62,17 @@ class LayersRequest(ViewRequest):
 
     @property
     def media(self) -> tuple[Medium, Medium, Medium]:
-        """Of red, green, blue."""
+        """Stacks of red, green, blue."""
         return self.stack.stack.media
 
     @property
     def mfp(self) -> Rgb:
-        """Of the first layer, red, green, blue [mm]."""
+        """Transport mean free path of the first layer, red, green, blue [mm]."""
         return rgb(medium.layers[0].mfp for medium in self.media)
 
 
 def read(file: str, content: Table) -> LayersRequest:
-    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
     stack = requested(file, content)
@@ -93,69 +91,54 @@ def read(file: str, content: Table) -> LayersRequest:
     )
 
 
-def draw(context: moderngl.Context, of: LayersRequest) -> Drawn:
-    """The picture, its truth, error and cost: some minutes, most of them for exact light at nine thicknesses."""
+def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
+    """Draw the picture beside its reference, with error and cost: minutes, for exact light at nine thicknesses."""
     scene = scene_of(of)
-    with Stage(context, (2 * of.size[0], 2 * of.size[1])) as stage:
-        stage.draw(scene)
-        fine = stage.buffers()
-    request.require_lit(of.file, fine)  # before the minutes that exact light takes
-    table = stack_table(of.media, of.least, of.most, of.stack.illumination)
-    way = technique(of, laws_of(of.stack) if of.kind in OF_LAW else None)
     with Stage(context, of.size) as stage:
-        judge = way.judged(judged(stage, of, table))
-        return request.drawn(judge, of, way.shown(of), own_error(fine, of.mfp, table))
+        stage.draw(scene)
+        request.require_lit(of.file, stage.buffers())  # before the minutes that exact light takes
+        table = stack_table(of.media, of.least, of.most, of.stack.illumination)
+        pair = technique(of, laws_of(of.stack) if of.kind in OF_LAW else None)
+        if of.single:
+            pair = pair._replace(seen=passes.WithSingle.of(pair.by, of.media, of.least, of.most))
+        return request.rendered(stage, surface_judge(stage, scene, of.mfp, table), of, pair)
 
 
-def judged(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
-    """The scene drawn, with its truth: the stack at each point, by the surface integral."""
-    stage.draw(scene_of(of))
-    buffers = stage.buffers()
-    request.require_lit(of.file, buffers)
-    return Judge(stage, of.mfp, exitance_of(buffers, of.mfp, table), buffers.mask > INSIDE)
+def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
+    """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
+    scene = scene_of(of)
+    stage.draw(scene)
+    request.require_lit(of.file, stage.buffers())
+    return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 
-@dataclass(frozen=True)
-class Way:
-    """A technique, and what the stage is told besides: lengths [mm] and, of half spaces, albedos of the three."""
+def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> TechniquePair:
+    """Return the technique of a `kind`, without light scattered once by itself.
 
-    label: str
-    by: Gather
-    mfp: Rgb
-    alpha: Rgb | None = None
+    It is the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
 
-    def judged(self, judge: Judge) -> Judge:
-        """What judges it."""
-        return replace(judge, mfp=self.mfp, alpha=self.alpha)
-
-    def shown(self, of: LayersRequest) -> Shown:
-        """With light scattered once in its own directions, where that is requested."""
-        seen = passes.WithSingle.of(self.by, of.media, of.least, of.most) if of.single else self.by
-        return Shown(self.label, self.by, seen)
-
-
-def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Way:
-    """By `kind`: the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
-
-    laws  of red, green, blue, which the first and the last of these need
+    Args:
+        of: the request.
+        laws: of red, green and blue, which the first and the last of these need.
     """
     light, n = of.stack.illumination, of.media[0].layers[0].n
     if of.kind in OF_LAW:  # of which the last one's light does not leave its pixel
         assert laws is not None
         plates = [plate_of(medium, light) for medium in of.media]
         lengths = of.mfp if of.kind == "stack" else (NO_LENGTH,) * 3
-        return Way(of.kind, passes.of_stack(laws, of.least, of.most, plates), lengths)
+        return alone(of.kind, passes.of_stack(laws, of.least, of.most, plates), lengths)
     if of.kind == "dipole":
         dipole = catalogue.load("dipole", setting=Setting(n=n))
         alpha = rgb(medium.layers[0].alpha for medium in of.media)
-        return Way("dipole of the first layer", passes.of_half_space(dipole), of.mfp, alpha)
+        return alone("dipole of the first layer", passes.of_half_space(dipole), of.mfp, alpha)
     near = [one_half_space(medium, light) for medium in of.media]
     hazard = catalogue.load("hazard", setting=Setting(light, n=n))
-    return Way(of.kind, passes.of_half_space(hazard), rgb(one.mfp for one in near), rgb(one.alpha for one in near))
+    lengths, albedos = rgb(one.mfp for one in near), rgb(one.alpha for one in near)
+    return alone(of.kind, passes.of_half_space(hazard), lengths, albedos)
 
 
 def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
-    """Those of a record of these very layers, in ./fits or that is shipped; fitted now where there is none."""
+    """Return the laws of a record of these very layers, in ./fits or shipped; fitted now where there is none."""
     for folder in (LOCAL, fits_folder()):
         if (record := matching(stack, folder)) is not None:
             return record.laws
@@ -165,7 +148,7 @@ def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 
 
 def scene_of(of: LayersRequest) -> Scene:
-    """The head in its pose; what its texture holds is the share of the way from the least thickness to the most."""
+    """Return the head in its pose; its texture is the share of the way from the least thickness to the most."""
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     values = np.repeat(of.values[::-1, :, None], len(CHANNELS), axis=-1)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
@@ -174,7 +157,7 @@ def scene_of(of: LayersRequest) -> Scene:
 
 
 def posed(points: Floats, pose: str) -> Floats:
-    """Points of the head at rest, moved: the neck stays, the head turns about it or nods, smoothly between."""
+    """Return points of the head at rest, moved: the neck stays, the head turns about it or nods, smoothly between."""
     share = np.clip((points[:, 1] + 170.0) / 130.0, 0.0, 1.0)
     angle = {"rest": 0.0, "turn": np.radians(25.0), "nod": np.radians(12.0)}[pose] * share**2 * (3.0 - 2.0 * share)
     c, s = np.cos(angle), np.sin(angle)
@@ -187,7 +170,7 @@ def posed(points: Floats, pose: str) -> Floats:
 
 
 def _thickness(tables: Tables, content: Table, stack: StackRequest) -> tuple[float, float, NDArray[np.float32]]:
-    """Least and most of the first layer [mm], and where between it is over u and v, row 0 at the top."""
+    """Return least and most of the first layer [mm], and where between it is over u and v, row 0 at the top."""
     given = stack.stack.map
     if given is not None:
         if "uneven" in content:
@@ -202,7 +185,7 @@ def _thickness(tables: Tables, content: Table, stack: StackRequest) -> tuple[flo
 
 
 def mottled() -> NDArray[np.float32]:
-    """(rows, columns) in [0, 1]: soft blotches of several sizes over the head, the same each time."""
+    """Return (rows, columns) in [0, 1]: soft blotches of several sizes over the head, the same each time."""
     random = np.random.default_rng(SEED)
     v, u = np.meshgrid(np.linspace(0, 1, COLUMNS // 2), np.linspace(0, 1, COLUMNS), indexing="ij")
     total = np.zeros_like(u)
@@ -215,7 +198,7 @@ def mottled() -> NDArray[np.float32]:
 
 
 def _single(tables: Tables, named: Table, stack: StackRequest) -> bool:
-    """Whether light scattered once is drawn by itself: as the file says, else where it is more than negligible."""
+    """Return whether light scattered once is drawn by itself: as the file says, else where it is not negligible."""
     value: Any = named.get("single", "auto")
     if isinstance(value, bool):
         return value

@@ -45,12 +45,12 @@ class StackTable:
     kappa: tuple[float, ...]
 
     def colour(self, values: ArrayLike) -> Floats:
-        """A [-] of red, green and blue along a last axis, at values in [0, 1] of any shape."""
+        """Return A [-] of red, green and blue along a last axis, at values in [0, 1] of any shape."""
         u = self._place(np.asarray(values, float))
         return np.stack([spline(u) for spline in self.reflectance], axis=-1)
 
     def curves(self, values: ArrayLike, /) -> Curves:
-        """As `CurveTable.curves`."""
+        """Return the curves, as `CurveTable.curves`."""
         given, y = np.asarray(values, float), knots()
         u = self._place(given)
         size = (given.size, y.size - 1, 4)
@@ -72,7 +72,7 @@ class StackTable:
 def stack_table(
     media: tuple[Medium, Medium, Medium], least: float, most: float, illumination: str = "diffuse"
 ) -> StackTable:
-    """The table of a stack whose first layer is from `least` to `most` thick; x = r / l, l that layer's mean free path.
+    """Return the table of a stack whose first layer is `least` to `most` thick; x = r / l, l its mean free path.
 
     media  of red, green, blue, of one index and g = 0;  thicknesses in their unit, 0 <= least < most
     Between thicknesses, to 99.5 % of the light: A is right to 1e-5 and R_d to 1e-3 (relative), the cdf to 2e-5, where
@@ -88,7 +88,11 @@ def stack_table(
     count = max(THICKNESSES, 1 + int(np.ceil(np.log(most / low) / WIDEST)))
     u, y = np.linspace(np.log(low), np.log(most), count), knots()
     profile, cdf, reflectance, kappa = [], [], [], []
-    rates = {medium: _slowest(medium) for medium in media}  # channels that are alike are solved once
+    # Far off light decays as in the layer in which it is slowest; rates in 1 / l. Equal channels are solved once.
+    rates = {
+        medium: min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * medium.layers[0].mfp
+        for medium in media
+    }
     solved = {one: _rows(one, np.exp(u), illumination, y, rate) for one, rate in rates.items()}
     for medium in media:
         rate = rates[medium]
@@ -101,7 +105,7 @@ def stack_table(
 
 
 def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
-    """Of each thickness of the first layer."""
+    """Return a row for each thickness of the first layer."""
     shapes: dict[float, tuple[Floats, Floats]] = {}
 
     def under(d: float) -> exact.Solution:
@@ -117,7 +121,7 @@ def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rat
 
 
 def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:
-    """ln(R_d l^2 / A) + kappa x, and ln(cdf / x)."""
+    """Return ln(R_d l^2 / A) + kappa x, and ln(cdf / x)."""
     unit, x = light.medium.layers[0].mfp, np.exp(y)
     share = np.clip(np.asarray(light.cdf(unit * x)), 0.0, 1.0)
     value = np.asarray(light.profile(unit * x)) * unit**2 / light.reflectance
@@ -127,9 +131,3 @@ def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Float
     kept = held(bright[None, :])[0]
     known = np.log(value[kept]) + rate * x[kept] - 2.0 * (y - y[kept])
     return known, np.log(share / x)
-
-
-def _slowest(medium: Medium) -> float:
-    """Rate at which light decays far off, in 1 / l of the first layer: that of the layer in which it is slowest."""
-    l1 = medium.layers[0].mfp
-    return min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * l1

@@ -22,5 +22,5 @@ __all__ = ["beam_share", "caustic_irradiance", "first_hit", "haltrin", "segment_
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return what an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

@@ -1,4 +1,4 @@
-"""What water leaves of light on its way, in three ways to count it, and what it scatters toward an eye.
+"""Light that water leaves on its way, by three techniques, and light that it scatters toward an eye.
 
 Single scattering takes all that is scattered out of a ray for lost; its scaled form keeps the forward peak (Joseph,
 Wiscombe & Weinman, J. Atmos. Sci. 33, 2452, 1976). Neither holds in the sea, whose light is scattered by small angles
@@ -31,7 +31,7 @@ DARKEST = 700.0  # optical length in a table where nothing is left: a shader can
 
 
 def ways(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes, kind: str) -> tuple[Floats, Floats, Floats]:
-    """Optical lengths -ln(share left) [-] that stand for c t: of what is sharp, of a shaft, and of wide light.
+    """Return optical lengths -ln(share left) [-] that stand for c t: of what is sharp, of a shaft, and of wide light.
 
     omega, ct, cw  albedo, length and half-width of the shaft [-], which broadcast;  lobes  as of `law.beam_share`
     kind           one of `KINDS`; the last two leave the same of all three
@@ -53,7 +53,7 @@ def ways(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes, kind: str
 
 
 def sunlit_haze(omega: float, ct: float, cosine: float, lobes: Lobes, kind: str) -> float:
-    """Radiance toward an eye in a calm, deep sea under an overhead sun, by the sun's irradiance there [1/sr].
+    """Return radiance toward an eye in a calm, deep sea under an overhead sun, by the sun's irradiance there [1/sr].
 
     ct  depth of the eye [-];  cosine  of the view to the downward vertical, 0 horizontal, 1 straight down
 
@@ -71,12 +71,12 @@ def sunlit_haze(omega: float, ct: float, cosine: float, lobes: Lobes, kind: str)
 
 
 def unscattered(cosine: ArrayLike) -> Any:
-    """Share of turns with this cosine whose light was not scattered before [-]."""
+    """Return the share of turns with this cosine whose light was not scattered before [-]."""
     return np.exp(-(1.0 - np.asarray(cosine, float)) / TURN)[()]
 
 
 def turned(lobes: Lobes, view: Floats, light: Floats) -> tuple[Floats, Floats]:
-    """Phase function of light that turns into a view, the mean over all azimuths between both [1/sr]: two of (v, n).
+    """Return phase function of light that turns into a view, the mean over azimuths between both [1/sr]: two (v, n).
 
     view, light  (v,), (n,) cosines to one upright
 
@@ -97,7 +97,7 @@ def turned(lobes: Lobes, view: Floats, light: Floats) -> tuple[Floats, Floats]:
 
 
 def table(c: Floats, omega: Floats, width: float, lobes: Lobes, kind: str, lengths: Floats) -> NDArray[np.float32]:
-    """(3, n, 4) for glsl/view.frag: `ways` in rows, of red, green and blue, over lengths (n,) [m]."""
+    """Return (3, n, 4) for glsl/view.frag: `ways` in rows, of red, green and blue, over lengths (n,) [m]."""
     columns: list[Any] = [
         ways(some, rate * lengths, rate * width, lobes, kind) for rate, some in zip(c, omega, strict=True)
     ]

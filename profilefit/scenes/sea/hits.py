@@ -1,4 +1,4 @@
-"""Where a ray meets an uneven floor: the first crossing, by steps and Newton's iteration, and the plain iterations.
+"""First hit of a ray on an uneven floor, by steps and Newton's iteration; and the plain iterations.
 
 Li, Wang, Li, Zhao, Wang and Liu (J. Image Graphics 16(8), 2011) find it by "about 3" Newton iterations from a distance
 of 1; Shah, Konttinen and Pattanaik (IEEE TVCG 13(2), 2007) by an iteration without slopes. Either holds while
@@ -40,7 +40,7 @@ def first_hit(
     newton: int = NEWTON,
     precision: type[np.floating] = np.float64,
 ) -> Floats | float:
-    """Distance along a ray to where it first comes through z = height(x, y) from above [m]; nan where it never does.
+    """Return the distance along a ray to its first hit on z = height(x, y) from above [m]; nan where there is none.
 
     origin, direction  (..., 3), z up; of unit length [m, -]
     lowest, highest    between which the height stays [m]
@@ -74,7 +74,7 @@ def first_hit(
 def dense_hit(
     height: Height, origin: ArrayLike, direction: ArrayLike, lowest: float, highest: float, steps: int = DENSE
 ) -> Floats:
-    """The reference: thousands of steps, and bisection to the last digit."""
+    """Return the reference of `first_hit`: thousands of steps, and bisection to the last digit."""
     where, along = _rays(origin, direction)
     near, far = _bracket(height, where, along, *_bounds(lowest, highest), checked_whole("steps", steps, 1))
     for _ in range(BISECTIONS):
@@ -85,7 +85,7 @@ def dense_hit(
 
 
 def to_plane(origin: ArrayLike, direction: ArrayLike, level: float) -> Floats:
-    """Distance along a ray to the plane z = level [m]; nan where the ray is level or goes away from it."""
+    """Return the distance along a ray to the plane z = level [m]; nan where the ray is level or goes away from it."""
     where, along = _rays(origin, direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (level - where[..., 2]) / along[..., 2]
@@ -95,7 +95,7 @@ def to_plane(origin: ArrayLike, direction: ArrayLike, level: float) -> Floats:
 def newton_hit(
     height: Height, slope: Slope, origin: ArrayLike, direction: ArrayLike, start: ArrayLike, iterations: int = NEWTON
 ) -> Floats:
-    """Plain Newton iterations from a distance [m]: k - f / f', f' = r_z - grad H . r_xy. It may diverge for S >= 1."""
+    """Return plain Newton iterations from a distance [m]: k - f / f', f' = r_z - grad H . r_xy; diverges if S >= 1."""
     where, along = _rays(origin, direction)
     k = np.asarray(start, float) + np.zeros(where.shape[:-1])
     for _ in range(checked_whole("iterations", iterations, 0)):
@@ -106,7 +106,7 @@ def newton_hit(
 def shah_hit(
     height: Height, origin: ArrayLike, direction: ArrayLike, start: ArrayLike, iterations: int = NEWTON
 ) -> Floats:
-    """Shah et al.'s iteration from a distance [m]: k - f / r_z, as if the floor were level. It may diverge, too."""
+    """Return Shah et al.'s iteration from a distance [m]: k - f / r_z, as if the floor were level; may diverge, too."""
     where, along = _rays(origin, direction)
     k = np.asarray(start, float) + np.zeros(where.shape[:-1])
     for _ in range(checked_whole("iterations", iterations, 0)):
@@ -115,7 +115,7 @@ def shah_hit(
 
 
 def steepness(steepest: float, direction: ArrayLike) -> Floats:
-    """S [-]: the floor's largest slope times the tangent of each ray to the vertical. A ray hits once if S < 1."""
+    """Return S [-], the floor's largest slope times the ray's tangent to the vertical: a ray hits once if S < 1."""
     _, along = _rays(np.zeros(3), direction)
     with np.errstate(divide="ignore"):
         return steepest * np.hypot(along[..., 0], along[..., 1]) / np.abs(along[..., 2])
@@ -131,7 +131,7 @@ def wrong_shares(
     iterations: int = NEWTON,
     seed: int = 0,
 ) -> Floats:
-    """Shares of rays whose hit is off by more than 1 % of the depth, of each way at each S: (ways, steepnesses).
+    """Return shares of rays whose hit is off by more than 1 % of the depth, of each way at each S: (ways, steepnesses).
 
     ways         a number of steps before the safeguarded iterations, or one of `PLAIN`
     steepnesses  S by the steepest place of the floor and the ray that a calm sea refracts [-]
@@ -180,7 +180,7 @@ def _bracket(
     steps: int,
     rate: Callable[[Floats], Floats] | None = None,
 ) -> tuple[Floats, Floats]:
-    """Distances between which a ray first comes through the surface; nan where it does not.
+    """Return distances between which a ray first comes through the surface; nan where it does not.
 
     rate  of the gap, by its distance: where a step begins falling and ends rising, the lowest place between, that of a
           cubic with both rates, is looked at, too. Without it such a dip is missed
@@ -220,7 +220,7 @@ def _bracket(
 
 
 def _least(start: Floats, end: Floats, begins: Floats, ends: Floats) -> Floats:
-    """Where in [0, 1] a cubic of these values and slopes at 0 and 1 is least, if it falls at 0 and rises at 1."""
+    """Return where in [0, 1] a cubic of these values and slopes at 0 and 1 is least, if it falls and then rises."""
     linear, cubic = 3.0 * (end - start) - 2.0 * begins - ends, begins + ends - 2.0 * (end - start)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = -begins / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * begins, 0.0)))
@@ -236,7 +236,7 @@ def _safeguarded(
     far: Floats,
     iterations: int,
 ) -> Floats:
-    """Newton's iteration from the chord of a bracket: a step that would leave it is a bisection instead."""
+    """Return Newton's iteration from the chord of a bracket: a step that would leave it is a bisection instead."""
     above, below = (_gap(height, origin, direction, end) for end in (near, far))
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(above > np.minimum(below, 0.0), above / (above - np.minimum(below, 0.0)), 0.0)
@@ -250,25 +250,25 @@ def _safeguarded(
 
 
 def _gap(height: Height, origin: Floats, direction: Floats, k: Floats) -> Floats:
-    """How far a ray is above the surface after a distance [m]."""
+    """Return the height of a ray above the surface after a distance [m]."""
     x, y, z = (origin[..., axis] + k * direction[..., axis] for axis in range(3))
     return np.asarray(z - np.asarray(height(x, y), k.dtype))
 
 
 def _slack(lengths: Floats) -> float:
-    """Relative tolerance of lengths in their precision [-]."""
+    """Return the relative tolerance of lengths in their precision [-]."""
     return max(SLACK, 4.0 * float(np.finfo(lengths.dtype).eps))
 
 
 def _rate(slope: Slope, origin: Floats, direction: Floats, k: Floats) -> Floats:
-    """Change of that with the distance [-]."""
+    """Return the change of `_gap` with the distance [-]."""
     zx, zy = slope(*(origin[..., axis] + k * direction[..., axis] for axis in range(2)))
     zx, zy = np.asarray(zx, k.dtype), np.asarray(zy, k.dtype)
     return np.asarray(direction[..., 2] - zx * direction[..., 0] - zy * direction[..., 1])
 
 
 def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
-    """Both as float64 arrays of one shape (..., 3)."""
+    """Return origins and directions as float64 arrays of one shape (..., 3)."""
     found = []
     for name, value in (("origin", origin), ("direction", direction)):
         array = checked_numbers(name, value, "finite numbers (..., 3)")

@@ -42,7 +42,7 @@ ROUNDING = 1e-9  # by which weights may exceed 1
 
 
 class Longer(NamedTuple):
-    """What longer paths take from light in all the plane: e^-X, X = size omega (1 - omega)^absorbed D (ct)^depth.
+    """Light in all the plane that longer paths take: e^-X, X = size omega (1 - omega)^absorbed D (ct)^depth.
 
     D is the mean of 1 - cos over all that is scattered onward. Fitted to photons of three phase functions (one, two
     and three terms of mean cosines 0.924 to 0.928), omega 0.2, 0.5, 0.8 and ct 0.5, 1, 2, 4; its errors beside.
@@ -75,7 +75,7 @@ HALVINGS = 60
 
 
 def beam_share(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes) -> Any:
-    """Share of a pencil beam's light that crosses the plane at a depth downward within a radius [-].
+    """Return the share of a pencil beam's light that crosses the plane at a depth downward within a radius [-].
 
     omega, ct, cw  albedo in [0, 1], depth >= 0 and radius >= 0 (inf: the whole plane), which broadcast
     lobes          (weight, g) of Henyey and Greenstein's terms; what the weights leave to 1 is lost
@@ -95,7 +95,7 @@ def beam_share(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes) -> 
 
 
 def water_mtf(omega: ArrayLike, ct: ArrayLike, k_over_c: ArrayLike, lobes: Lobes) -> Any:
-    """Contrast that water leaves of a pattern of light of frequency k across it, times its mean [-].
+    """Return the contrast that water leaves of a pattern of light of frequency k across it, times its mean [-].
 
     omega, ct, k_over_c  albedo, depth and angular frequency >= 0 [-], which broadcast;  lobes  as of `beam_share`
 
@@ -124,18 +124,18 @@ class WaterGaussians(NamedTuple):
     error: float
 
     def mtf(self, k_over_c: ArrayLike) -> Any:
-        """E at frequencies [-]."""
+        """Return E at frequencies [-]."""
         square = 0.5 * np.asarray(k_over_c, float)[..., None] ** 2
         return (self.unscattered + np.exp(-square * self.variances) @ self.weights)[()]
 
     def share(self, cw: ArrayLike) -> Any:
-        """Share within a radius [-]."""
+        """Return the share within a radius [-]."""
         square = 0.5 * np.asarray(cw, float)[..., None] ** 2
         return (self.unscattered - np.expm1(-square / self.variances) @ self.weights)[()]
 
 
 def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterGaussians:
-    """`water_mtf` as unscattered light and 1 to 8 Gaussians: least squares over frequencies even in ln k.
+    """Fit unscattered light and 1 to 8 Gaussians to `water_mtf`: least squares over frequencies even in ln k.
 
     Variances by least squares within bounds, and the weights, none negative, to each of them.
     """
@@ -155,7 +155,7 @@ def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterG
     target = _scattered(albedo, depth, frequency, terms) / whole
 
     def weighted(logs: Floats) -> tuple[Floats, Floats]:
-        """Weights that sum to 1, and what they miss."""
+        """Return weights that sum to 1, and the error that they leave."""
         table = np.exp(-0.5 * np.square(frequency)[:, None] * np.exp(logs))
         rows = np.vstack([table, np.full(number, 1e3)])  # the last one, which counts for all, keeps the energy
         found = nnls(rows, np.append(target, 1e3))[0]
@@ -174,7 +174,7 @@ def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterG
 
 
 def failing_depth(omega: ArrayLike, cw: ArrayLike, lobes: Lobes, by: float = 0.1) -> Any:
-    """b t [-] at which e^-ct, the share that is not scattered, is too dark by a part of itself; inf where it never is.
+    """Return b t [-] at which e^-ct, the unscattered share, is too dark by a part of itself; inf where it never is.
 
     omega, cw  which broadcast;  by  by how much there is more light within the radius than e^-ct, > 0
     """
@@ -195,7 +195,7 @@ def failing_depth(omega: ArrayLike, cw: ArrayLike, lobes: Lobes, by: float = 0.1
 
 
 def segment_integral(c: ArrayLike, s0: ArrayLike, t0: ArrayLike, m: ArrayLike, t1: ArrayLike) -> Any:
-    """int_0^t1 e^{-c (s0 + m t)} e^{-c (t0 + t)} dt [length]: what a beam brings to a view ray, and that to an eye.
+    """Return int_0^t1 e^{-c (s0 + m t)} e^{-c (t0 + t)} dt [length]: light of a beam that a view ray brings to an eye.
 
     c       attenuation >= 0 [1/length];  m  cosine of the view ray to the beam, in [-1, 1]; -1 looks along it
     s0, t0  way of the light to the segment's begin, and from there to the eye, >= 0
@@ -226,7 +226,7 @@ def segment_integral(c: ArrayLike, s0: ArrayLike, t0: ArrayLike, m: ArrayLike, t
 
 
 def segment_between(begin: ArrayLike, end: ArrayLike, t1: ArrayLike) -> Any:
-    """The same of optical ways at both ends of a segment: t1 e^{-min} phi(|begin - end|) [length].
+    """Return that integral of optical ways at both ends of a segment: t1 e^{-min} phi(|begin - end|) [length].
 
     begin, end  c (s + t) >= 0 [-] of light that is scattered there, s to the place and t on to the eye;  t1  length
 
@@ -241,7 +241,7 @@ def segment_between(begin: ArrayLike, end: ArrayLike, t1: ArrayLike) -> Any:
 
 
 def onward(g: float) -> tuple[float, float]:
-    """Of Henyey and Greenstein's lobe: share that goes onward, F = int_0^1 p dcos, and D = int_0^1 (1 - cos) p dcos."""
+    """Return F = int_0^1 p dcos, a Henyey-Greenstein lobe's share that goes onward, and int_0^1 (1 - cos) p dcos."""
     if abs(g) < 1e-3:  # p = (1 + 3 g cos) / 2
         return 0.5 + 0.75 * g, 0.25 + 0.25 * g
     root = np.sqrt(1.0 + g * g)
@@ -251,7 +251,7 @@ def onward(g: float) -> tuple[float, float]:
 
 
 def _gain(omega: Any, depth: Any, frequency: Any, terms: Floats) -> Any:
-    """G(k), which may be complex; at k = inf 0."""
+    """Return G(k), which may be complex; at k = inf 0."""
     share, deviation = np.array([onward(g) for g in terms[:, 1]]).T
     share, deviation = terms[:, 0] @ share, terms[:, 0] @ deviation
     excess = FITTED.size * omega * (1.0 - omega) ** FITTED.absorbed * deviation * depth**FITTED.depth
@@ -267,7 +267,7 @@ def _gain(omega: Any, depth: Any, frequency: Any, terms: Floats) -> Any:
 
 
 def _mean_decay(x: Any) -> Any:
-    """(1 - e^-x) / x."""
+    """Return (1 - e^-x) / x."""
     small = np.abs(x) < 1e-8
     safe = np.where(small, 1.0, x)
     with np.errstate(under="ignore"):
@@ -275,14 +275,14 @@ def _mean_decay(x: Any) -> Any:
 
 
 def _scattered(omega: Any, depth: Any, frequency: Any, terms: Floats) -> NDArray:
-    """E(k) - e^-ct, without cancellation where little is scattered, and without overflow where ct is large."""
+    """Return E(k) - e^-ct, without cancellation where little is scattered, and without overflow where ct is large."""
     gain, straight = _gain(omega, depth, frequency, terms), np.exp(-depth)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         return np.where(depth > 1.0, np.exp(gain - depth) - straight, straight * np.expm1(gain))
 
 
 def _within(omega: Floats, depth: Floats, radius: Floats, terms: Floats) -> Floats:
-    """`beam_share` of arrays (n,)."""
+    """Return `beam_share` of arrays (n,)."""
     found = np.exp(-depth)
     for first in range(0, radius.size, TOGETHER):
         part = slice(first, first + TOGETHER)
@@ -299,7 +299,7 @@ def _within(omega: Floats, depth: Floats, radius: Floats, terms: Floats) -> Floa
 
 
 def _checked(**values: ArrayLike) -> list[Floats]:
-    """Numbers that broadcast: omega in [0, 1], cw and t1 >= 0 or inf, the others finite and >= 0."""
+    """Return numbers that broadcast: omega in [0, 1], cw and t1 >= 0 or inf, the others finite and >= 0."""
     found = []
     for name, value in values.items():
         if name == "omega":

@@ -1,4 +1,4 @@
-"""The truth of a view under the sea: all light that comes to a pixel, of all orders, by paths followed backward.
+"""Reference of a view under the sea: all light that comes to a pixel, of all orders, by paths followed backward.
 
 Whatever a path is scattered or reflected by is lit by the sun as its rays came through the waves, `Sunlight`, and by
 the sky where a path leaves the water. Of the picture that this judges it has the world and the first refraction, none
@@ -16,7 +16,6 @@ from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
 from profilefit.scenes.sea.hits import first_hit
-from profilefit.scenes.sea.photons import turn
 from profilefit.scenes.sea.reference import Photons, boxes
 from profilefit.scenes.sea.waves import Waves, refracted
 from profilefit.scenes.sea.world import World
@@ -66,25 +65,22 @@ class Sunlight:
             self.around = Mixture((0.5, 0.5), (world.phase, HenyeyGreenstein(max(1.0 - spread, 0.0))))
 
     def at(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
-        """Flux (n,) per horizontal area, over the sun's across its rays in air; and the unit way (n, 3) it goes."""
+        """Return flux (n,) per horizontal area, over the sun's across its rays in air, and its unit way (n, 3)."""
         level = np.clip((self.top - z) / self.step, 0.0, len(self.light) - 1.000001)
         whole = level.astype(int)
         rest = (level - whole)[:, None]
-        at = self._pixel(x + self.calm * z, y)
+        row, column = (np.floor(np.mod(one / self.tile, 1.0) * self.pixels) for one in (y, x + self.calm * z))
+        row, column = (np.minimum(one.astype(int), self.pixels - 1) for one in (row, column))
+        at = row * self.pixels + column
         found = (1.0 - rest) * self.light[whole, at] + rest * self.light[whole + 1, at]
         flux = np.maximum(found[:, 0], 1e-30)
         way = np.column_stack([found[:, 1] / flux, found[:, 2] / flux, -np.ones(len(flux))])
         way[found[:, 0] <= 0] = self.calm, 0.0, -1.0
         return found[:, 0], way / np.linalg.norm(way, axis=1)[:, None]
 
-    def _pixel(self, x: Floats, y: Floats) -> NDArray[np.intp]:
-        row, column = (np.floor(np.mod(one / self.tile, 1.0) * self.pixels).astype(int) for one in (y, x))
-        row, column = (np.minimum(one, self.pixels - 1) for one in (row, column))
-        return np.asarray(row * self.pixels + column)
-
 
 class Event(NamedTuple):
-    """seen  (n, 3) radiance that comes into the path there;  kept  of the path's light, (n or 1, 3 or 1)
+    """Event of paths: seen  (n, 3) radiance that comes in there;  kept  share of the path's light (n or 1, 3 or 1)
     turned  (n,) density of the turn that light would take over that of the one drawn;  place, way  (n, 3) on from there
     """
 
@@ -96,20 +92,20 @@ class Event(NamedTuple):
 
 
 class Traced(NamedTuple):
-    """radiance (n, 3) of red, green and blue by each ray's paths, of two independent halves of them (2, n, 3)."""
+    """Radiance of red, green and blue by each ray's paths, of two independent halves of them (2, n, 3)."""
 
     halves: Floats
 
     @property
     def radiance(self) -> Floats:
-        """By both."""
+        """Mean radiance (n, 3) of both halves."""
         return np.asarray(self.halves.mean(axis=0))
 
 
 def traced(
     world: World, light: Sunlight, origin: Floats, corner: Floats, across: Floats, up: Floats, paths: int, seed: int = 0
 ) -> Traced:
-    """Radiance of pixels (n, 3) that an eye below the waves sees, each the mean over its area.
+    """Return the radiance of pixels (n, 3) that an eye below the waves sees, each the mean over its area.
 
     origin  (3,) the eye [m];  corner  (n, 3) of pixels as seen from it;  across, up  (3,) their sides
     paths   of a pixel, an even number
@@ -132,7 +128,7 @@ def traced(
 
 
 def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Floats:
-    """Radiance (n, 3) that each of these rays finds, by one path."""
+    """Return the radiance (n, 3) that each of these rays finds, by one path."""
     c, b = world.c, np.asarray(world.b, float)
     found = np.zeros((len(place), 3))
     own, way = np.arange(len(place)), way.copy()
@@ -168,7 +164,7 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
 
 
 def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
-    """In the water: what the sun's light is turned into the path, and where the path goes on backward."""
+    """Return what is scattered in the water: sunlight that turns into the path, and where it goes on backward."""
     seen, sunward = _sunlit(world, light, place, way)
     new = _turned(world.phase, way, rng)
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
@@ -179,19 +175,19 @@ def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
 
 
 def _sunlit(world: World, light: Sunlight, place: Floats, way: Floats) -> tuple[Floats, Floats]:
-    """Sunlight (n, 3) that a scattering turns into a ray, which `way` follows backward; and the way to the sun."""
+    """Return sunlight (n, 3) that is scattered into a ray, which `way` follows backward; and the way to the sun."""
     flux, beam = light.at(*place.T)
     turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
     return (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam), -beam
 
 
 def _come(world: World, place: Floats, beam: Floats) -> Floats:
-    """The sun's irradiance (n, 3) times what the water leaves of its rays as they come to a place."""
+    """Return the sun's irradiance (n, 3) times what the water leaves of its rays as they come to a place."""
     return np.asarray(world.sun) * np.exp(world.c * np.minimum(place[:, 2] / -beam[:, 2], 0.0)[:, None])
 
 
 def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
-    """At the floor: Lambert's."""
+    """Return what the floor reflects, as Lambert's."""
     normal = _normal(world.floor, place)
     flux, beam = light.at(*place.T)
     facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
@@ -208,7 +204,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
 
 
 def _surfaced(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
-    """At the waves from below: the sky behind them, and the path reflected."""
+    """Return what waves show from below: the sky behind them, and the path reflected."""
     normal = _normal(world.sea, place)
     cosine = np.clip(np.sum(way * normal, axis=1), 0.0, 1.0)
     share = fresnel(world.n, 1.0, cosine)[0][:, None]
@@ -219,7 +215,7 @@ def _surfaced(world: World, light: Sunlight, place: Floats, way: Floats, rng: np
 
 
 def _ends(world: World, place: Floats, way: Floats, length: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    """How far each ray comes (n,) [m], and what is there: `WATER`, `FLOOR` or `SURFACE`."""
+    """Return the length of each ray (n,) [m], and what is at its end: `WATER`, `FLOOR` or `SURFACE`."""
     end, kind = length.copy(), np.full(len(way), WATER, np.int8)
     last = place[:, 2] + length * way[:, 2]
     for is_near, surface, event in (
@@ -234,7 +230,7 @@ def _ends(world: World, place: Floats, way: Floats, length: Floats) -> tuple[Flo
 
 
 def met(surface: Waves, place: Floats, way: Floats) -> Floats:
-    """Distance (n,) at which rays come to a surface: to a floor from above, or to the waves from below [m]; or inf."""
+    """Return the distance (n,) to a floor from above, or to the waves from below [m]; inf where a ray meets none."""
     if not len(way):
         return np.zeros(0)
     rises = 1.0 if way[0, 2] > 0 else -1.0
@@ -270,9 +266,24 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
 
 
 def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
-    """Directions (n, 3) drawn around others."""
+    """Return directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
     return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
+
+
+def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
+    """Return unit directions turned by angles of which 1 - c and 1 + c are given; sharp ones keep their precision."""
+    sine, cosine = np.sqrt(below * above), 1.0 - below
+    across, along = sine * np.cos(azimuth), sine * np.sin(azimuth)
+    # Two unit vectors across the direction (Duff et al., J. Comput. Graph. Tech. 6, 2017): no pole to divide by.
+    sign = np.where(dz >= 0, 1.0, -1.0)
+    a = -1.0 / (sign + dz)
+    b = dx * dy * a
+    x = cosine * dx + across * (1.0 + sign * dx * dx * a) + along * b
+    y = cosine * dy + across * sign * b + along * (sign + dy * dy * a)
+    z = cosine * dz - across * sign * dx - along * dy
+    norm = 1.0 / np.sqrt(x * x + y * y + z * z)
+    return x * norm, y * norm, z * norm
 
 
 def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
@@ -280,12 +291,12 @@ def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _density(phase: Phase, way: Floats, new: Floats) -> Floats:
-    """Of such a draw [1/sr]."""
+    """Return the density of such a draw [1/sr]."""
     return np.asarray(phase.pdf(np.clip(np.sum(way * new, axis=1), -1.0, 1.0)))
 
 
 def _normal(surface: Waves, place: Floats) -> Floats:
-    """Upward unit normals (n, 3)."""
+    """Return the upward unit normals (n, 3)."""
     x, y = surface.slope(*place[:, :2].T)
     found = np.column_stack([-x, -y, np.ones(len(place))])
     return found / np.linalg.norm(found, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Caustic maps as they should be, by photons; how far one is from that; and the published filter, judged so."""
+"""Reference of caustic maps by photons, and errors of a map against it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import correlate1d
+from numpy.typing import NDArray
 
-from mcml_sim.media.checks import checked_numbers, checked_whole
+from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import SUN, Waves, checked_sun, refracted
 
@@ -17,13 +16,9 @@ Floats = NDArray[np.float64]
 BRIGHT, DARK = 2.0, 0.6  # of the mean
 FEW, EXTREME = 0.01, 0.05  # shares of pixels: where fewer are bright, or dark, so many of the extremest count as that
 
-SIZES = (7, 5, 3)  # pixels of a side, from dark to bright (Li et al., J. Image Graphics 16(8), 2011)
-# Neither limits nor sigma are printed: these are ours.
-LIMITS = (0.8, 1.6)  # of the mean, between dark, middling and bright
-
 
 class MapError(NamedTuple):
-    """rms, and energy: of a map's mean, less 1 [-]; bright, dark: relative error of the light of such pixels [-]"""
+    """Errors of a map [-]: rms; of the light where it is bright and dark, relative; energy, its mean less 1."""
 
     rms: float
     bright: float
@@ -32,9 +27,10 @@ class MapError(NamedTuple):
 
 
 def misfit(light: Floats, true: Floats) -> MapError:
-    """A map in units of the mean that entered, against one whose mean is that. Bright: above 2 of it, dark: below 0.6.
+    """Return the errors of a map in units of the mean that entered, against one whose mean is that.
 
-    Where fewer than 1 % of the pixels are so, the 5 % that are brightest, or darkest, are taken.
+    Bright is above 2 of the mean, dark below 0.6. Where fewer than 1 % of the pixels are so, the 5 % that are
+    brightest, or darkest, are taken.
     """
     right = true / true.mean()
     bright, dark = right > BRIGHT, right < DARK
@@ -47,7 +43,7 @@ def misfit(light: Floats, true: Floats) -> MapError:
 
 
 class Photons(NamedTuple):
-    """Where photons of a lattice over a tile land.
+    """Places where photons of a lattice over a tile land.
 
     x, y  (rows, columns), not brought back into the tile [m];  flux  per horizontal area of the surface [-]
     """
@@ -58,7 +54,7 @@ class Photons(NamedTuple):
 
 
 def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: float, azimuth: float = 0.0) -> Photons:
-    """Rays through all pairs of x (columns,) and y (rows,) to the level floor at -depth [m].
+    """Return rays through all pairs of x (columns,) and y (rows,) to the level floor at -depth [m].
 
     azimuth  turns the sun about the vertical, from +x toward +y [rad]. Waves must not shade one another: InputError.
     """
@@ -79,7 +75,7 @@ def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: fl
 def caustic_photons(
     waves: Waves, depth: float, tilt: float, n: float, pixels: int, side: int = 2048, suns: int = 1, sun: float = SUN
 ) -> Floats:
-    """Irradiance of a tile of a level floor, averaged over pixels: (pixels, pixels), row 0 at y = 0 [-].
+    """Return the irradiance of a tile of a level floor, averaged over pixels: (pixels, pixels), row 0 at y = 0 [-].
 
     side  photons along the tile, a multiple of pixels;  suns  directions of the sun's disc, 1 of a point sun
     sun   half-width of the disc in air [rad]
@@ -104,7 +100,7 @@ def caustic_photons(
 
 
 def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np.int64], Floats]]:
-    """Pixels, in one row, that all but the outermost photons of a lattice come to, each over its box, and its share.
+    """Yield pixels, in one row, that all but the outermost photons of a lattice come to over their boxes, and shares.
 
     Four pixels each, all photons in each of four turns;  scale  [pixels/m]
     """
@@ -125,7 +121,7 @@ def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np
 
 
 def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
-    """All but the outermost photons of a lattice, each over its box (pixels^2,) [photons]; scale  [pixels/m]."""
+    """Spread all but the outermost photons of a lattice over their boxes (pixels^2,) [photons]; scale  [pixels/m]."""
     flux, found = sent.flux[1:-1, 1:-1].ravel(), np.zeros(pixels * pixels)
     for at, share in boxes(sent, pixels, scale):
         found += np.bincount(at, flux * share, pixels * pixels)
@@ -133,7 +129,7 @@ def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
 
 
 def _disc(tilt: float, count: int, half_width: float) -> list[tuple[float, float]]:
-    """Tilt and azimuth of directions that fill a disc about the sun evenly: Vogel's spiral."""
+    """Return tilt and azimuth of directions that fill a disc about the sun evenly: Vogel's spiral."""
     if count == 1:
         return [(tilt, 0.0)]
     radius = half_width * np.sqrt((np.arange(count) + 0.5) / count)
@@ -141,30 +137,3 @@ def _disc(tilt: float, count: int, half_width: float) -> list[tuple[float, float
     along, across = radius * np.cos(turn), radius * np.sin(turn)
     x, z = np.sin(tilt) + along * np.cos(tilt), np.cos(tilt) - along * np.sin(tilt)
     return list(zip(np.arctan2(np.hypot(x, across), z).tolist(), np.arctan2(across, x).tolist(), strict=True))
-
-
-def sigma(size: int) -> float:
-    """Of a Gaussian over so many pixels [pixels]: 0.3 ((size - 1) / 2 - 1) + 0.8, as OpenCV's getGaussianKernel."""
-    return 0.3 * (0.5 * (size - 1) - 1.0) + 0.8
-
-
-def adaptive_filter(light: ArrayLike, scatter: bool = False) -> Floats:
-    """A map (rows, columns) that repeats, blurred by 7x7 where it is dark, 5x5, and 3x3 where it is bright.
-
-    scatter  False: each pixel gathers by its own size, as published: not all light is taken up as often as it is there.
-             True: each spreads by its own size, and none is lost
-    """
-    array = checked_numbers("light", light, "finite numbers (rows, columns)")
-    if array.ndim != 2 or not np.all(np.isfinite(array)):
-        raise InputError(f"light must be finite numbers (rows, columns), got shape {array.shape}")
-    bound = [-np.inf, *(limit * float(array.mean()) for limit in LIMITS), np.inf]
-    found = np.zeros_like(array)
-    for size, low, high in zip(SIZES, bound[:-1], bound[1:], strict=True):
-        own = (array >= low) & (array < high)
-        weights = np.exp(-0.5 * (np.arange(size) - size // 2) ** 2 / sigma(size) ** 2)
-        weights /= weights.sum()
-        spread = array * own if scatter else array
-        for axis in (0, 1):
-            spread = correlate1d(spread, weights, axis, mode="wrap")
-        found += spread if scatter else spread * own
-    return found

@@ -1,4 +1,4 @@
-"""What a file requests of a sea, SEA.toml: water, waves, floor, technique, camera and light."""
+"""Request of a sea, SEA.toml: water, waves, floor, technique, camera and light."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.sea.world import World, checked_lobes
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.request import ViewRequest
+from profilefit.scenes.stage.request import Defaults, ViewRequest
 from profilefit.scenes.stage.world import Camera, Light, Rgb
 
 Floats = NDArray[np.float64]
@@ -48,7 +47,6 @@ SLOPE, TILE, SEA_SEED = 0.12, 5.0, 4
 DEPTH, FLOOR_SLOPE, FLOOR_SEED, REFLECTANCE = 4.0, 0.08, 2, (0.42, 0.38, 0.30)
 AUTO = "auto"
 SPLATS = {"points": Splat.POINTS, "wireframe": Splat.WIREFRAME_ENERGY, "faces": Splat.FACES, "cells": Splat.CELLS}
-SAMPLES = 12
 # Of whole numbers in [technique]: least, most, and what is taken if a file says nothing.
 RANGES = {
     "vertices": (2, 1024, 128),
@@ -60,14 +58,20 @@ RANGES = {
 MOST_ROWS = 16384  # of a column of maps
 EYE, TARGET, ANGLE = (6.0, 2.5, -2.2), (0.0, 2.5, -2.4), 1.1
 WIDEST = 2.5  # [rad]
-SUN, IRRADIANCE, AMBIENT = (-0.5, 0.0, 0.9), (3.0, 2.9, 2.7), (0.25, 0.32, 0.42)
+DEFAULTS = Defaults(
+    samples=12,
+    size=(128, 96),
+    light=Light((-0.5, 0.0, 0.9), (3.0, 2.9, 2.7)),
+    ambient=(0.25, 0.32, 0.42),
+    limit="whose truth is traced",
+)
 LARGEST = 1000.0  # length [m]
 MOST_WATER = 100.0  # a coefficient [1/m]
 
 
 @dataclass(frozen=True)
 class SeaRequest(ViewRequest):
-    """What a file requests; of `ViewRequest` the lengths are metres here, and z is up.
+    """Picture of a sea that a file requests; lengths are metres, and z is up.
 
     a, b     absorption and scattering of red, green and blue [1/m];  lobes  (weight, g) of the phase function's terms
     n        refractive index;  sea, floor  surfaces, each by (slope, seed), tile and depth [m], wind [m/s]
@@ -97,7 +101,7 @@ class SeaRequest(ViewRequest):
 
     @property
     def world(self) -> World:
-        """What it is a picture of."""
+        """World that it is a picture of."""
         level = -float(self.depth)
         sea, bed = Waves(self.tile), Waves(self.tile, mean=level)
         if self.slope:
@@ -120,7 +124,7 @@ class SeaRequest(ViewRequest):
 
     @property
     def splats(self) -> tuple[Splat, Splat]:
-        """Of the floor's map, and of those in depths."""
+        """Splats of the floor's map, and of those in depths."""
         if self.splat != AUTO:
             return (SPLATS[self.splat],) * 2
         world = self.world
@@ -129,30 +133,25 @@ class SeaRequest(ViewRequest):
 
 
 def read(file: str, content: Table) -> SeaRequest:
-    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
     for key in ("title", "unit"):
         tables.text("", key, content, "m")
-    water, sea, floor, named, seen, lit = (tables.table(content, name, {}) for name in list(TABLES)[1:])
+    water, sea, floor, named = (tables.table(content, name, {}) for name in list(TABLES)[1:5])
     for key in ("a", "b"):
         if key not in water:
             raise tables.bad("water", key, f"three numbers in 0 ... {MOST_WATER:g} [1/m]", None)
     if "source" not in water:
         raise tables.bad("water", "source", "a text that says where a and b are from", None)
     tables.text("water", "source", water)
-    size = tables.sides("camera", "resolution", seen, (128, 96), 1024)
-    if size[0] * size[1] > request.MOST_PIXELS:
-        accepted = f"{request.MOST_PIXELS} pixels at most, whose truth is traced"
-        raise tables.bad("camera", "resolution", accepted, list(size))
+    numbers: dict[str, Any] = {
+        key: tables.whole("technique", key, named, default, least, most)
+        for key, (least, most, default) in RANGES.items()
+    }
     found = SeaRequest(
-        file=file,
-        sampling=tables.made("technique", lambda: Sampling(named.get("samples", SAMPLES))),
-        chart=request.chart(tables, named),
-        camera=_camera(tables, seen),
-        light=_light(tables, lit),
-        ambient=tables.three("light", "ambient", lit, AMBIENT, 0.0, request.MOST_LIGHT),
-        size=size,
+        **request.view(tables, content, _camera, DEFAULTS, _toward),
+        **numbers,
         a=tables.three("water", "a", water, (0.0,) * 3, 0.0, MOST_WATER),
         b=tables.three("water", "b", water, (0.0,) * 3, 0.0, MOST_WATER),
         lobes=_lobes(tables, water),
@@ -167,10 +166,6 @@ def read(file: str, content: Table) -> SeaRequest:
         reflectance=tables.three("floor", "reflectance", floor, REFLECTANCE, 0.0, 1.0),
         kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
         splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
-        **{
-            key: tables.whole("technique", key, named, default, least, most)
-            for key, (least, most, default) in RANGES.items()
-        },
     )
     if found.texels * found.slices > MOST_ROWS:
         accepted = f"so many that texels times slices is {MOST_ROWS} at most"
@@ -194,13 +189,13 @@ def _camera(tables: Tables, seen: Table) -> Camera:
     return Camera(eye, target, float(2.0 * np.tan(0.5 * angle) * np.linalg.norm(np.subtract(target, eye))))
 
 
-def _light(tables: Tables, lit: Table) -> Light:
-    direction = tables.three("light", "direction", lit, SUN, -1e6, 1e6)
+def _toward(tables: Tables, lit: Table, default: Rgb) -> Rgb:
+    direction = tables.three("light", "direction", lit, default, -1e6, 1e6)
     x, y, z = direction
     if not (x <= 0 and y == 0 and z > 0):
         accepted = "toward the sun, [x <= 0, 0, z > 0]: its light goes toward +x"
         raise tables.bad("light", "direction", accepted, list(direction))
-    return Light(direction, tables.three("light", "irradiance", lit, IRRADIANCE, 0.0, request.MOST_LIGHT))
+    return direction
 
 
 def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
@@ -212,14 +207,14 @@ def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
 
 
 def lobes_of(name: str) -> tuple[tuple[float, float], ...]:
-    """(weight, g) of the terms fitted to a phase function that has a record. InputError."""
+    """Return (weight, g) of the terms fitted to a phase function that has a record. InputError."""
     found = phase.named(name).phase(FORM)
     assert isinstance(found, Mixture)
     return tuple((float(w), float(one.mean_cosine)) for w, one in zip(found.weights, found.phases, strict=True))
 
 
 def _slope(tables: Tables, where: str, table: Table, default: float) -> float:
-    """Root mean square, 0 of a level surface."""
+    """Return the root mean square of a slope, 0 of a level surface."""
     value = table.get("slope", default)
     return 0.0 if value == 0 else tables.number(where, "slope", table, default, 2.0)
 
@@ -237,5 +232,4 @@ def _require_sight(tables: Tables, of: SeaRequest, world: World) -> None:
     if not world.floor.highest < z < world.sea.lowest:
         accepted = f"in the water, with z in {world.floor.highest:.3g} ... {world.sea.lowest:.3g} m"
         raise tables.bad("camera", "eye", accepted, list(of.camera.eye))
-    if not any((*of.light.irradiance, *of.ambient)):
-        raise InputError(f"{of.file}: [light] irradiance and ambient must not both be 0: nothing would be seen")
+    of.require_light()

@@ -5,7 +5,7 @@ the depth z, q = tilt + a sum of waves. What scatters once toward the eye is the
 infinite irradiance of folds: a ray that crosses the view ray where it has gone t adds its flux dX over |v_x - v_z q|.
 Li et al. (J. Image Graphics 16(8), 1497, 2011) draw lines, then square prisms; a caustic map a depth serves both.
 
-Where single scattering fails, and what to put in its place, is at the end. Lengths in 1 / c, as in `law`.
+Lengths in 1 / c, as in `law`.
 """
 
 from __future__ import annotations
@@ -17,23 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
+from mcml_sim.media.checks import checked_whole, is_number, shown
 from mcml_sim.media.phase import Phase
-from mcml_sim.results.estimate import Estimate
 from profilefit.errors import InputError
 from profilefit.scenes.sea.law import segment_between
-from profilefit.scenes.sea.photons import ByOrder
 
 Floats = NDArray[np.float64]
 FINE = 1 << 16  # rays a period of a quadrature: right to 1e-5
 PIXELS, RAYS_A_PIXEL = 512, 16  # of a caustic map, a period
-# Of the light toward a horizontal eye beyond ct = 2, sun overhead: ln(L / single scattering at the surface) =
-# BRIGHTER_1 omega + BRIGHTER_2 omega^2 - F(omega) ct, F = 1 - FADES_1 omega - FADES_2 omega^2. Fitted to photons of one
-# and three terms of mean cosine 0.924, omega 0.1 ... 0.8 and ct 2 ... 6: rms 2.8 %, at most 7.3 %; errors beside.
-FADES = (0.878, 0.186)
-FADES_ERRORS = (0.020, 0.030)
-BRIGHTER = (1.20, 0.97)
-BRIGHTER_ERRORS = (0.08, 0.12)
 
 
 @dataclass(frozen=True)
@@ -61,13 +52,13 @@ class Bundle:
                 raise InputError(f"waves must be (slope, whole number a period, phase), got {shown(one)}")
 
     def slope(self, x: Floats) -> Floats:
-        """q at X [-]."""
+        """Return q at X [-]."""
         turn = 2.0 * np.pi / self.period
         return self.tilt + sum((a * np.sin(turn * n * x + phase) for a, n, phase in self.waves), np.zeros_like(x))
 
     @property
     def most(self) -> float:
-        """|q - tilt| of no ray is larger."""
+        """Largest |q - tilt| of any ray."""
         return float(sum(abs(a) for a, _, _ in self.waves))
 
 
@@ -90,7 +81,7 @@ class ViewRay:
 
 
 def determinant(gradient: ArrayLike, depth: ArrayLike) -> Any:
-    """Area of a thin prism of rays by that at the surface [-]: det(1 + z Q) = 1 + z tr Q + z^2 det Q.
+    """Return the area of a thin prism of rays by that at the surface [-]: det(1 + z Q) = 1 + z tr Q + z^2 det Q.
 
     gradient  (..., 2, 2) dq / d(X, Y) [1/length];  depth  z [length].  Its irradiance is the sun's over |this|; < 0
     behind a fold.
@@ -102,7 +93,7 @@ def determinant(gradient: ArrayLike, depth: ArrayLike) -> Any:
 
 
 def by_quadrature(bundle: Bundle, view: ViewRay, phase: Phase, fine: int = FINE) -> float:
-    """Radiance that is scattered once into the view ray, by the sun's irradiance and by b [length/sr]: the truth.
+    """Return the radiance scattered once into the view ray, by the sun's irradiance and b [length/sr]: the reference.
 
     The sum over many prisms, which is second order in their width wherever the view ray ends.
     """
@@ -110,7 +101,7 @@ def by_quadrature(bundle: Bundle, view: ViewRay, phase: Phase, fine: int = FINE)
 
 
 def by_lines(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
-    """The same of `count` lines a period, each the flux of its cell: those that the view ray meets."""
+    """Return that radiance by `count` lines a period, each the flux of its cell: those that the view ray meets."""
     x, flux = _rays(bundle, view, count, middle=True)
     q = bundle.slope(x)
     met = _met(view, x, q)
@@ -122,7 +113,7 @@ def by_lines(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
 
 
 def by_prisms(bundle: Bundle, view: ViewRay, phase: Phase, count: int, is_spread: bool = True) -> float:
-    """The same of `count` prisms a period between neighbouring rays, each with the integral over its chord.
+    """Return that radiance by `count` prisms a period between neighbouring rays, each integrated over its chord.
 
     is_spread  a prism's flux stays as its area changes with depth; False is one irradiance in all of it, which makes
                light where prisms widen, and loses it where they meet
@@ -153,7 +144,7 @@ def by_prisms(bundle: Bundle, view: ViewRay, phase: Phase, count: int, is_spread
 def by_slices(
     bundle: Bundle, view: ViewRay, phase: Phase, count: int, pixels: int = PIXELS, has_slopes: bool = True
 ) -> float:
-    """The same of `count` caustic maps, each halfway through a piece of the view ray; a horizontal ray has one map.
+    """Return that radiance by `count` caustic maps, each in the middle of a piece of the ray; one if it is horizontal.
 
     The piece is laid onto the map along the sun: what is seen there is the mean over its pixels, times the integral of
     the segment. has_slopes  the map also holds the mean direction of its light, for the phase function; False takes
@@ -177,7 +168,7 @@ def by_slices(
 
 
 def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) -> Floats:
-    """(2, n): flux between 0 and x (n,) at a depth [length], as a caustic map's running sum has it, and flux times q.
+    """Return (2, n) flux from 0 to x (n,) at a depth [length], as a caustic map's running sum has it, and flux times q.
 
     Over a period it is a period.
     """
@@ -194,61 +185,22 @@ def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) ->
     return np.array(found)
 
 
-def share_once(found: ByOrder, omega: float) -> Estimate:
-    """Of the radiance toward an eye, what single scattering is [-], by photons of `trace_view`; its error by groups."""
-    whole = found.at(omega)
-    once = omega * found.groups[0, 1]
-    value = once / np.asarray(whole.value)
-    return Estimate(value, value * whole.standard_error / whole.value, whole.effective_samples)
-
-
-def scaled_once(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """Horizontal radiance, sun overhead, of single scattering in water whose forward peak counts as unscattered [1/sr].
-
-    f = <P_2> of the phase function (g^2 of one term); c' = c (1 - omega f), b' = b (1 - f), p' = p / (1 - f) (Joseph,
-    Wiscombe & Weinman, J. Atmos. Sci. 33, 2452, 1976); by the sun's irradiance.
-    """
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    kept = 1.0 - some * float(phase.moment(2))
-    return (some * float(phase.pdf(0.0)) / kept * np.exp(-kept * depth))[()]
-
-
-def fading(omega: ArrayLike) -> Any:
-    """K / c = F(omega) [-] with which radiance toward a horizontal eye falls off beyond ct = 2, sun overhead."""
-    some = _albedo(omega)
-    return (1.0 - FADES[0] * some - FADES[1] * some**2)[()]
-
-
-def deep_radiance(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """All of that radiance for omega <= 0.8 and ct 2 ... 6 [1/sr], by the sun's irradiance; off by 7 % at most."""
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    rise = BRIGHTER[0] * some + BRIGHTER[1] * some**2
-    return (some * float(phase.pdf(0.0)) * np.exp(rise - fading(some) * depth))[()]
-
-
-def _albedo(omega: ArrayLike) -> Floats:
-    some = checked_numbers("omega", omega, "an albedo in [0, 1]")
-    if not np.all((some >= 0) & (some <= 1)):
-        raise InputError(f"omega must be an albedo in [0, 1], got {shown(omega)}")
-    return some
-
-
 def _scattered(view: ViewRay, q: Floats, phase: Phase) -> Floats:
-    """Phase function of rays toward the eye times the way along a ray by depth, 1 / cosine [1/sr]: by flux a level."""
+    """Return the phase function toward the eye times the way along a ray by depth, 1 / cosine [1/sr]."""
     slant = np.sqrt(1.0 + q * q)
     cosine = -(view.direction[0] * q + view.direction[2]) / slant
     return np.asarray(phase.pdf(np.clip(cosine, -1.0, 1.0)) * slant)
 
 
 def _met(view: ViewRay, x: Floats, q: Floats) -> Floats:
-    """Way t along the view to where it meets the ray that entered at X; inf where both are parallel."""
+    """Return the way t along the view to where it meets the ray that entered at X; inf where both are parallel."""
     across = view.direction[0] - view.direction[2] * q
     with np.errstate(divide="ignore", invalid="ignore"):
         return (x + view.z * q - view.x) / across
 
 
 def _rays(bundle: Bundle, view: ViewRay, count: int, middle: bool) -> tuple[Floats, float]:
-    """X of all rays that may meet the view, as edges or middles of cells, and the flux of a cell [length]."""
+    """Return X of all rays that may meet the view, as edges or middles of cells, and the flux of a cell [length]."""
     number = checked_whole("count", count, lowest=1, highest=10**7)
     ends: Sequence[float] = (view.x, view.x + view.direction[0] * view.length)
     depths = (view.z, view.z + view.direction[2] * view.length)

@@ -41,7 +41,7 @@ def caustic_irradiance(
     curvature: Surface | None = None,
     spacing: float | None = None,
 ) -> Any:
-    """Irradiance on a level floor at z = -depth below waves z = surface(x), of a point sun [-]; the shape of x.
+    """Return irradiance on a level floor at z = -depth below waves z = surface(x), of a point sun [-]; the shape of x.
 
     x      [m];  depth  below z = 0, below the deepest trough [m]
     tilt   of the sun from the vertical, in [0, pi / 2): light goes toward +x and down [rad]
@@ -74,7 +74,7 @@ def caustic_boxes(
     curvature: Surface | None = None,
     spacing: float | None = None,
 ) -> Floats:
-    """The same, averaged over each pixel between edges (m + 1,): (m,) [-]. Others as of `caustic_irradiance`.
+    """Return that irradiance (m,) [-] averaged over pixels between edges (m + 1,); others as of `caustic_irradiance`.
 
     sun  half-width of its even disc in air, `SUN` of the real one [rad]: averaged over 32 directions of it in the
          plane of the waves, weighted by the disc's chords (Chebyshev's points of the second kind)
@@ -96,7 +96,7 @@ def caustic_boxes(
 
 
 class _Rays:
-    """What a surface sends to a floor, between the places from where rays can come to these x."""
+    """Rays that a surface sends to a floor, between the places from where they can come to these x."""
 
     def __init__(
         self,
@@ -136,10 +136,12 @@ class _Rays:
             reach = 1.5 * farthest
         self.nodes = self._with_folds(nodes, stretch)
         self.landing = self.at(self.nodes)[0]
-        self._highest_before()
+        self._before = np.maximum.accumulate(self._across(self.nodes))
+        through = self._through(self.nodes[:-1], self.nodes[1:])
+        self._cumulated = np.concatenate([[0.0], np.cumsum(through)])
 
     def at(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """Of places on the surface: where their rays land [m], dX/dx [-], and flux per horizontal area [-]."""
+        """Return where rays of places on the surface land [m], dX/dx [-], and flux per horizontal area [-]."""
         z, zx, zxx = self._derivatives(x)
         across, _, flux = refracted(self.tilt, (zx, np.zeros_like(zx)), self.n)
         # tan(psi), psi the ray's angle to the vertical: slope a, then sin(psi - a) = sin(tilt - a) / n.
@@ -152,7 +154,7 @@ class _Rays:
         return x + (self.depth + z) * across, stretch, flux
 
     def arrivals(self, x: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
-        """Which of x a ray comes to, from which place [m], and whether it lands farther on with the place."""
+        """Return which of x a ray comes to, from which place [m], and whether it lands farther on with the place."""
         turning = np.flatnonzero(np.diff(np.sign(np.diff(self.landing))) != 0) + 1
         ends = np.concatenate([[0], turning, [self.landing.size - 1]])
         order = np.argsort(x)
@@ -185,18 +187,18 @@ class _Rays:
         return target, place, rises
 
     def flux_before(self, x: Floats) -> Floats:
-        """Flux that lands below each x, but for one constant [m]."""
+        """Return flux that lands below each x, but for one constant [m]."""
         target, place, rises = self.arrivals(x)
         signed = np.where(rises, 1.0, -1.0) * self._sent(place)
         return np.bincount(target, signed, x.size).astype(float)
 
     def lit(self, x: Floats) -> NDArray[np.bool_]:
-        """Whether no crest is in the way: the place is farther across the rays than all before it."""
+        """Return whether no crest is in the way: the place is farther across the rays than all before it."""
         cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 1)
         return self._across(x) >= self._before[cell]
 
     def _sent(self, x: Floats) -> Floats:
-        """Flux through the surface from the first sample to x, what crests shade taken off [m]."""
+        """Return flux through the surface from the first sample to x, what crests shade taken off [m]."""
         cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 2)
         return self._cumulated[cell] + self._through(self.nodes[cell], x)
 
@@ -208,17 +210,12 @@ class _Rays:
             found += weight * np.where(self.lit(here), flux, 0.0)
         return found * (far - near)
 
-    def _highest_before(self) -> None:
-        self._before = np.maximum.accumulate(self._across(self.nodes))
-        through = self._through(self.nodes[:-1], self.nodes[1:])
-        self._cumulated = np.concatenate([[0.0], np.cumsum(through)])
-
     def _across(self, x: Floats) -> Floats:
-        """Distance across the rays [m], the same all along one."""
+        """Return the distance across the rays [m], the same all along one."""
         return x * np.cos(self.tilt) + self._height(x) * np.sin(self.tilt)
 
     def _with_folds(self, nodes: Floats, stretch: Floats) -> Floats:
-        """The places where dX/dx changes its sign among them: between two, X is monotone."""
+        """Return the places where dX/dx changes its sign among them: between two, X is monotone."""
         cell = np.flatnonzero(np.sign(stretch[:-1]) * np.sign(stretch[1:]) < 0)
         near, far, sign = nodes[cell], nodes[cell + 1], np.sign(stretch[cell])
         for _ in range(HALVINGS):

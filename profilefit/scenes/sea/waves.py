@@ -23,7 +23,7 @@ STILL = np.zeros(0)
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """z(x, y) = mean + sum_i amplitude_i cos(kx_i x + ky_i y + phase_i), with z up and the sea's mean level at 0.
+    """Surface z(x, y) = mean + sum_i amplitude_i cos(kx_i x + ky_i y + phase_i), z up, the sea's mean level at 0.
 
     tile        side of the square in which it repeats [m]
     amplitudes  (n,) [m];  vectors  (n, 2) kx, ky, multiples of 2 pi / tile [1/m];  phases  (n,) [rad]
@@ -87,32 +87,33 @@ class Waves:
         return float(np.max(-0.5 * (zxx + zyy) + np.hypot(0.5 * (zxx - zyy), zxy)))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """z [m]."""
+        """Return z [m]."""
         angle = self._angle(x, y)
         return self.mean + np.sum(self.amplitudes * np.cos(angle), axis=-1)
 
     def slope(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-        """dz/dx and dz/dy [-]."""
+        """Return dz/dx and dz/dy [-]."""
         sines = -self.amplitudes * np.sin(self._angle(x, y))
         return sines @ self.vectors[:, 0], sines @ self.vectors[:, 1]
 
     def curvature(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """d2z/dx2, d2z/dxdy and d2z/dy2 [1/m]."""
+        """Return d2z/dx2, d2z/dxdy and d2z/dy2 [1/m]."""
         kx, ky = self.vectors.T
         cosines = -self.amplitudes * np.cos(self._angle(x, y))
         return cosines @ (kx * kx), cosines @ (kx * ky), cosines @ (ky * ky)
 
     def lattice(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-        """z, dz/dx and dz/dy at all pairs of x (columns,) and y (rows,): three of (rows, columns), by products."""
+        """Return z, dz/dx and dz/dy at all pairs of x (columns,) and y (rows,): three of (rows, columns)."""
         z, zx, zy = self._grid(x, y, ("", "x", "y"))
         return self.mean + z, zx, zy
 
     def scaled(self, factor: float) -> Waves:
-        """As many times as high about its mean, and as steep and as curved."""
+        """Return waves so many times as high about their mean, and as steep and as curved."""
         return replace(self, amplitudes=self.amplitudes * factor)
 
+    @cached_property
     def texels(self) -> NDArray[np.float32]:
-        """(1, n, 4) for glsl/waves.glsl: whole waves in the tile along x and y, amplitude [m], phase [turns]."""
+        """Table (1, n, 4) for glsl/waves.glsl: whole waves in the tile along x and y, amplitude [m], phase [turns]."""
         whole = np.round(self.vectors * self.tile / (2.0 * np.pi))
         found = np.column_stack([whole, self.amplitudes, np.mod(self.phases / (2.0 * np.pi), 1.0)])
         return (found if found.size else np.zeros((1, 4))).astype(np.float32)[None]
@@ -122,7 +123,7 @@ class Waves:
         return np.asarray(x, float)[..., None] * kx + np.asarray(y, float)[..., None] * ky + self.phases
 
     def _grid(self, x: Floats, y: Floats, kinds: tuple[str, ...]) -> list[Floats]:
-        """Derivatives of z at all pairs, each named by its letters, as one product of matrices."""
+        """Return derivatives of z at all pairs, each named by its letters, as one product of matrices."""
         kx, ky = self.vectors.T
         along = np.exp(1j * np.outer(kx, x))
         across = np.exp(1j * (np.outer(y, ky) + self.phases)) * self.amplitudes
@@ -141,7 +142,7 @@ def random_sea(
     harmonics: int = 6,
     wind: tuple[float, float] = (WIND, 0.0),
 ) -> Waves:
-    """A wind sea of a given root mean square slope [-] over a tile [m].
+    """Return a wind sea of a given root mean square slope [-] over a tile [m].
 
     count      of waves that are kept, those of the largest slope;  harmonics  most waves along a side of the tile
     wind       [m/s] along x and y
@@ -167,7 +168,7 @@ def random_sea(
 def random_floor(
     rms_slope: float, tile: float, depth: float, seed: int = 0, count: int = 6, harmonics: int = 4
 ) -> Waves:
-    """An uneven floor of waves of all directions alike, around a mean depth [m]; the others as of `random_sea`.
+    """Return an uneven floor of waves of all directions alike, around a mean depth [m]; the others as of `random_sea`.
 
     Each of the waves, drawn from the lattice of the tile, has about as much slope: heights fall as 1 / k.
     """
@@ -180,7 +181,7 @@ def random_floor(
 
 
 def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floats, Floats, Floats]:
-    """Sunlight behind a surface of these slopes: its ray's x and y a unit of depth, and its flux.
+    """Return sunlight behind a surface of these slopes: its ray's x and y a unit of depth, and its flux.
 
     tilt  of the sun from the vertical, in the plane of x and z; light goes toward +x where it is > 0 [rad]
     slope  dz/dx and dz/dy [-];  n  refractive index below, over that above [-]
@@ -200,7 +201,7 @@ def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floa
 
 
 def checked_sun(depth: object, tilt: object, n: object) -> tuple[float, float, float]:
-    """Depth of a floor [m], tilt of the sun [rad] and the water's index over the air's [-]. InputError."""
+    """Return the depth of a floor [m], tilt of the sun [rad] and the water's index over the air's [-]. InputError."""
     if not is_number(depth) or not 0.0 < depth < np.inf:
         raise InputError(f"depth must be a length > 0 [m], got {shown(depth)}")
     if not is_number(tilt) or not 0.0 <= tilt < 0.5 * np.pi:
@@ -211,7 +212,7 @@ def checked_sun(depth: object, tilt: object, n: object) -> tuple[float, float, f
 
 
 def _lattice(tile: float, harmonics: int) -> Floats:
-    """Wave vectors of up to so many waves a tile, one of each pair of opposite ones (n, 2) [1/m]."""
+    """Return the wave vectors of up to so many waves a tile, one of each pair of opposite ones (n, 2) [1/m]."""
     whole = np.arange(-harmonics, harmonics + 1)
     x, y = (one.ravel() for one in np.meshgrid(whole, whole))
     half = ((y > 0) | ((y == 0) & (x > 0))) & (x**2 + y**2 <= harmonics**2)
@@ -219,7 +220,7 @@ def _lattice(tile: float, harmonics: int) -> Floats:
 
 
 def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: int, count: int) -> Waves:
-    """Complex normal deviates times these roots of variances, and of those so many of the largest slope."""
+    """Return complex normal deviates times these roots of variances, and of those so many of the largest slope."""
     if not is_number(rms_slope) or not 0.0 <= rms_slope < np.inf:
         raise InputError(f"rms_slope must be a number >= 0, got {shown(rms_slope)}")
     rng = np.random.default_rng(seed)

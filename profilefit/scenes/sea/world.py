@@ -1,4 +1,4 @@
-"""The sea of a scene: its water, the waves on it, the floor below it, and the light that comes in."""
+"""Sea of a scene: its water, the waves on it, the floor below it, and the light that comes in."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROUNDING = 1e-6  # by which weights may miss a sum of 1
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """What light meets; lengths in metres, z up, the sea's mean level at 0. InputError.
+    """Water, waves, floor and light; lengths in metres, z up, the sea's mean level at 0. InputError.
 
     a, b         absorption >= 0 and scattering >= 0 of red, green and blue [1/m], a + b > 0
     lobes        (weight, g) of Henyey and Greenstein's terms, weights that sum to 1
@@ -74,12 +74,12 @@ class World:
 
     @property
     def depth(self) -> float:
-        """Of the floor's mean level [m]."""
+        """Depth of the floor's mean level [m]."""
         return -self.floor.mean
 
     @cached_property
     def phase(self) -> Mixture:
-        """Of the lobes."""
+        """Phase function of the lobes."""
         weights = np.array([weight for weight, _ in self.lobes])
         shares = tuple((weights / weights.sum()).tolist())
         return Mixture(shares, tuple(HenyeyGreenstein(g) for _, g in self.lobes))
@@ -117,7 +117,7 @@ class World:
 
 
 def checked_lobes(lobes: ArrayLike) -> None:
-    """InputError where they are no mixture of Henyey and Greenstein's terms."""
+    """Raise InputError where lobes are no mixture of Henyey and Greenstein's terms."""
     accepted = "a list of pairs [weight, g], weights >= 0 that sum to 1, g in (-1, 1)"
     terms = checked_numbers("lobes", lobes, accepted)
     good = terms.ndim == 2 and terms.shape[1] == 2 and len(terms) > 0

@@ -1,1 +1,1 @@
-"""Liang et al.'s head."""
+"""Head after Liang et al., drawn by samples of a law or by a separable filter."""

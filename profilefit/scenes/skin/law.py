@@ -1,4 +1,4 @@
-"""The laws that draw the head: samples of any profile law, or the separable kernel, stretched to its material.
+"""Laws that draw the head: samples of any profile law, or the separable kernel, stretched to its material.
 
 Sampled are the laws of `profilefit.laws` that have a shader source, as fitted or printed, each by its own source; their
 light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (stage/gather.py).
@@ -15,16 +15,15 @@ whose code rounds pi to 3.14.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from mcml_sim import Setting, exact
-from mcml_sim.exact.single_scattering import entered
+from mcml_sim import Setting
 from profilefit.errors import InputError
+from profilefit.scenes.skin.truth import exact_quartile
 from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
@@ -45,7 +44,7 @@ class SkinGaussians:
     stretches: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def profile(self, r: ArrayLike) -> Floats:
-        """R(r) [1/mm^2] of red, green, blue along a last axis, at radii [mm] of any shape."""
+        """Return R(r) [1/mm^2] of red, green, blue along a last axis, at radii [mm] of any shape."""
         scaled = np.asarray(r, float)[..., None] / np.array(self.stretches)
         variance = np.array(self.variances)[:, None]
         gaussians = np.exp(-(scaled[..., None, :] ** 2) / (2.0 * variance)) / (2.0 * np.pi * variance)
@@ -70,11 +69,11 @@ D_EON = SkinGaussians(
     ),
 )
 FALLOFF = (1.0, 0.37, 0.3)
-"""The default of the authors' code for red, green, blue."""
+"""Default of the authors' code for red, green, blue."""
 
 
 def separable(falloff: tuple[float, float, float] = FALLOFF) -> SkinGaussians:
-    """Jimenez et al.: the red Gaussians but the narrowest, in all channels, r / (0.001 + falloff).
+    """Return the kernel of Jimenez et al.: the red Gaussians but the narrowest, in all channels, r / (0.001 + falloff).
 
     The narrowest they take for light that comes straight back. Nothing is normalised here (0.767 of red is left): their
     filter divides by the sum of its own samples.
@@ -93,7 +92,6 @@ STRENGTH = float(np.sum(D_EON.weights, axis=0)[0] - D_EON.weights[0][0])
 PUBLISHED_STRENGTH = (0.48, 0.41, 0.28)
 """The default of the authors' code for red, green, blue: an artist's choice, too weak for a width to be matched."""
 DARKEST = 1e-4  # an albedo below has no light to blur; its width is that of this one
-RADII = 4000
 # Share of a tap that its depth takes, per depth in units of the kernel: the authors' 300 / tan(10 degrees) times a
 # width of 0.0125 scene units, the middle of their slider, of which the kernel's unit is a third.
 FOLLOW = 300.0 / np.tan(np.radians(10.0)) * 0.0125**2 / 3.0
@@ -101,7 +99,7 @@ FOLLOW = 300.0 / np.tan(np.radians(10.0)) * 0.0125**2 / 3.0
 
 @dataclass(frozen=True)
 class Separable:
-    """As wide as a profile: strength, the share of the light that is blurred, of red, green, blue [-]; its setting."""
+    """Kernel as wide as a profile of a setting; strength is the share of red, green, blue that is blurred [-]."""
 
     strength: Rgb = (STRENGTH, STRENGTH, STRENGTH)
     setting: Setting = DIFFUSE
@@ -112,13 +110,13 @@ class Separable:
         require_isotropic(self.setting)
 
     def stretches(self, alpha: Floats, mfp: Floats) -> Floats:
-        """(3,) lengths [mm] of the kernel's unit: a step edge rises to 3/4 where it does under the exact profile."""
-        wanted = [exact_quartile(max(a, DARKEST), self.setting) for a in np.asarray(alpha).tolist()]
+        """Return the unit (3,) [mm] by which the kernel lets an edge rise to 3/4 where the exact profile does."""
+        exact = [exact_quartile(max(a, DARKEST), self.setting) for a in np.asarray(alpha).tolist()]
         own = [kernel_quartile(share) for share in self.strength]
-        return np.asarray(mfp, float) * np.array(wanted) / np.array(own)
+        return np.asarray(mfp, float) * np.array(exact) / np.array(own)
 
     def taps(self, number: int, stretches: Floats) -> NDArray[np.float32]:
-        """(taps, 4): weights of red, green and blue, each of sum 1, and offset [mm]; an odd number of taps."""
+        """Return (taps, 4) weights of red, green and blue, each of sum 1, and offset [mm]; an odd number of taps."""
         count = number | 1
         if count == 1:
             return np.array([[1.0, 1.0, 1.0, 0.0]], np.float32)
@@ -134,32 +132,8 @@ class Separable:
         return np.column_stack([weight, offset * widest]).astype(np.float32)
 
 
-@cache
-def albedo_of(reflectance: float, setting: Setting) -> float:
-    """alpha of the exact half space of reflectance A [-]."""
-    share = max(reflectance, 0.0)
-    if share >= entered(setting):  # a surface that refracts lets no more in
-        return 1.0
-    return float(brentq(lambda alpha: float(exact.reflectance(alpha, setting)) - share, 0.0, 1.0))
-
-
-@cache
-def exact_quartile(alpha: float, setting: Setting) -> float:
-    """Distance [mfp] from a step edge at which the exact profile lets 3/4 of the light through.
-
-    A radius r drawn by the profile, in a random direction, crosses an edge at distance q with the chance
-    arccos(q / r) / pi; the mean over even shares of the energy is 1/4 there.
-    """
-    radius = np.asarray(exact.quantile((np.arange(RADII) + 0.5) / RADII, alpha, setting=setting))
-
-    def crossed(distance: float) -> float:
-        return float(np.mean(np.arccos(np.minimum(distance / radius, 1.0)))) / np.pi - 0.25
-
-    return float(brentq(crossed, 0.0, radius[-1]))
-
-
 def kernel_quartile(strength: float) -> float:
-    """The same of the kernel, in its own unit: its line spread is its slice, and 1 - strength of it stays in place."""
+    """Return that distance of the kernel, in its unit: its line spread is its slice, 1 - strength stays in place."""
     if not strength > 0.5:
         raise InputError(
             f"strength must be > 0.5: a kernel that blurs less is as wide as no material, got {strength!r}"
@@ -176,7 +150,7 @@ def kernel_quartile(strength: float) -> float:
 
 
 def transmitted() -> str:
-    """Shader expression of the share of the light within x, in units of the stretch: cdf of the red skin profile."""
+    """Return GLSL of the share of the light within x, in units of the stretch: cdf of the red skin profile."""
     gaussians = separable()
     weights = np.array([w[0] for w in gaussians.weights])
     terms = " + ".join(

@@ -1,4 +1,4 @@
-"""What a translucent thing of the render is made of: a measured material under the light of a setting; its texture.
+"""Materials of translucent parts: measured ones under the light of a setting; and their texture.
 
 A reflectance texture of skin is drawn by formulas: blotches, freckles of a millimetre, finer stubble. A texture
 (rows, columns, 3) lies over the head's u and v; row 0 is at v = 0. Fixed seeds: the same texture everywhere.
@@ -17,7 +17,7 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
 from profilefit.recipes.toml_tables import Range
-from profilefit.scenes.skin.law import albedo_of
+from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.world import Rgb, rgb
 
@@ -32,7 +32,7 @@ LIPS = np.array([0.98, 0.62, 0.72])
 
 @dataclass(frozen=True)
 class Translucent:
-    """alpha single-scattering albedo [-], mfp transport mean free path [mm], reflectance A [-]: red, green, blue."""
+    """Material of red, green, blue: alpha [-], transport mean free path [mm], reflectance A [-]."""
 
     name: str
     alpha: Rgb
@@ -52,20 +52,20 @@ class Painted:
 
     @classmethod
     def even(cls, reflectance: Iterable[float], mfp: Iterable[float]) -> Painted:
-        """A material of one A and one mean free path a colour."""
+        """Return a material of one A and one mean free path a colour."""
         first, second = (rgb(np.fromiter(values, float)) for values in (reflectance, mfp))
         (a, b, c), (d, e, f) = (tuple((one, one) for one in values) for values in (first, second))
         return cls((a, b, c), (d, e, f))
 
     def middle(self, setting: Setting = DIFFUSE) -> Translucent:
-        """The material in the middle of the ranges: mean A, geometric mean of the mean free paths."""
+        """Return the material in the middle of the ranges: mean A, geometric mean of the mean free paths."""
         reflectance = np.mean(self.reflectance, axis=1)
         alpha = [albedo_of(one, setting) for one in reflectance.tolist()]
         return Translucent("painted", rgb(alpha), rgb(np.prod(np.sqrt(self.mfp), axis=1)), rgb(reflectance))
 
 
 def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
-    """A material of Jensen et al. (2001), table 1; its A is that of the exact half space in a setting."""
+    """Return a material of Jensen et al. (2001), table 1; its A is that of the exact half space in a setting."""
     if name not in BY_NAME:
         raise InputError(f"material must be one of {', '.join(BY_NAME)}, got {name!r}")
     alpha = np.array(BY_NAME[name].alpha)
@@ -73,7 +73,7 @@ def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
 
 
 def skin(reflectance: ArrayLike, columns: int = 2048, seed: int = 7) -> NDArray[np.float32]:
-    """(columns / 2, columns, 3) A in (0, 1) [-] around the given one of red, green and blue."""
+    """Return (columns / 2, columns, 3) A in (0, 1) [-] around the given one of red, green and blue."""
     rng = np.random.default_rng(seed)
     rows = columns // 2
     texture = np.asarray(reflectance, float) * (1.0 + _blotches(rng, rows, columns))
@@ -84,17 +84,17 @@ def skin(reflectance: ArrayLike, columns: int = 2048, seed: int = 7) -> NDArray[
 
 
 def plain(reflectance: ArrayLike) -> NDArray[np.float32]:
-    """(1, 1, 3) the same A everywhere."""
+    """Return (1, 1, 3) the same A everywhere."""
     return np.asarray(reflectance, np.float32).reshape(1, 1, 3)
 
 
 def _blend(texture: Floats, left: Floats, share: Floats) -> Floats:
-    """A is multiplied by `left` where share is 1, by 1 where it is 0."""
+    """Multiply A by `left` where share is 1, by 1 where it is 0."""
     return texture * (1.0 + (left - 1.0) * share[..., None])
 
 
 def _blotches(rng: np.random.Generator, rows: int, columns: int) -> Floats:
-    """Relative deviations of A, (rows, columns, 3): large and reddish, small and grey."""
+    """Return relative deviations of A, (rows, columns, 3): large and reddish, small and grey."""
     pixel = AROUND / columns
     large = _noise(rng, rows, columns, 9.0 / pixel)[..., None] * [0.05, 0.11, 0.12]
     small = _noise(rng, rows, columns, 0.5 / pixel)[..., None] * [0.05, 0.06, 0.06]
@@ -107,7 +107,7 @@ def _noise(rng: np.random.Generator, rows: int, columns: int, width: float) -> F
 
 
 def _dots(rng: np.random.Generator, rows: int, columns: int, number: int, chance, radii: tuple[float, float]) -> Floats:
-    """(rows, columns) in [0, 1]: soft discs, more where chance(u, v) is high; radii [mm] from ... to."""
+    """Return (rows, columns) in [0, 1]: soft discs, more where chance(u, v) is high; radii [mm] from ... to."""
     u, v, kept = rng.random((3, number * 3))
     chosen = np.flatnonzero(kept < chance(u, v))[:number]
     radius, depth = rng.uniform(*radii, chosen.size), rng.uniform(0.4, 1.0, chosen.size)
@@ -124,12 +124,12 @@ def _dots(rng: np.random.Generator, rows: int, columns: int, number: int, chance
 
 
 def _freckled(u: Floats, v: Floats) -> Floats:
-    """Cheeks and nose."""
+    """Return the chance of a freckle, on cheeks and nose."""
     return 0.06 + 0.94 * np.exp(-(((u - 0.5) / 0.13) ** 2) - ((v - 0.47) / 0.07) ** 2)
 
 
 def _bearded(u: Floats, v: Floats) -> Floats:
-    """Chin, jaw and upper lip, not the lips."""
+    """Return the chance of stubble, on chin, jaw and upper lip, not the lips."""
     jaw = np.exp(-(((u - 0.5) / 0.22) ** 4) - ((v - 0.27) / 0.10) ** 4)
     return jaw * (np.hypot((u - 0.5) / 0.045, (v - 0.345) / 0.025) > 1.0)
 

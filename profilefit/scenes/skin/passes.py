@@ -1,4 +1,4 @@
-"""The head's own technique: Jimenez et al.'s separable filter, which blurs along rows and then along columns."""
+"""Technique of the head: Jimenez et al.'s separable filter, which blurs along rows and then along columns."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.skin.law import FOLLOW, Separable, albedo_of, transmitted
-from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Pass, Technique, maps, through_text
+from profilefit.scenes.skin.law import FOLLOW, Separable, transmitted
+from profilefit.scenes.skin.truth import albedo_of
+from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Technique, maps, through_text
 from profilefit.shader.emit import text_beside
 
 Floats = NDArray[np.float64]
@@ -18,7 +20,7 @@ HALFWAY = "halfway_map"
 
 @dataclass(frozen=True)
 class SeparableFilter(Technique):
-    """One kernel serves the whole picture: that of its mean A, where no alpha is fixed. A sample is a tap."""
+    """Filter by one kernel all over the picture: that of its mean A, where no alpha is fixed. A sample is a tap."""
 
     kernel: Separable = field(default_factory=Separable)
 
@@ -42,7 +44,7 @@ class SeparableFilter(Technique):
         return LawText("separable", through_text(transmitted()))
 
     def lengths(self, frame: Frame) -> Floats:
-        """Stretches of the kernel (3,) [mm]."""
+        """Return the stretches of the kernel (3,) [mm]."""
         alpha = frame.fixed_alpha
         if alpha is None:
             alpha = np.array([albedo_of(a, self.kernel.setting) for a in frame.mean_reflectance().tolist()])

@@ -20,21 +20,19 @@ from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
-from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
-from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.picture import Drawn
-from profilefit.scenes.stage.request import Shown, ViewRequest
+from profilefit.scenes.stage.judge import surface_judge
+from profilefit.scenes.stage.picture import RenderResult
+from profilefit.scenes.stage.request import ViewRequest
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_integral import exitance_of, own_error
-from profilefit.scenes.stage.technique import Lambert, Technique
+from profilefit.scenes.stage.technique import Lambert, Technique, alone
 from profilefit.scenes.stage.world import Camera, Part, Scene
 
 
 @dataclass(frozen=True)
 class Head(Scene):
-    """The scene, and what scatters in its parts."""
+    """Scene, and the material of its parts."""
 
     material: Translucent = field(default_factory=translucent)
 
@@ -49,7 +47,7 @@ def head_scene(
     columns: int = 2048,
     setting: Setting = DIFFUSE,
 ) -> Head:
-    """A head under grazing light with a thin band before it; all of one material, freckles and stubble on the face.
+    """Return a head under grazing light behind a thin band: all of one material, freckles and stubble on the face.
 
     material  by its name, or the middle of a painted one
     detail  of the meshes, a whole number >= 1;  columns  of the skin's texture
@@ -99,7 +97,7 @@ class SceneRequest(ViewRequest):
 
 
 def read(file: str, content: Table) -> SceneRequest:
-    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
     tables.text("", "title", content, "")
@@ -118,22 +116,16 @@ def read(file: str, content: Table) -> SceneRequest:
     )
 
 
-def draw(context: moderngl.Context, of: SceneRequest) -> Drawn:
-    """The picture, its truth, error and cost: a minute for 26 000 pixels, which the truth takes."""
+def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
+    """Draw the picture beside its reference, with error and cost: a minute for 26 000 pixels, of the reference."""
     scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
-    mfp = scene.material.mfp
-    with Stage(context, (2 * of.size[0], 2 * of.size[1])) as stage:
-        stage.draw(scene)
-        fine = stage.buffers()
+    pair = alone(of.label, of.technique, scene.material.mfp)
     with Stage(context, of.size) as stage:
         stage.draw(scene)
-        buffers = stage.buffers()
-        request.require_lit(of.file, buffers)
-        judge = Judge(stage, mfp, exitance_of(buffers, mfp, of.setting), buffers.mask > INSIDE)
-        shown = Shown(of.label, of.technique, of.technique)
-        return request.drawn(judge, of, shown, own_error(fine, mfp, of.setting))
+        request.require_lit(of.file, stage.buffers())
+        return request.rendered(stage, surface_judge(stage, scene, pair.mfp, of.setting), of, pair)
 
 
 def _material(tables: Tables, content: Table, setting: Setting) -> str | Painted:

@@ -1,1 +1,1 @@
-"""What every scene shares: G-buffer, shadow map, gather, exact edges and integrals, a head."""
+"""Machinery of every scene: passes, renderer, judge, G-buffer, gather, exact edges and integrals, a head."""

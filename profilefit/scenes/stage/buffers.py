@@ -1,10 +1,10 @@
-"""The G-buffer: what the camera sees of a scene, pixel by pixel, as numpy arrays."""
+"""G-buffer: the surface that the camera sees of a scene, pixel by pixel, as numpy arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,6 +15,8 @@ VECTORS = ("irradiance", "reflectance", "position", "normal")
 NUMBERS = ("mask", "thickness", "visibility", "roughness")
 INSIDE = 0.5  # the shaders' threshold of the mask: light scatters inside where it is beyond
 ROUNDING = 1e-6  # a float32 that came from a texture's filter may end so far beyond 1
+SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
+PLACE = "place_map"  # u, v, and 1 where a surface is
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,8 @@ class Buffers:
         rows, columns = self.mask.shape
         return columns, rows
 
-    def targets(self) -> tuple[Singles, Singles, Singles, Singles]:
-        """The four float targets, (h, w, 4) each."""
+    def maps(self) -> dict[str, Singles]:
+        """Return the four float maps (h, w, 4) of `SURFACE`, by name."""
         ones = np.ones_like(self.mask)
         fourth = (
             self.thickness,
@@ -81,11 +83,17 @@ class Buffers:
             self.mask,
             0.42 * ones if self.roughness is None else self.roughness,
         )
-        irradiance, reflectance, position, normal = (
-            np.concatenate([getattr(self, name), last[..., None]], axis=-1).astype(np.float32)
-            for name, last in zip(VECTORS, fourth, strict=True)
-        )
-        return irradiance, reflectance, position, normal
+        return {
+            name: np.concatenate([getattr(self, vector), last[..., None]], axis=-1).astype(np.float32)
+            for name, vector, last in zip(SURFACE, VECTORS, fourth, strict=True)
+        }
+
+    @classmethod
+    def of_maps(cls, maps: Iterable[Singles], pixel: float, is_perspective: bool) -> Buffers:
+        """Return the G-buffer of four maps (h, w, 4), in the order of `SURFACE`."""
+        one, two, three, four = maps
+        vectors = one[..., :3], two[..., :3], three[..., :3], four[..., :3]
+        return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
 
 
 def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], what: str) -> None:
@@ -94,7 +102,7 @@ def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], w
 
 
 def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:
-    """A plane that faces an orthographic camera and fills its view.
+    """Return a plane that faces an orthographic camera and fills its view.
 
     size  columns, rows;  pixel [mm];  reflectance, irradiance  broadcast to (rows, columns, 3)
     """
@@ -110,89 +118,9 @@ def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance
 
 
 def step_edge(size: tuple[int, int], pixel: float, reflectance: ArrayLike) -> Buffers:
-    """`flat`, lit where x > 0 only: the edge is a border of pixels, so `size` has an even number of columns."""
+    """Return `flat`, lit where x > 0 only: the edge is a border of pixels, so `size` has an even number of columns."""
     columns, rows = size
     if columns % 2:
         raise InputError(f"size must have an even number of columns, so that a border is at x = 0, got {columns}")
     lit = np.broadcast_to((np.arange(columns) >= columns // 2).astype(float)[None, :, None], (rows, columns, 3))
     return flat(size, pixel, reflectance, lit)
-
-
-SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
-PLACE = "place_map"  # u, v, and 1 where a surface is
-
-
-class Maps:
-    """Float textures of one size by name, four channels each, which passes read and fill."""
-
-    def __init__(self, context: moderngl.Context, size: tuple[int, int]):
-        self.context, self.size = context, size
-        self._maps: dict[str, moderngl.Texture] = {}
-        self._into: dict[str, moderngl.Framebuffer] = {}
-
-    def map(self, name: str) -> moderngl.Texture:
-        """The texture of that name, made on first use."""
-        if name not in self._maps:
-            self._maps[name] = float_texture(self.context, self.size, 4)
-        return self._maps[name]
-
-    def into(self, name: str) -> moderngl.Framebuffer:
-        """What fills it."""
-        if name not in self._into:
-            self._into[name] = self.context.framebuffer([self.map(name)])
-        return self._into[name]
-
-    def release(self) -> None:
-        for framebuffer in self._into.values():
-            framebuffer.release()
-        for texture in self._maps.values():
-            texture.release()
-
-
-class Targets(Maps):
-    """Those of a stage: the maps of `SURFACE` and `PLACE`, which parts are drawn into, and all that passes need."""
-
-    def __init__(self, context: moderngl.Context, size: tuple[int, int]):
-        super().__init__(context, size)
-        self._depth = context.depth_renderbuffer(size)
-        self.surface = context.framebuffer([self.map(name) for name in (*SURFACE, PLACE)], self._depth)
-
-    def upload(self, buffers: Buffers) -> None:
-        for name, array in zip(SURFACE, buffers.targets(), strict=True):
-            self._maps[name].write(np.ascontiguousarray(array).tobytes())
-
-    def read(self, pixel: float, is_perspective: bool) -> Buffers:
-        irradiance, reflectance, position, normal = (pixels(self._maps[name]) for name in SURFACE)
-        return Buffers(
-            irradiance[..., :3],
-            reflectance[..., :3],
-            position[..., :3],
-            normal[..., :3],
-            position[..., 3],
-            irradiance[..., 3],
-            pixel,
-            is_perspective,
-            reflectance[..., 3],
-            normal[..., 3],
-        )
-
-    def release(self) -> None:
-        self.surface.release()
-        super().release()
-        self._depth.release()
-
-
-def float_texture(
-    context: moderngl.Context, size: tuple[int, int], channels: int, array: Singles | None = None
-) -> moderngl.Texture:
-    """A float32 texture without a filter, of an array (rows, columns, channels) if one is given."""
-    data = None if array is None else np.ascontiguousarray(array, np.float32).tobytes()
-    texture = context.texture(size, channels, data, dtype="f4")
-    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    return texture
-
-
-def pixels(texture: moderngl.Texture) -> Singles:
-    """(h, w, channels) float32, row 0 at the bottom; a copy."""
-    columns, rows = texture.size
-    return np.frombuffer(texture.read(), np.float32).reshape(rows, columns, texture.components).copy()

@@ -1,4 +1,4 @@
-"""The exact half space as a law that a shader can run: textures for given albedos behind the functions of a law.
+"""Exact half space as a law that a shader can run: textures for given albedos behind the functions of a law.
 
 For tests and references: what any closed form would give if it had no error.
 """
@@ -44,25 +44,25 @@ class ExactLaw:
         require_isotropic(self.setting)
 
     def text(self, name: str) -> str:
-        """The law's text with the prefix `name`; it needs the textures of `textures(name)`."""
+        """Return the law's text with the prefix `name`; it needs the textures of `textures(name)`."""
         reflectance = np.atleast_1d(exact.reflectance(self.alpha, self.setting))
         rows = {"ROWS": str(len(self.alpha)), "ALPHAS": ", ".join(literal(a) for a in self.alpha)}
         return table_text(name, reflectance) + _filled("exact_law", name, rows)
 
     def textures(self, name: str) -> dict[str, Singles]:
-        """Float textures (rows, columns, channels) by the names of their samplers."""
+        """Return float textures (rows, columns, channels) by the names of their samplers."""
         drawn, known = _tables(self.alpha, self.setting)
         return {f"{name}_drawn": drawn, f"{name}_known": known}
 
 
 def require_isotropic(setting: Setting) -> None:
-    """SettingError where a setting has g: a scene's albedos and lengths are reduced, those of exact light are not."""
+    """Raise SettingError where a setting has g: a scene's albedos and lengths are reduced, exact light's are not."""
     if setting.g != 0.0:
         raise SettingError(f"a scene's exact light scatters isotropically: setting must have g = 0, got {setting}")
 
 
 def table_text(name: str, reflectance: Iterable[float]) -> str:
-    """GLSL of a table, whose shapes are rows, of A [-] each."""
+    """Return GLSL of a table, whose shapes are rows, of A [-] each."""
     reflectances = [literal(float(a)) for a in reflectance]
     values = {
         "ROWS": str(len(reflectances)),
@@ -82,14 +82,14 @@ def _filled(file: str, name: str, values: Mapping[str, str]) -> str:
 
 
 def columns() -> tuple[Floats, Floats]:
-    """t (DRAWN,) of the radii that are drawn, and x (KNOWN,) [mfp] of density and cdf: a table's columns."""
+    """Return t (DRAWN,) of the radii that are drawn, and x (KNOWN,) [mfp] of density and cdf: a table's columns."""
     t = np.linspace(0.0, MOST_DEPTH, DRAWN)
     t[0] = 1e-4 * t[1]
     return t, np.maximum(NEAR * np.sinh(np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOWN)), NEAREST)
 
 
 def row(radius: Floats, ring: Floats, share: Floats) -> tuple[Singles, Singles]:
-    """Of x at each t, density 2 pi x R_d / A and cdf at each x of `columns`: ln(x/t) (DRAWN, 1), and ln density and
+    """Return a row of x at each t, and of density 2 pi x R_d / A and cdf at each x: ln(x/t) (DRAWN, 1), ln density and
     -ln(1 - cdf) (KNOWN, 2)."""
     left = np.maximum(1.0 - share, np.exp(-MOST_DEPTH - 10.0))
     known = np.stack([np.log(np.maximum(ring, LEAST_DENSITY)), -np.log(left)], axis=-1)
@@ -98,7 +98,7 @@ def row(radius: Floats, ring: Floats, share: Floats) -> tuple[Singles, Singles]:
 
 @cache
 def _tables(alpha: tuple[float, ...], setting: Setting) -> tuple[Singles, Singles]:
-    """A row for each albedo; the same arrays each time, which are sent once."""
+    """Return a row for each albedo; the same arrays each time, which are sent once."""
     drawn, known = zip(*(_table(one, setting) for one in alpha), strict=True)
     return np.stack(drawn), np.stack(known)
 

@@ -1,4 +1,4 @@
-"""The exact half space as a table over albedo and radius, for sums over millions of pairs of points.
+"""Exact half space as a table over albedo and radius, for sums over millions of pairs of points.
 
 ln(R_d l^2 / A) + kappa x and ln(cdf / x), x = r/l, are smooth in s = sqrt(1 - alpha) and ln x: the decay rate kappa
 takes what falls off exponentially, the rest bends over one unit of ln x. Cubic splines of both through exact values;
@@ -34,7 +34,7 @@ LEAST_REFRACTED = (
 
 @dataclass(frozen=True)
 class Curves:
-    """The exact half space at m albedos, or what another `CurveTable` has at m values.
+    """Exact half space at m albedos, or another `CurveTable` at m values.
 
     alpha, reflectance, kappa (m,)  albedo, A [-], decay rate [1/mfp]
     profile, cdf (m, intervals, 4)  ln(R_d l^2 / A) + kappa x and ln(cdf / x) between knots of ln x, which start at
@@ -48,21 +48,21 @@ class Curves:
     cdf: Floats
 
     def density(self, x: Floats) -> Floats:
-        """R_d l^2 / A of each albedo at its x = r/l > 0, (m, n); taken at the table's ends beyond them [-]."""
+        """Return R_d l^2 / A of each albedo at its x = r/l > 0, (m, n); taken at the table's ends beyond them [-]."""
         near = np.clip(x, NEAREST, FARTHEST)
         return np.exp(_cubic(self.profile, near) - self.kappa[:, None] * near)
 
     def share(self, x: Floats) -> Floats:
-        """Cdf of each albedo at its x = r/l >= 0, (m, n) [-]."""
+        """Return the cdf of each albedo at its x = r/l >= 0, (m, n) [-]."""
         near = np.clip(x, NEAREST, FARTHEST)
         return np.minimum(np.exp(_cubic(self.cdf, near)) * np.minimum(x, FARTHEST), 1.0)
 
 
 class CurveTable(Protocol):
-    """Where light that scatters in a surface takes its curves from: an `ExactTable`, or a scene's own."""
+    """Source of curves for light that scatters in a surface: an `ExactTable`, or a scene's own."""
 
     def curves(self, values: ArrayLike, /) -> Curves:
-        """At values (3 m,) in [0, 1] [-], pixel by pixel, red, green, blue in turn.
+        """Return curves at values (3 m,) in [0, 1] [-], pixel by pixel, red, green, blue in turn.
 
         A value is A, or what the table has in its place. Each curve is normalised by its own A, `Curves.reflectance`:
         its cdf tends to 1.
@@ -71,7 +71,7 @@ class CurveTable(Protocol):
 
 @dataclass(frozen=True)
 class ExactTable:
-    """The splines of one setting: (s, ln x) -> ln(R_d l^2 / A) + kappa x, and ln(cdf / x); A -> s, s -> kappa."""
+    """Splines of one setting: (s, ln x) -> ln(R_d l^2 / A) + kappa x, and ln(cdf / x); A -> s, s -> kappa."""
 
     y: Floats
     profile: RectBivariateSpline
@@ -79,7 +79,7 @@ class ExactTable:
     root: CubicSpline
 
     def curves(self, reflectance: ArrayLike) -> Curves:
-        """At reflectances A (m,) in [0, 1]; InputError."""
+        """Return curves at reflectances A (m,) in [0, 1]; InputError."""
         values = np.atleast_1d(np.asarray(reflectance, float))
         if values.ndim != 1 or not np.all((values >= 0) & (values <= 1)):
             raise InputError(f"reflectance must be a list of numbers in [0, 1], got {reflectance!r}")
@@ -90,7 +90,7 @@ class ExactTable:
 
 
 def hermite(spline: RectBivariateSpline, at: Floats, y: Floats) -> Floats:
-    """A spline of (s, ln x) at some s (m,), as cubics between the knots y of ln x (m, intervals, 4), as in `Curves`."""
+    """Return a spline of (s, ln x) at s (m,), as cubics between knots y of ln x (m, intervals, 4), as in `Curves`."""
     order = np.argsort(at)
     value, slope = np.empty((at.size, y.size)), np.empty((at.size, y.size))
     value[order] = spline(at[order], y)
@@ -101,13 +101,13 @@ def hermite(spline: RectBivariateSpline, at: Floats, y: Floats) -> Floats:
 
 
 def knots() -> Floats:
-    """ln x of a table's columns."""
+    """Return ln x of a table's columns."""
     return np.log(NEAREST) + STEP * np.arange(int(np.ceil(np.log(FARTHEST / NEAREST) / STEP)) + 1)
 
 
 @lru_cache(maxsize=4)
 def exact_table(setting: Setting) -> ExactTable:
-    """The table of a light and a surface, built once: seconds; SettingError where it has g.
+    """Return the table of a light and a surface, built once: seconds; SettingError where it has g.
 
     Relative error below 1e-5 of R_d for x in [1e-5, 3000] where x^2 R_d l^2 / A > 1e-10, and of the cdf everywhere;
     where the surface refracts, below 1e-3 of R_d where x^2 R_d l^2 / A > 1e-8, and 1e-7 of the whole in the cdf.
@@ -125,7 +125,7 @@ def exact_table(setting: Setting) -> ExactTable:
 
 
 def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
-    """ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint [-]."""
+    """Return ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint [-]."""
     path = np.asarray(exact.decay_rate(alpha))[:, None] * np.exp(y)
     kept = held(path <= FAINT)
     profile = np.asarray(exact.profile(np.exp(y[kept]), alpha[:, None], setting=setting))
@@ -136,13 +136,13 @@ def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
 
 
 def held(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Of each column itself, or the last before all that is faint."""
+    """Return for each column itself, or the last before all that is faint."""
     last = np.where(bright.all(axis=1), bright.shape[1], np.argmin(bright, axis=1)) - 1
     return np.minimum(np.arange(bright.shape[1]), last[:, None])
 
 
 def _cubic(coefficients: Floats, x: Floats) -> Floats:
-    """The curves (m, intervals, 4) at x (m, n)."""
+    """Return the curves (m, intervals, 4) at x (m, n)."""
     place = (np.log(x) - np.log(NEAREST)) / STEP
     k = np.minimum(place.astype(int), coefficients.shape[1] - 1)
     t = place - k

@@ -1,4 +1,4 @@
-"""Scattered light by samples of a law: the technique of Liang et al., (22)."""
+"""Scattered light by samples of a law: technique of Liang et al., (22)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.exact_law import NAME, ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
+from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, prefix, text_beside
 
 Law = ProfileLaw | ExactLaw
@@ -18,13 +19,13 @@ Law = ProfileLaw | ExactLaw
 
 @dataclass(frozen=True, eq=False)
 class Gather(Technique):
-    """Each pixel samples radii of a law, whose text is compiled in."""
+    """Technique by which each pixel samples radii of a law, whose source is compiled in."""
 
     law: LawText
 
     @classmethod
     def of(cls, law: Law) -> Gather:
-        """By a law with a shader source, or by the exact half space."""
+        """Return samples of a law with a shader source, or of the exact half space."""
         if isinstance(law, ExactLaw):
             return cls(LawText(NAME, law.text(LAW), law.textures(LAW)))
         return cls(LawText(prefix(law), law_text(law, name=LAW)))
@@ -53,7 +54,7 @@ class Gather(Technique):
 
 
 def technique(by: Law | Technique) -> Technique:
-    """A technique itself, or samples of a law; InputError on anything else."""
+    """Return a technique itself, or samples of a law; InputError on anything else."""
     if isinstance(by, Technique):
         return by
     if isinstance(by, Law):

@@ -1,160 +1,99 @@
-"""Passes 1 and 2: the depth along the light, and from the camera all that the others need, in five targets at once."""
+"""Passes 1 and 2: the depth along the light, and from the camera all that the others need, in five maps at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.stage.technique import ShaderProgram
+from profilefit.scenes.stage.buffers import PLACE, SURFACE
+from profilefit.scenes.stage.renderer import NEAREST, Pass, Read, Smooth
 from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
-from profilefit.shader.context import check_errors
 from profilefit.shader.emit import text_beside
 
-SHADOW_SIDE = 2048
+SHADOW, SHADOW_SIDE = "shadow_map", 2048  # of one channel, and of that many texels a side
 NOWHERE = 1e6  # depth along the light where nothing is [mm]
 MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
-ANISOTROPY = 8.0
-Values = dict[str, object]
+Values = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """Around everything there is [mm]."""
+    """Sphere around all parts of a scene [mm]."""
 
     centre: NDArray[np.float64]
     radius: float
 
-
-class Geometry:
-    """The programs of both passes and the shadow map."""
-
-    def __init__(self, context: moderngl.Context, shadow_side: int = SHADOW_SIDE):
-        self.context = context
-        self._shadow, self._surface = (
-            ShaderProgram(context, name, *(text_beside(__name__, f"glsl/{name}.{stage}") for stage in ("frag", "vert")))
-            for name in ("shadow", "surface")
-        )
-        self._map = context.texture((shadow_side, shadow_side), 1, dtype="f4")
-        self._map.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._depth = context.depth_renderbuffer((shadow_side, shadow_side))
-        self._target = context.framebuffer([self._map], self._depth)
-        self._parts: tuple[Part, ...] = ()
-        self._drawn: list[_Drawn] = []
-        self._unwrapped: ShaderProgram | None = None
-
-    def draw(self, scene: Scene, target: moderngl.Framebuffer) -> None:
-        """Both passes; the target has five float textures and a depth. Parts seen before are not sent again."""
-        if scene.parts is not self._parts:
-            self._release_parts()
-            self._drawn = [_Drawn(self.context, part, self._shadow.compiled) for part in scene.parts]
-            self._parts = scene.parts
-        sphere = _around(scene)
-        light = self._light(scene, sphere)
-        self._draw_shadow(light)
-        self._draw_surface(scene, light, sphere, target)
-
-    def unwrap(self, part: Part, scene: Scene, target: moderngl.Framebuffer, inset: tuple[float, float]) -> None:
-        """After `draw` of the scene: one of its parts laid out over its uv, positions and normals in the world.
-
-        inset  share of the target that u and v from 0 to 1 take
-        """
-        if self._unwrapped is None:
-            texts = (text_beside(__name__, f"glsl/{file}") for file in ("surface.frag", "atlas.vert"))
-            self._unwrapped = ShaderProgram(self.context, "atlas", *texts)
-        drawn = next(one for one in self._drawn if one.part is part)
-        light = self._light(scene, _around(scene))
-        values = {**light, **self._shading(scene), "view": np.eye(4), "inset": inset}
-        with self.context.scope(target, enable_only=moderngl.NOTHING):
-            target.clear()
-            drawn.draw_surface(self._map, values, self._unwrapped)
-        check_errors(self.context, "atlas")
-
-    def release(self) -> None:
-        self._release_parts()
-        if self._unwrapped is not None:
-            self._unwrapped.release()
-        for one in (self._target, self._depth, self._map, self._surface, self._shadow):
-            one.release()
-
-    def _release_parts(self) -> None:
-        for part in self._drawn:
-            part.release()
-        self._parts, self._drawn = (), []
-
-    def _light(self, scene: Scene, sphere: Sphere) -> Values:
-        toward = unit(scene.light.direction)
-        half = MARGIN * sphere.radius
-        eye = sphere.centre + 2.0 * sphere.radius * toward
-        clip = orthographic(half, half, 0.5 * sphere.radius, 4.0 * sphere.radius) @ looking(eye, sphere.centre)
-        return {
-            "light_clip": clip,
-            "toward_light": tuple(toward),
-        }
-
-    def _draw_shadow(self, light: Values) -> None:
-        self._shadow.assign({}, light)
-        with self.context.scope(self._target, enable_only=moderngl.DEPTH_TEST):
-            self._target.clear(NOWHERE, depth=1.0)
-            for part in self._drawn:
-                part.shadow.render(moderngl.TRIANGLES)
-        check_errors(self.context, "shadow")
-
-    def _draw_surface(self, scene: Scene, light: Values, sphere: Sphere, target: moderngl.Framebuffer) -> None:
-        camera = scene.camera
-        depth = -(camera.view() @ np.append(sphere.centre, 1.0))[2]
-        near = max(depth - MARGIN * sphere.radius, 0.01 * sphere.radius)
-        values = {
-            **light,
-            **self._shading(scene),
-            "view": camera.view(),
-            "projection": camera.projection(target.width / target.height, near, depth + MARGIN * sphere.radius),
-        }
-        with self.context.scope(target, enable_only=moderngl.DEPTH_TEST):
-            target.clear(depth=1.0)
-            for part in self._drawn:
-                part.draw_surface(self._map, values, self._surface)
-        check_errors(self.context, "surface")
-
-    def _shading(self, scene: Scene) -> Values:
-        pixel = 2.0 * MARGIN * _around(scene).radius / self._map.width
-        return {"shadow_pixel": pixel, "light": scene.light.irradiance, "ambient": scene.ambient}
+    @classmethod
+    def around(cls, scene: Scene) -> Sphere:
+        points = np.concatenate([part.mesh.position for part in scene.parts])
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        return cls(centre, float(np.linalg.norm(points - centre, axis=1).max()))
 
 
-class _Drawn:
-    """A part on the GPU, for as long as it is drawn."""
+def surface_passes(scene: Scene, aspect: float, shadow_side: int) -> list[Pass]:
+    """Return passes 1 and 2 of a scene: into `SHADOW`, of `shadow_side` texels, then into the maps of a G-buffer.
 
-    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program):
-        self.context, self.part = context, part
-        self._vertices = context.buffer(part.mesh.vertices().tobytes())
-        self._triangles = context.buffer(part.mesh.triangles.astype("i4").tobytes())
-        self.shadow = context.vertex_array(shadow, [(self._vertices, "3f 5x4", "position")], self._triangles)
-        self._seen: dict[ShaderProgram, moderngl.VertexArray] = {}
-        rows, columns = part.reflectance.shape[:2]
-        self._skin = context.texture((columns, rows), 3, part.reflectance.astype("f4").tobytes(), dtype="f4")
-        self._skin.repeat_y = False
-        self._skin.build_mipmaps()
-        self._skin.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        self._skin.anisotropy = ANISOTROPY
-
-    def draw_surface(self, shadow_map: moderngl.Texture, values: Values, by: ShaderProgram) -> None:
-        own = {"translucent": float(self.part.is_translucent), "roughness": self.part.roughness}
-        by.assign({"skin": self._skin, "shadow_map": shadow_map}, {**values, **own})
-        if by not in self._seen:
-            content = [(self._vertices, "3f 3f 2f", "position", "normal", "uv")]
-            self._seen[by] = self.context.vertex_array(by.compiled, content, self._triangles)
-        self._seen[by].render(moderngl.TRIANGLES)
-
-    def release(self) -> None:
-        for array in (self.shadow, *self._seen.values()):
-            array.release()
-        for one in (self._vertices, self._triangles, self._skin):
-            one.release()
+    Args:
+        scene: the parts, light and camera.
+        aspect: width of the picture over its height [-].
+        shadow_side: texels of a side of the shadow map.
+    """
+    sphere, camera = Sphere.around(scene), scene.camera
+    light = _light(scene, sphere)
+    depth = -(camera.view() @ np.append(sphere.centre, 1.0))[2]
+    near = max(depth - MARGIN * sphere.radius, 0.01 * sphere.radius)
+    values = {
+        **light,
+        **_shading(scene, sphere, shadow_side),
+        "view": camera.view(),
+        "projection": camera.projection(aspect, near, depth + MARGIN * sphere.radius),
+    }
+    fragment, vertex = _text("shadow.frag"), _text("shadow.vert")
+    return [
+        Pass("shadow", {}, SHADOW, fragment, light, vertex, part.mesh, kept=NEAREST, clear=None if number else NOWHERE)
+        for number, part in enumerate(scene.parts)
+    ] + [
+        _surface("surface", part, SHADOW, values, kept=NEAREST, clear=None if number else 0.0)
+        for number, part in enumerate(scene.parts)
+    ]
 
 
-def _around(scene: Scene) -> Sphere:
-    points = np.concatenate([part.mesh.position for part in scene.parts])
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return Sphere(centre, float(np.linalg.norm(points - centre, axis=1).max()))
+def unwrapping(part: Part, scene: Scene, shadow: moderngl.Texture, inset: tuple[float, float]) -> Pass:
+    """Return the pass that lays a part of a scene out over its uv, positions and normals in the world.
+
+    Args:
+        part: one of the scene's.
+        scene: whose light falls on it.
+        shadow: the shadow map of that scene.
+        inset: share of the maps that u and v from 0 to 1 take [-].
+    """
+    sphere = Sphere.around(scene)
+    values = {**_light(scene, sphere), **_shading(scene, sphere, shadow.width), "view": np.eye(4), "inset": inset}
+    return _surface("atlas", part, shadow, values, clear=0.0)
+
+
+def _surface(vertex: str, part: Part, shadow: Read, values: Values, **more: Any) -> Pass:
+    own = {"translucent": float(part.is_translucent), "roughness": part.roughness}
+    reads: dict[str, Read] = {"skin": Smooth(part.reflectance), "shadow_map": shadow}
+    fragment, text = _text("surface.frag"), _text(f"{vertex}.vert")
+    return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, text, part.mesh, **more)
+
+
+def _light(scene: Scene, sphere: Sphere) -> Values:
+    toward, half = unit(scene.light.direction), MARGIN * sphere.radius
+    eye = sphere.centre + 2.0 * sphere.radius * toward
+    clip = orthographic(half, half, 0.5 * sphere.radius, 4.0 * sphere.radius) @ looking(eye, sphere.centre)
+    return {"light_clip": clip, "toward_light": tuple(toward)}
+
+
+def _shading(scene: Scene, sphere: Sphere, shadow_side: int) -> Values:
+    pixel = 2.0 * MARGIN * sphere.radius / shadow_side
+    return {"shadow_pixel": pixel, "light": scene.light.irradiance, "ambient": scene.ambient}
+
+
+def _text(file: str) -> str:
+    return text_beside(__name__, f"glsl/{file}")

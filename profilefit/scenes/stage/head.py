@@ -41,7 +41,7 @@ TWICE = (
 
 
 def head(detail: int = 1) -> Mesh:
-    """The skull and face; `detail` multiplies rows and columns."""
+    """Return the skull and face; `detail` multiplies rows and columns."""
     u, v = parameters(256 * detail, 384 * detail)
     direction = ball(u, v)
     box = np.sum(np.abs(direction) ** ROUNDNESS, axis=-1, keepdims=True) ** (-1.0 / ROUNDNESS)
@@ -53,7 +53,7 @@ def head(detail: int = 1) -> Mesh:
 
 
 def ear(side: int, detail: int = 1) -> Mesh:
-    """A plate of 5 mm with a thicker rim, flared out; side -1 at the picture's left, 1 at its right."""
+    """Return a plate of 5 mm with a thicker rim, flared out; side -1 at the picture's left, 1 at its right."""
     u, v = parameters(64 * detail, 96 * detail)
     direction = ball(u, v)
     x, y, z = np.moveaxis(direction, -1, 0)
@@ -70,7 +70,7 @@ def ear(side: int, detail: int = 1) -> Mesh:
 
 
 def neck(detail: int = 1) -> Mesh:
-    """A column from inside the jaw down, which widens towards the shoulders."""
+    """Return a column from inside the jaw down, which widens towards the shoulders."""
     u, v = parameters(64 * detail, 128 * detail)
     angle, y = 2.0 * np.pi * u, -190.0 + 150.0 * v
     radius = 50.0 + 70.0 * _rise(-y, 130.0, 200.0) ** 2
@@ -79,7 +79,7 @@ def neck(detail: int = 1) -> Mesh:
 
 
 def band(detail: int = 1, radius: float = 122.0, height: float = 11.0, thickness: float = 1.6) -> Mesh:
-    """A strip that runs around the brow at a distance, aslant; light shines through it."""
+    """Return a strip that runs around the brow at a distance, aslant; light shines through it."""
     u, v = parameters(16 * detail, 384 * detail)
     angle, around = 2.0 * np.pi * u, 2.0 * np.pi * v
     out = 0.5 * thickness * _squared(np.cos(around), 0.35)
@@ -91,13 +91,13 @@ def band(detail: int = 1, radius: float = 122.0, height: float = 11.0, thickness
 
 
 def ball(u: Floats, v: Floats) -> Floats:
-    """Unit vectors; u around y from the back, so that its seam is there, and v from the lowest point up."""
+    """Return the unit vectors; u around y from the back, so that its seam is there, and v from the lowest point up."""
     around, up = 2.0 * np.pi * (u - 0.5), np.pi * (v - 0.5)
     return np.stack([np.cos(up) * np.sin(around), np.sin(up), np.cos(up) * np.cos(around)], axis=-1)
 
 
 def _face(points: Floats) -> Floats:
-    """How far each point of the skull is pushed along z [mm]; the back of the head is left alone."""
+    """Return the push of each point of the skull along z [mm]; the back of the head is left alone."""
     x, y, z = np.moveaxis(points, -1, 0)
     push = np.zeros_like(x)
     for bump in ONCE:
@@ -112,13 +112,13 @@ def _bump(x: Floats, y: Floats, at_x: float, at_y: float, width: float, height: 
 
 
 def _rise(value: Floats, low: float, high: float) -> Floats:
-    """Smoothly from 0 at low to 1 at high."""
+    """Return a smooth rise from 0 at low to 1 at high."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def _squared(value: Floats, power: float) -> Floats:
-    """A circle's coordinate bent towards that of a square."""
+    """Return a circle's coordinate bent towards that of a square."""
     return np.sign(value) * np.abs(value) ** power
 
 

@@ -1,60 +1,177 @@
-"""Error of a picture's scattered light against what it costs: points, for a report to draw."""
+"""Judge of pictures: a reference, errors of pictures against it, and points of error against cost for a report."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import uniform_filter
 
+from mcml_sim import Setting
+from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.exact_law import DIFFUSE
+from profilefit.scenes.stage.exact_table import CurveTable
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.picture import ChartPoint
-from profilefit.scenes.stage.stage import By, Stage
-from profilefit.scenes.stage.world import Rgb
+from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, to_srgb
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface_integral import exitance_of, own_error
+from profilefit.scenes.stage.technique import TechniquePair
+from profilefit.scenes.stage.world import Scene
 
 Floats = NDArray[np.float64]
 TURNS = 5
+EXPOSURE = 1.1  # of pictures whose lamp is chosen for it: few of their pixels are clipped by it
+SQUARE = 7  # pixels of a side, over which a map of errors that are noisy takes a mean
 
 
 @dataclass(frozen=True)
 class Judge:
-    """A stage that has drawn a scene, and the truth of it; row 0 at the bottom.
+    """Reference of a picture; row 0 at the bottom.
 
-    mfp    of red, green, blue [mm];  truth  (h, w, 3) radiant exitance;  mask  (h, w), where light scatters
-    alpha  of the three [-], if not that of each pixel's A
+    Attributes:
+        reference: (h, w, 3) light.
+        mask: (h, w) pixels whose errors count.
+        truth_error: error of the reference itself.
+        exposure: factor by which pictures are shown.
+        halves: (2, h, w, 3) independent estimates, whose mean the reference is: errors are then without their noise.
     """
 
-    stage: Stage
-    mfp: Rgb
-    truth: Floats
+    reference: Floats
     mask: NDArray[np.bool_]
-    alpha: Rgb | None = field(default=None, kw_only=True)
+    truth_error: TruthError = UNKNOWN
+    exposure: float = EXPOSURE
+    halves: Floats | None = None
 
-    def rmse(self, exitance: NDArray[np.floating]) -> float:
-        """Root mean square error of (h, w, 3) where light scatters, over the mean of the truth there [-]."""
-        difference = exitance[self.mask] - self.truth[self.mask]
-        return float(np.sqrt(np.mean(difference**2)) / np.mean(self.truth[self.mask]))
+    @classmethod
+    def of_halves(cls, halves: Floats, white: float) -> Judge:
+        """Return the judge of all pixels of a picture that was estimated twice (2, h, w, 3).
 
-    def relative_error(self, exitance: NDArray[np.floating]) -> Floats:
-        """(h, w) root mean square over the channels, over the same mean [-], NaN elsewhere: its own RMS is `rmse`."""
-        error = np.sqrt(np.mean((exitance - self.truth) ** 2, axis=-1)) / np.mean(self.truth[self.mask])
-        return np.where(self.mask, error, np.nan)
+        Args:
+            halves: estimates whose errors are independent.
+            white: share of the reference's numbers that a picture does not clip [-].
+        """
+        reference = np.asarray(halves.mean(axis=0))
+        share = np.sqrt(np.mean((halves[1] - halves[0]) ** 2, axis=-1)) / 2.0 / np.mean(reference)
+        exposure = float(1.0 / max(np.quantile(reference, white), 1e-30))
+        return cls(reference, np.ones(reference.shape[:2], bool), TruthError.of(share), exposure, halves)
+
+    @property
+    def mean(self) -> float:
+        """Mean of the reference where errors count, in its unit."""
+        return float(np.mean(self.reference[self.mask]))
+
+    def rmse(self, picture: NDArray[np.floating]) -> float:
+        """Return the root mean square error of a picture (h, w, 3), over the reference's mean [-]."""
+        return float(np.sqrt(np.maximum(np.mean(self._squares(picture)[self.mask]), 0.0)) / self.mean)
+
+    def relative_error(self, picture: NDArray[np.floating]) -> Floats:
+        """Return a map (h, w) of root mean squares over the channels, over the same mean [-]; NaN where none counts.
+
+        Its own root mean square is `rmse`. With `halves` it is a mean over squares of pixels around each.
+        """
+        squares = self._squares(picture)
+        if self.halves is not None:
+            squares = np.maximum(uniform_filter(squares, SQUARE, mode="nearest"), 0.0)
+        return np.where(self.mask, np.sqrt(squares) / self.mean, np.nan)
+
+    def points(
+        self,
+        label: str,
+        samples: Sequence[int],
+        draw: Callable[[int], NDArray[np.floating]],
+        time: Callable[[int], float],
+        turns: int = TURNS,
+    ) -> list[ChartPoint]:
+        """Return error and cost of a technique with each number of samples.
+
+        Times are taken in turns, so that what else the machine does hits all of them.
+
+        Args:
+            label: of the technique.
+            samples: numbers of them.
+            draw: function of a number that returns the picture (h, w, 3).
+            time: function of a number that returns the milliseconds of its passes, which were compiled by `draw`.
+            turns: how often each is timed.
+        """
+        errors = [self.rmse(draw(number)) for number in samples]
+        times = np.array([[time(number) for number in samples] for _ in range(turns)])
+        return [
+            ChartPoint(label, number, error, tuple(turn))
+            for number, error, turn in zip(samples, errors, times.T.tolist(), strict=True)
+        ]
+
+    def result(
+        self,
+        picture: NDArray[np.floating],
+        chart: Sequence[ChartPoint],
+        samples: int,
+        frame: Sequence[float],
+        shown: NDArray[np.floating] | None = None,
+        of: str = "scattered light",
+        passes: Mapping[str, Any] | None = None,
+    ) -> RenderResult:
+        """Return a picture beside its reference.
+
+        Args:
+            picture: (h, w, 3) whose error is measured.
+            chart: points of the technique, one of them of `samples`.
+            samples: of the picture.
+            frame: milliseconds of a whole frame.
+            shown: (h, w, 3) radiance to the eye, where `picture` is exitance: whatever else it has is its own in both.
+            of: light that the errors are of.
+            passes: milliseconds of parts of the frame.
+        """
+        true = self.reference if shown is None else shown + (self.reference - picture) / np.pi
+        return RenderResult(
+            picture=to_srgb((picture if shown is None else shown)[::-1], self.exposure),
+            truth=to_srgb(true[::-1], self.exposure),
+            error=self.relative_error(picture)[::-1],
+            point=next(point for point in chart if point.samples == samples),
+            chart=tuple(chart),
+            frame=tuple(frame),
+            truth_error=self.truth_error,
+            of=of,
+            passes=passes or {},
+        )
+
+    def _squares(self, picture: NDArray[np.floating]) -> Floats:
+        """Return the mean square error (h, w) over the channels, which may be below 0 where noise is left out."""
+        first, second = (self.reference, self.reference) if self.halves is None else self.halves
+        return np.asarray(np.mean((picture - first) * (picture - second), axis=-1))
 
 
 def points(
-    judge: Judge, label: str, by: By, sampling: Sampling, samples: Sequence[int], turns: int = TURNS
+    stage: Stage, judge: Judge, pair: TechniquePair, sampling: Sampling, samples: Sequence[int], turns: int = TURNS
 ) -> list[ChartPoint]:
-    """Error and cost of a technique with each number of samples.
+    """Return error and cost of a stage's technique with each number of samples."""
 
-    Times are taken in turns, so that what else the machine does hits all of them.
+    def draw(number: int) -> NDArray[np.floating]:
+        return stage.scatter(pair.by, pair.mfp, replace(sampling, samples=number), pair.alpha)
+
+    def time(number: int) -> float:
+        return stage.time(pair.by, pair.mfp, replace(sampling, samples=number), 1, fixed_alpha=pair.alpha)[0]
+
+    return judge.points(pair.label, samples, draw, time, turns)
+
+
+def surface_judge(
+    stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, has_error: bool = True
+) -> Judge:
+    """Return the judge of a scene that a stage has drawn: the surface integral, all over its pixels.
+
+    Args:
+        stage: that has drawn the scene.
+        scene: drawn once more, with pixels of half the side, by which the error of the reference is estimated.
+        mfp: of the three channels (3,) [mm].
+        table: curves, or the setting of the exact half space.
+        has_error: whether that error is estimated.
     """
-    each = [replace(sampling, samples=number) for number in samples]
-    errors = [judge.rmse(judge.stage.scatter(by, judge.mfp, one, judge.alpha)) for one in each]
-    times = np.array(
-        [[judge.stage.time(by, judge.mfp, one, 1, fixed_alpha=judge.alpha)[0] for one in each] for _ in range(turns)]
-    )
-    return [
-        ChartPoint(label, one.samples, error, tuple(taken))
-        for one, error, taken in zip(each, errors, times.T.tolist(), strict=True)
-    ]
+    buffers, error = stage.buffers(), UNKNOWN
+    if has_error:
+        with Stage(stage.context, (2 * stage.size[0], 2 * stage.size[1])) as fine:
+            fine.draw(scene)
+            error = own_error(fine.buffers(), mfp, table)
+    return Judge(exitance_of(buffers, mfp, table), buffers.mask > INSIDE, error)

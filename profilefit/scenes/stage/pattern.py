@@ -1,4 +1,4 @@
-"""How pixels take their samples: how many, by which map, for which channel; one lattice for all, shifted by blue noise.
+"""Samples of pixels: how many, by which map, for which channel; one lattice for all, shifted by blue noise.
 
 A lattice of n points on the unit torus, (i a / n, (i + 1/2) / n) modulo 1, with the a for which the closest two are
 farthest apart (Korobov's form). A shift by a random point of one cell of it is as good as one by a random point of the
@@ -32,7 +32,7 @@ MOST_SEED = 2**31 - 1
 
 @dataclass(frozen=True)
 class Sampling:
-    """How the points of a lattice (`best`), shifted as a whole in each pixel, become radii and angles.
+    """Samples of a pixel: how the points of a lattice (`best`), shifted as a whole, become radii and angles.
 
     Noise on a step edge, alpha 0.8, within 4 mfp, with 16 and 64 points: 0.037 and 0.011; a Fibonacci lattice's 0.035
     and 0.012, Hammersley's set 0.036 and 0.012, the R2 sequence 0.038 and 0.014, Sobol's 0.050 and 0.014, random points
@@ -65,7 +65,7 @@ class Sampling:
 
 
 class Lattice(NamedTuple):
-    """a the generator; cell (2, 2) its two edges, the short one first, as rows of (xi, angle / 2 pi)."""
+    """Lattice of generator a; cell (2, 2) its two edges, the short one first, as rows of (xi, angle / 2 pi)."""
 
     generator: int
     cell: Floats
@@ -73,7 +73,7 @@ class Lattice(NamedTuple):
 
 @cache
 def best(samples: int) -> Lattice:
-    """The lattice of n points whose shortest difference is the longest."""
+    """Return the lattice of n points whose shortest difference is the longest."""
     candidates = [a for a in range(1, samples + 1) if gcd(a, samples) == 1]
     cells = [_cell(a, samples) for a in candidates]
     chosen = int(np.argmax([np.linalg.norm(cell[0]) for cell in cells]))
@@ -81,13 +81,13 @@ def best(samples: int) -> Lattice:
 
 
 def points(samples: int) -> Floats:
-    """(n, 2) xi and angle / 2 pi, before the shift."""
+    """Return (n, 2) xi and angle / 2 pi, before the shift."""
     i = np.arange(samples)
     return np.stack([i * best(samples).generator % samples / samples, (i + 0.5) / samples], axis=-1)
 
 
 def _cell(generator: int, samples: int) -> Floats:
-    """The shortest difference of two points, and the shortest that makes a cell of area 1 / n with it."""
+    """Return the shortest difference of two points, and the shortest that makes a cell of area 1 / n with it."""
     i = np.arange(samples)
     differences = (np.stack([i * generator % samples, i], axis=-1) / samples + WRAPS).reshape(-1, 2)
     length = np.linalg.norm(differences, axis=1)
@@ -106,13 +106,13 @@ STARTING_SHARE = 0.1  # of all pixels, in the pattern that is first made even
 
 @cache
 def shifts(side: int = SIDE, seed: int = 1) -> NDArray[np.float32]:
-    """(side, side, 2) numbers in (0, 1), two independent tiles whose every level is blue: shifts of xi and of angle."""
+    """Return (side, side, 2) in (0, 1), two independent tiles whose every level is blue: shifts of xi and of angle."""
     tiles = [(ranks(side, seed + channel) + 0.5) / side**2 for channel in range(2)]
     return np.stack(tiles, axis=-1).astype(np.float32)
 
 
 def ranks(side: int, seed: int) -> NDArray[np.int64]:
-    """(side, side) every whole number in [0, side^2) once; those below any level are spread evenly. Periodic."""
+    """Return (side, side) every whole number in [0, side^2) once; those below any level are spread evenly. Periodic."""
     pattern = _evened(side, np.random.default_rng(seed))
     count = int(pattern.sum())
     order = np.zeros((side, side), np.int64)
@@ -126,7 +126,7 @@ def ranks(side: int, seed: int) -> NDArray[np.int64]:
 
 
 class _Field:
-    """How crowded each place is by the chosen ones, on a torus; a place chosen or dropped changes it at once."""
+    """Crowding of each place by the chosen ones, on a torus; a place chosen or dropped changes it at once."""
 
     def __init__(self, pattern: NDArray[np.bool_]):
         self.kernel = _crowding(len(pattern))
@@ -136,18 +136,18 @@ class _Field:
             self.turn((row, column))
 
     def turn(self, place: Place) -> Place:
-        """Chooses a place, or drops it."""
+        """Choose a place, or drop it."""
         sign = -1.0 if self.chosen[place] else 1.0
         self.value += sign * np.roll(self.kernel, place, (0, 1))
         self.chosen[place] = not self.chosen[place]
         return place
 
     def tightest(self) -> Place:
-        """The chosen place that is most crowded."""
+        """Return the chosen place that is most crowded."""
         return self._place(np.argmax(np.where(self.chosen, self.value, -np.inf)))
 
     def widest(self) -> Place:
-        """The free place that is least crowded."""
+        """Return the free place that is least crowded."""
         return self._place(np.argmin(np.where(self.chosen, np.inf, self.value)))
 
     def _place(self, index: np.intp) -> Place:
@@ -156,14 +156,14 @@ class _Field:
 
 
 def _crowding(side: int) -> Floats:
-    """What a place at the origin adds to each place of the torus."""
+    """Return what a place at the origin adds to the crowding of each place of the torus."""
     distance = np.minimum(np.arange(side), side - np.arange(side))
     line = np.exp(-(distance**2) / (2.0 * SIGMA**2))
     return np.outer(line, line)
 
 
 def _evened(side: int, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """A random pattern whose tightest cluster has gone to its widest void until that changes nothing."""
+    """Return a random pattern whose tightest cluster has gone to its widest void until that changes nothing."""
     pattern = np.zeros(side * side, bool)
     pattern[rng.choice(side * side, int(STARTING_SHARE * side**2), replace=False)] = True
     field = _Field(pattern.reshape(side, side))

@@ -1,4 +1,4 @@
-"""Pictures: linear light for a screen; a scene as a technique draws it, beside its truth, with error and cost."""
+"""Pictures: linear light for a screen; a scene as a technique draws it, beside its reference, with error and cost."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ Bytes = NDArray[np.uint8]
 class ChartPoint:
     """Error and cost of a technique with so many samples (of the separable filter: taps).
 
-    rmse          root mean square error of the scattered light, over the mean of the truth [-]
-    milliseconds  of the technique's passes, each time that they were run (turns,)
+    Attributes:
+        label: of the technique.
+        samples: of a pixel.
+        rmse: root mean square error of the light, over the mean of the reference [-].
+        milliseconds: of the technique's passes, each time that they were run (turns,).
     """
 
     label: str
@@ -30,26 +33,40 @@ class ChartPoint:
 
 
 class TruthError(NamedTuple):
-    """What half the pixel's side changes in the truth, over its mean [-].
+    """Error of a reference over its mean [-]: half of the pixels and nine in ten are below the first two.
 
-    Half of the pixels and nine in ten are below the first two; the root mean square is what outlines set.
+    Of a surface integral it is what half the pixel's side changes, of paths and rays the standard error; the root mean
+    square is what outlines set.
     """
 
     half: float
     most: float
     rms: float
 
+    @classmethod
+    def of(cls, share: Floats) -> TruthError:
+        """Return the error of pixels whose errors are known, each over the reference's mean [-]."""
+        half, most = np.quantile(share, (0.5, 0.9)).tolist()
+        return cls(half, most, float(np.sqrt(np.mean(share**2))))
+
+
+UNKNOWN = TruthError(np.nan, np.nan, np.nan)
+
 
 @dataclass(frozen=True)
-class Drawn:
-    """A scene, drawn; row 0 at the top.
+class RenderResult:
+    """Scene, drawn beside its reference; row 0 at the top.
 
-    picture, truth  (h, w, 3) as a screen shows them
-    error           (h, w) root mean square of the channels' errors, over the mean of the truth [-]; NaN where none is
-                    measured. Its own root mean square is `point.rmse`, or more if the truth has noise
-    point           of the technique;  chart  the same with other numbers of samples, too, the least first
-    frame           milliseconds of a whole frame, each time that it was drawn (turns,)
-    of              what the errors are of;  passes  milliseconds of parts of the frame by their names, if known
+    Attributes:
+        picture, truth: (h, w, 3) as a screen shows them.
+        error: (h, w) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none is
+            measured. Its own root mean square is `point.rmse`, or more if the reference has noise.
+        point: of the technique.
+        chart: the same with other numbers of samples, too, the least first.
+        frame: milliseconds of a whole frame, each time that it was drawn (turns,).
+        truth_error: of the reference.
+        of: light that the errors are of.
+        passes: milliseconds of parts of the frame by their names, if known.
     """
 
     picture: Bytes
@@ -64,13 +81,13 @@ class Drawn:
 
 
 def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:
-    """Linear (h, w, 3) times `exposure`, as 8-bit values for a screen (IEC 61966-2-1); same order of rows."""
+    """Return linear light (h, w, 3) times `exposure` as 8-bit values of a screen (IEC 61966-2-1), rows as they are."""
     if not exposure > 0:
         raise InputError(f"exposure must be a factor > 0, got {exposure!r}")
     return np.round(srgb_codes(np.asarray(image, float) * exposure)).astype(np.uint8)
 
 
 def srgb_codes(linear: ArrayLike) -> Floats:
-    """Values of a screen [8-bit steps, 0 to 255] for linear ones, white 1, not rounded: fractions of a step count."""
+    """Return values of a screen [8-bit steps, 0 to 255] for linear ones, white 1; they are not rounded."""
     clipped = np.clip(np.asarray(linear, float), 0.0, 1.0)
     return 255.0 * np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)

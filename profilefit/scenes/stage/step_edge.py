@@ -1,4 +1,4 @@
-"""The flat step edge: an endless plane, lit for x > 0 and dark elsewhere. What a profile makes of it is an integral.
+"""Flat step edge: an endless plane, lit for x > 0 and dark elsewhere, whose light by a profile is an integral.
 
 A point at the distance d from the edge gathers from the lit side, where it lies on the dark one itself,
 
@@ -43,7 +43,7 @@ ALL = 1.0 - 1e-15  # share of the light that is all of it, to rounding
 def step_response(
     x: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0, setting: Setting | None = None, law: ProfileLaw | None = None
 ) -> float | Floats:
-    """L(x) / A: the share of its light that a point gathers from beyond the edge at 0, where x > 0 is lit [-].
+    """Return L(x) / A: the share of its light that a point gathers from beyond the edge at 0, where x > 0 is lit [-].
 
     x        place [length], any real number; mfp in the same unit; x, alpha, mfp broadcast
     alpha    single-scattering albedo in [0, 1]
@@ -68,7 +68,7 @@ def step_response(
 
 
 def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
-    """The light of a law, or of the exact half space; SettingError where there is none."""
+    """Return the light of a law, or of the exact half space; SettingError where there is none."""
     if law is not None:
         if setting is not None and setting != law.setting:
             raise SettingError(f"the law belongs to {law.setting}, got a request for {setting}")
@@ -85,7 +85,7 @@ def _require(name: str, values: Floats, good: NDArray[np.bool_], what: str) -> N
 
 
 def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
-    """The share from beyond a straight edge at each distance >= 0 [mfp], (n,)."""
+    """Return the share from beyond a straight edge at each distance >= 0 [mfp], (n,)."""
     found = np.full(distance.shape, 0.5)
     last = _last_radius(target, alpha)
     some = (distance > 0) & (distance < last)
@@ -99,7 +99,7 @@ def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
 
 
 def _rule(last: Floats) -> tuple[Floats, Floats]:
-    """Nodes and weights from 0 to each last u, (n,) -> (n, nodes): as many equal panels as the longest needs."""
+    """Return nodes and weights from 0 to each last u, (n,) -> (n, nodes): as many equal panels as the longest needs."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     panels = int(np.ceil(np.max(last) / PANEL))
     width = last[:, None, None] / panels
@@ -108,7 +108,7 @@ def _rule(last: Floats) -> tuple[Floats, Floats]:
 
 
 def _last_radius(target: Target, alpha: float) -> float:
-    """The radius beyond which, to rounding, no light leaves [mfp]: a law that ends has a kink there."""
+    """Return the radius beyond which, to rounding, no light leaves [mfp]: a law that ends has a kink there."""
     low, high = 0.0, FARTHEST
     if target.cdf(np.array([high]), alpha)[0] < ALL:
         return high
@@ -129,7 +129,7 @@ NEAREST_XI = 1e-9
 
 @dataclass(frozen=True)
 class EdgeGather:
-    """How radii are drawn and what they weigh, for one albedo; lengths in mfp.
+    """Draw of radii and their weights, for one albedo; lengths in mfp.
 
     sample  xi in [0, 1) -> x = r/l;  weight  x -> w of (22), up to a factor that cancels [-]
     """
@@ -140,7 +140,7 @@ class EdgeGather:
 
 @dataclass(frozen=True)
 class EdgeEstimate:
-    """What the estimator gives at each place x (m,), as a share of A.
+    """Estimate at each place x (m,), as a share of A.
 
     mean, standard_error of it, variance of one estimate, rmse of one estimate against `truth`, the exact response
     law_bias  of the law's own integral against the truth; `mean` - truth tends to it with the number of samples
@@ -156,12 +156,12 @@ class EdgeEstimate:
 
     @property
     def bias(self) -> Floats:
-        """Of the estimator (m,): that of the law, and that of the ratio of two sums, of order 1/n."""
+        """Bias of the estimator (m,): that of the law, and that of the ratio of two sums, of order 1/n."""
         return self.mean - self.truth
 
 
 def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> EdgeGather:
-    """Radii by the law's sampler, or by another, each with its own density."""
+    """Return the gather with radii by the law's sampler, or by another, each with its own density."""
     drawn, target = sampler or law.sampler, LawTarget(law)
 
     def weight(x: Floats) -> Floats:
@@ -172,13 +172,13 @@ def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> Edg
 
 
 def by_quantile(alpha: float, setting: Setting | None = None) -> EdgeGather:
-    """The exact profile with radii by its exact quantile: every weight is 1."""
+    """Return the gather of the exact profile with radii by its exact quantile: every weight is 1."""
     curve = _quantile_curve(alpha, setting or Setting())
     return EdgeGather(lambda xi: np.exp(curve(np.log(_depth(xi)))), np.ones_like)
 
 
 def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | None = None) -> EdgeGather:
-    """Radii uniform up to that of 99.5 % of the light, for a law or the exact profile."""
+    """Return the gather with radii uniform up to that of 99.5 % of the light, for a law or the exact profile."""
     target = target_of(setting, law)
     low, high = 0.0, 1e6
     while high - low > 1e-9 * high:
@@ -188,12 +188,12 @@ def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | N
 
 
 def random_points(samples: int, trials: int, seed: int) -> Floats:
-    """Independent (xi, angle / 2 pi), (trials, samples, 2)."""
+    """Return independent (xi, angle / 2 pi), (trials, samples, 2)."""
     return np.random.default_rng(seed).random((trials, samples, 2))
 
 
 def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | None = None) -> Floats:
-    """One set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
+    """Return one set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
 
     points  (samples, 2), shifted over the whole torus; by default the stage's lattice, shifted within one of its cells,
             which gives the same sets. -> (trials, samples, 2)
@@ -210,7 +210,7 @@ def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | Non
 def edge_estimate(
     gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float, setting: Setting, law: ProfileLaw | None = None
 ) -> EdgeEstimate:
-    """The estimator at places x (m,) [mfp] with each trial's points (trials, samples, 2), the same at every place.
+    """Return estimator at places x (m,) [mfp] with each trial's points (trials, samples, 2), the same at every place.
 
     setting  of the exact response that it is judged by;  law  whose own response `law_bias` compares
     """
@@ -236,19 +236,19 @@ def edge_estimate(
 
 
 def _ratio(weight: Floats, lit: NDArray[np.bool_], own: float) -> Floats:
-    """(22) for each trial (trials,)."""
+    """Return (22) for each trial (trials,)."""
     total = weight.sum(axis=1)
     some = total > 0
     return np.where(some, np.sum(weight * lit, axis=1) / np.where(some, total, 1.0), own)
 
 
 def _depth(xi: Floats) -> Floats:
-    """-ln(1 - xi), where radii are smooth at both ends."""
+    """Return -ln(1 - xi), where radii are smooth at both ends."""
     return -np.log1p(-np.clip(xi, NEAREST_XI, LAST_XI))
 
 
 @lru_cache(maxsize=16)
 def _quantile_curve(alpha: float, setting: Setting) -> CubicSpline:
-    """ln x over ln(-ln(1 - xi))."""
+    """Return ln x over ln(-ln(1 - xi))."""
     depth = np.geomspace(_depth(np.zeros(1))[0], _depth(np.ones(1))[0], KNOTS)
     return CubicSpline(np.log(depth), np.log(exact.quantile(-np.expm1(-depth), alpha, setting=setting)))

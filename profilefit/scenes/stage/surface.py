@@ -1,4 +1,4 @@
-"""What a view sees of a surface: the G-buffer of a render as float64 arrays, and the patch that each pixel shows."""
+"""Surface that a view sees: the G-buffer of a render as float64 arrays, and the patch that each pixel shows."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class View:
             raise InputError(f"pixel must be a length > 0, got {self.pixel!r}")
 
     def footprint(self, position: Floats, normal: Floats) -> tuple[Floats, Floats]:
-        """Sides of the parallelogram of the tangent plane that each pixel shows, along and across rows (..., 3)."""
+        """Return sides of the parallelogram of the tangent plane that a pixel shows, along and across rows (..., 3)."""
         forward = np.asarray(self.forward, float)
         ray, scale = np.broadcast_to(forward, position.shape), np.full(position.shape[:-1], float(self.pixel))
         if self.eye is not None:
@@ -59,7 +59,7 @@ class View:
         return across, along
 
     def coarsened(self, factor: int) -> View:
-        """The view with pixels that many times as large."""
+        """Return the view with pixels that many times as large."""
         return replace(self, pixel=self.pixel * factor)
 
 
@@ -100,7 +100,7 @@ class Surface:
         return np.where(self.mask[..., None], value, 0.0)
 
     def coarsened(self, factor: int) -> Surface:
-        """Means over blocks of factor x factor pixels, seen where all of them are; InputError if blocks do not fit."""
+        """Return means over blocks of factor x factor pixels, seen where all are; InputError if blocks do not fit."""
         h, w = self.mask.shape
         if factor < 1 or h % factor or w % factor:
             raise InputError(f"factor must divide {h} and {w}, got {factor}")
@@ -116,7 +116,7 @@ class Surface:
 
 
 def seen(buffers: Buffers) -> tuple[Surface, View]:
-    """The scattering part of a render's G-buffer, in view space, and the camera that it was seen by."""
+    """Return the scattering part of a render's G-buffer, in view space, and the camera that it was seen by."""
     reflectance = np.clip(np.asarray(buffers.reflectance, float), 0.0, 1.0)  # a float32 may end beyond
     position, normal, irradiance = (
         np.asarray(value, float) for value in (buffers.position, buffers.normal, buffers.irradiance)
@@ -127,19 +127,19 @@ def seen(buffers: Buffers) -> tuple[Surface, View]:
 
 
 def world(buffers: Buffers, camera: Camera) -> Floats:
-    """Places (h, w, 3) of the world that a camera sees [mm]."""
+    """Return places (h, w, 3) of the world that a camera sees [mm]."""
     view = camera.view()
     return np.asarray((buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3], float)
 
 
 def evenly(mask: NDArray[np.bool_], most: int) -> tuple[NDArray[np.intp], ...]:
-    """Rows and columns of at most so many pixels of a mask, spread over all of it."""
+    """Return rows and columns of at most so many pixels of a mask, spread over all of it."""
     found = np.argwhere(mask)
     return tuple(found[np.linspace(0, len(found) - 1, min(most, len(found))).astype(int)].T)
 
 
 def sees(buffers: Buffers, camera: Camera, points: ArrayLike) -> NDArray[np.bool_]:
-    """(n,) whether a view sees points (n, 3) of the world: in front of none of them lies another surface [mm]."""
+    """Return (n,) whether a view sees points (n, 3) of the world [mm]: no other surface lies in front of them."""
     view = camera.view()
     place = np.asarray(points, float) @ view[:3, :3].T + view[:3, 3]
     rows, columns = buffers.mask.shape

@@ -1,4 +1,4 @@
-"""What a screen-space gather should give: the exact profile summed over the whole visible surface, in float64, offline.
+"""Reference of a screen-space gather: the exact profile summed over the whole visible surface, in float64, offline.
 
     L_c(o) = A_c(o) sum_i W_ci E_c(i) / sum_i W_ci,   W_ci = int over the surface in pixel i of R_d(|P - P_o|) / A_c dS
 
@@ -50,7 +50,7 @@ CHECKED = 60  # pixels at which the reference is compared with one of half the p
 
 @dataclass(frozen=True)
 class Gathered:
-    """What points gather: `light` L [unit of E] and `share`, the energy of R_d / A that the visible surface holds [-].
+    """Light that points gather, L [unit of E], and `share`, the energy of R_d / A that the visible surface holds [-].
 
     Both (m, 3) at m chosen pixels, or (h, w, 3), 0 where nothing is visible.
     """
@@ -66,7 +66,7 @@ def gathered(
     table: CurveTable | Setting = DIFFUSE,
     pixels: ArrayLike | None = None,
 ) -> Gathered:
-    """The reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
+    """Return the reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 
     mfp  of the three channels (3,), in the unit of the positions
     table  of the curves, by the surface's `reflectance`; of a setting, that of the exact half space by A
@@ -94,7 +94,7 @@ def gathered(
 def refined(
     fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike, factor: int = 2
 ) -> tuple[Floats, Floats]:
-    """Light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
+    """Return light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
 
     view  the fine one. -> the means of the fine light over each pixel (m, 3), and the coarse light less these (m, 3):
     an estimate of the error of the coarse one, and a bound for that of the fine one.
@@ -108,14 +108,14 @@ def refined(
 
 
 def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
-    """(h, w, 3) radiant exitance of a picture in diffuse light: the reference; Lambert's where nothing scatters."""
+    """Return radiant exitance (h, w, 3) in diffuse light: the reference; Lambert's where nothing scatters."""
     light = gathered(*seen(buffers), mfp, table).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
 
 def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:
-    """What half the pixel's side changes in `exitance_of`, over its mean [-], at some pixels of an even-sized picture.
+    """Return what half the pixel's side changes in `exitance_of`, at some pixels of a picture of even size.
 
     fine  the same picture with pixels of half the side
     """
@@ -123,13 +123,11 @@ def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFU
     inside = np.argwhere(surface.coarsened(2).mask)
     chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
     mean, difference = refined(surface, view, mfp, table, chosen)
-    share = np.abs(difference) / np.mean(mean)
-    half, most = np.quantile(share, (0.5, 0.9)).tolist()
-    return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
+    return TruthError.of(np.abs(difference) / np.mean(mean))
 
 
 def own_share(curves: Curves, across: Floats, along: Floats) -> Floats:
-    """Energy of each curve within a parallelogram around its source, of sides (m, 3) in mfp; (m,) [-].
+    """Return the energy of each curve within a parallelogram around its source, of sides (m, 3) in mfp; (m,) [-].
 
     (1/2 pi) int cdf(rho) dphi along the edge; on a side at the distance d, rho = d cosh u and dphi = du / cosh u.
     """
@@ -147,7 +145,7 @@ def own_share(curves: Curves, across: Floats, along: Floats) -> Floats:
 
 
 class _Scene(NamedTuple):
-    """The n visible pixels and one that has no area, which stands for all that are not: (n + 1, ...)."""
+    """Visible pixels (n + 1, ...), and one that has no area, which stands for all that are not."""
 
     position: Array
     across: Array
@@ -207,7 +205,7 @@ def _scene(surface: Surface, view: View) -> _Scene:
 
 
 def _numbers(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Of each pixel of the image with a margin of NEAR around it, the number of the visible one that stands for it."""
+    """Return the number of the visible pixel that stands for each pixel of the image and a margin of NEAR around it."""
     count = np.count_nonzero(mask)
     numbers = np.full((mask.shape[0] + 2 * NEAR, mask.shape[1] + 2 * NEAR), count)
     numbers[NEAR:-NEAR, NEAR:-NEAR][mask] = np.arange(count)
@@ -222,7 +220,7 @@ def _some(
     table: CurveTable,
     chosen: NDArray[np.int64],
 ) -> tuple[Floats, Floats]:
-    """Light and share of up to AT_ONCE points (m, 3); the last one fills the shape that was compiled."""
+    """Return light and share of up to AT_ONCE points (m, 3); the last one fills the shape that was compiled."""
     full = np.concatenate([chosen, np.repeat(chosen[-1:], AT_ONCE - len(chosen), axis=0)])
     rows, columns = full.T
     curves = table.curves(surface.reflectance[rows, columns].ravel())
@@ -247,12 +245,12 @@ def _some(
 
 @jax.jit
 def _sums(scene: _Scene, points: _Points, mfp: Array) -> tuple[Array, Array]:
-    """sum W E and sum W, each (m, 3)."""
+    """Return sum W E and sum W, each (m, 3)."""
     return jax.lax.map(partial(_sum, scene, mfp), points)
 
 
 def _sum(scene: _Scene, mfp: Array, point: _Points) -> tuple[Array, Array]:
-    """For one point, (3,)."""
+    """Return both sums for one point, (3,)."""
     far = jnp.where(jnp.max(jnp.abs(scene.place - point.place), axis=1) > NEAR, scene.area, 0.0)
     lit, share = point.own * point.irradiance, point.own
     for position, area, irradiance in (
@@ -266,7 +264,7 @@ def _sum(scene: _Scene, mfp: Array, point: _Points) -> tuple[Array, Array]:
 
 
 def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Array]:
-    """Positions, areas and irradiances of count x count Gauss points on each of the pixels."""
+    """Return positions, areas and irradiances of count x count Gauss points on each of the pixels."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     a, b = (0.5 * grid.ravel()[:, None] for grid in np.meshgrid(nodes, nodes))
     position = scene.position[pixels, None] + a * scene.across[pixels, None] + b * scene.along[pixels, None]
@@ -275,7 +273,7 @@ def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Ar
 
 
 def _density(offset: Array, mfp: Array, point: _Points) -> Array:
-    """R_d / A [1/length^2] of the three channels, (3, n), at vectors (n, 3) from the point: `Curves.density`."""
+    """Return R_d / A [1/length^2] of the three channels, (3, n), at vectors (n, 3) from the point: `Curves.density`."""
     r = jnp.sqrt(jnp.sum(offset**2, axis=1))
     x = jnp.clip(r / mfp, NEAREST, FARTHEST)
     place = (jnp.log(x) - np.log(NEAREST)) / STEP

@@ -1,4 +1,4 @@
-"""What is drawn: parts with a mesh and a texture, one light far away, a little light from everywhere, and a camera.
+"""Scene: parts with a mesh and a texture, one light far away, a little light from everywhere, and a camera.
 
 World and view space are in millimetres, y up; a view looks along -z.
 """
@@ -23,7 +23,7 @@ DIFFERENCE = float(np.cbrt(np.finfo(float).eps))
 
 @dataclass(frozen=True)
 class Camera:
-    """eye, target  points of the world [mm];  height  of what is visible at the target [mm];  kind  one of `KINDS`."""
+    """Camera: eye, target  points [mm];  height  of what is visible at the target [mm];  kind  one of `KINDS`."""
 
     eye: tuple[float, float, float] = (0.0, 0.0, 700.0)
     target: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -42,19 +42,19 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """From eye to target [mm]."""
+        """Distance from eye to target [mm]."""
         return float(np.linalg.norm(np.subtract(self.eye, self.target)))
 
     def pixel(self, rows: int) -> float:
-        """Side of a pixel [mm]; in perspective at a depth of 1 mm."""
+        """Return the side of a pixel [mm]; in perspective at a depth of 1 mm."""
         return self.height / rows / (self.distance if self.is_perspective else 1.0)
 
     def view(self) -> Floats:
-        """(4, 4) from world to view space."""
+        """Return (4, 4) from world to view space."""
         return looking(self.eye, self.target)
 
     def projection(self, aspect: float, near: float, far: float) -> Floats:
-        """(4, 4) from view to clip space; near and far depths [mm]."""
+        """Return (4, 4) from view to clip space; near and far depths [mm]."""
         if not self.is_perspective:
             return orthographic(0.5 * self.height * aspect, 0.5 * self.height, near, far)
         half = 0.5 * self.height / self.distance
@@ -64,7 +64,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Mesh:
-    """position (n, 3) [mm], normal (n, 3), uv (n, 2) in [0, 1], triangles (m, 3) counter-clockwise from outside."""
+    """Mesh of position (n, 3) [mm], normal (n, 3), uv (n, 2) in [0, 1], triangles (m, 3) counter-clockwise outside."""
 
     position: Floats
     normal: Floats
@@ -72,7 +72,7 @@ class Mesh:
     triangles: NDArray[np.int32]
 
     def vertices(self) -> NDArray[np.float32]:
-        """(n, 8) position, normal, uv, as a vertex buffer holds them."""
+        """Return (n, 8) position, normal, uv, as a vertex buffer holds them."""
         return np.concatenate([self.position, self.normal, self.uv], axis=1).astype(np.float32)
 
 
@@ -91,7 +91,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Light:
-    """direction to the light, in the world; irradiance of a surface that faces it [-], in the picture's unit."""
+    """Lamp far away: direction to it, in the world; irradiance of a surface that faces it [-], in its unit."""
 
     direction: tuple[float, float, float] = (-0.90, 0.26, 0.36)
     irradiance: Rgb = (3.6, 3.4, 3.1)
@@ -104,7 +104,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Scene:
-    """ambient irradiance [-] comes from everywhere, without shadows; f0 is what the surface mirrors head-on [-]."""
+    """Parts under a lamp; ambient irradiance [-] is everywhere, without shadows; f0 is mirrored head-on [-]."""
 
     parts: tuple[Part, ...]
     light: Light = field(default_factory=Light)
@@ -116,7 +116,7 @@ class Scene:
         _require_light("ambient", self.ambient)
 
     def zoomed(self, height: float) -> Self:
-        """The same seen by a camera that shows `height` [mm] at its target."""
+        """Return the scene seen by a camera that shows `height` [mm] at its target."""
         return replace(self, camera=replace(self.camera, height=height))
 
 
@@ -126,13 +126,13 @@ def _require_light(name: str, light: Rgb) -> None:
 
 
 def rgb(values: Iterable[float]) -> Rgb:
-    """Three numbers, of red, green and blue, as floats."""
+    """Return three numbers, of red, green and blue, as floats."""
     red, green, blue = (float(value) for value in values)
     return red, green, blue
 
 
 def looking(eye: ArrayLike, target: ArrayLike) -> Floats:
-    """(4, 4) from the world to a space whose origin is the eye and whose -z points at the target."""
+    """Return (4, 4) from the world to a space whose origin is the eye and whose -z points at the target."""
     back = unit(np.subtract(eye, target))
     up = (0.0, 1.0, 0.0) if abs(back[1]) < 0.99 else (0.0, 0.0, 1.0)
     right = unit(np.cross(up, back))
@@ -143,26 +143,26 @@ def looking(eye: ArrayLike, target: ArrayLike) -> Floats:
 
 
 def orthographic(half_width: float, half_height: float, near: float, far: float) -> Floats:
-    """(4, 4) parallel projection of depths near ... far."""
+    """Return (4, 4) parallel projection of depths near ... far."""
     matrix = np.diag([1 / half_width, 1 / half_height, 2 / (near - far), 1.0])
     matrix[2, 3] = (near + far) / (near - far)
     return matrix
 
 
 def unit(vectors: ArrayLike) -> Floats:
-    """The same directions with length 1 along the last axis."""
+    """Return the directions with length 1 along the last axis."""
     array = np.asarray(vectors, float)
     return array / np.linalg.norm(array, axis=-1, keepdims=True)
 
 
 def parameters(rows: int, columns: int) -> tuple[Floats, Floats]:
-    """u and v (rows + 1, columns + 1), even over [0, 1]; u along a row."""
+    """Return u and v (rows + 1, columns + 1), even over [0, 1]; u along a row."""
     v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
     return u, v
 
 
 def sheet(points: Floats, u: Floats, v: Floats, closed: bool = False) -> Mesh:
-    """A grid of points (rows, columns, 3), outside where d/du x d/dv points; `closed`: its last column is its first."""
+    """Return a grid of points (rows, columns, 3), outside where d/du x d/dv points; `closed`: last column is first."""
     rows, columns = u.shape
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
@@ -172,7 +172,7 @@ def sheet(points: Floats, u: Floats, v: Floats, closed: bool = False) -> Mesh:
 
 
 def deformed(mesh: Mesh, move: Callable[[Floats], Floats]) -> Mesh:
-    """The mesh moved by a smooth map of space, (n, 3) -> (n, 3) [mm]; its normals by the map's derivatives.
+    """Return the mesh moved by a smooth map of space, (n, 3) -> (n, 3) [mm]; its normals by the map's derivatives.
 
     Raises InputError where the map turns space inside out, as a mirror does, or is not finite.
     """
@@ -201,7 +201,7 @@ def _moved(move: Callable[[Floats], Floats], points: Floats) -> Floats:
 
 
 def _derivatives(move: Callable[[Floats], Floats], points: Floats) -> list[Floats]:
-    """d move / dx, d / dy, d / dz, each (n, 3) [-]: central differences."""
+    """Return d move / dx, d / dy, d / dz, each (n, 3) [-]: central differences."""
     step = DIFFERENCE * (np.max(np.abs(points), initial=0.0) or 1.0)
     found = []
     for axis in np.eye(3):
@@ -212,7 +212,7 @@ def _derivatives(move: Callable[[Floats], Floats], points: Floats) -> list[Float
 
 
 def normals(points: Floats, closed: bool = False) -> Floats:
-    """(rows, columns, 3) unit normals of a grid: of each vertex, the mean of its faces by their area."""
+    """Return (rows, columns, 3) unit normals of a grid: of each vertex, the mean of its faces by their area."""
     across, along = np.diff(points, axis=1), np.diff(points, axis=0)
     face = np.cross(across[:-1], along[:, 1:]) + np.cross(across[1:], along[:, :-1])
     padded = np.pad(face, ((1, 1), (1, 1), (0, 0)))

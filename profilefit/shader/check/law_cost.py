@@ -7,7 +7,6 @@ medians over turns: machines are shared, and their clocks change.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
-from profilefit.shader.context import check_errors, full_screen, program
+from profilefit.shader.context import check_errors, full_screen, program, seconds
 
 Floats = NDArray[np.float64]
 YARDSTICK = "burley"
@@ -155,8 +154,4 @@ class _Loop:
 
     def _seconds(self) -> float:
         self._program["rounds"] = self._rounds
-        self._context.finish()
-        begin = time.perf_counter()
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        self._context.finish()
-        return time.perf_counter() - begin
+        return seconds(self._context, lambda: self._triangle.render(moderngl.TRIANGLES, vertices=3))

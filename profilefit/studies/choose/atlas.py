@@ -9,7 +9,7 @@ import numpy as np
 
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.chart import SURE
-from profilefit.scenes.heart.law import missed
+from profilefit.scenes.heart.law import occlusion_error
 from profilefit.scenes.heart.meshes import CHARTS_END, off_edges
 from profilefit.scenes.heart.passes import ATLAS, Balanced
 from profilefit.scenes.heart.scene import HeartRequest, light_of, staged
@@ -59,7 +59,7 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     judged = inside & off_edges(of.surface, of.size_mm, places, light.mfp[0])
     at = evenly(judged if judged.any() else inside, CHOSEN)
     places, own = places[at], buffers.irradiance[at].astype(float)
-    off = missed(elements, sees(buffers, of.camera, elements.points), light.kernel, places, own)
+    off = occlusion_error(elements, sees(buffers, of.camera, elements.points), light.kernel, places, own)
     whole = summed(elements, light.kernel.variances, light.kernel.weights, places, own)
     colour = np.array(light.colour)
     error, hidden = (np.sqrt(np.mean(one**2)) for one in (gathered[at] - colour * whole, colour * off))

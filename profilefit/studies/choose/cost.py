@@ -25,10 +25,11 @@ import numpy as np
 
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
+from profilefit.scenes.skin.chart import covering
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import Head, head_scene
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.stage import By, Stage, covering
+from profilefit.scenes.stage.stage import By, Stage
 from profilefit.shader.context import renderer
 from profilefit.shader.emit import source
 from profilefit.studies.choose.case import Option

@@ -13,7 +13,7 @@ import numpy as np
 from profilefit.errors import InputError
 from profilefit.scenes.fur.request import FurRequest
 from profilefit.scenes.fur.truth import random_patch
-from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, FurWay, least_layers, trial
+from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, LayerTechnique, least_layers, trial
 
 ANGLES = (0, 30, 45, 60, 75, 85)  # of the view to the normal [degrees]
 WORST = 75  # the layers of a picture are those of this angle: what a ball shows beyond is a rim of 3 % of its radius
@@ -43,12 +43,12 @@ class FurNeed:
     angle: int = WORST
     most: int = MOST
 
-    def cheapest(self, angle: int) -> FurWay | None:
+    def cheapest(self, angle: int) -> LayerTechnique | None:
         """Return the way of the least layers times cost at an angle; None if no way is within the tolerance there."""
         return cheapest(self.layers[angle])
 
     @property
-    def way(self) -> FurWay | None:
+    def way(self) -> LayerTechnique | None:
         """The cheapest of a picture."""
         return self.cheapest(self.angle)
 
@@ -58,7 +58,7 @@ class FurNeed:
         return None if self.way is None else self.layers[self.angle][self.way.name]
 
 
-def cheapest(layers: Mapping[str, int | None]) -> FurWay | None:
+def cheapest(layers: Mapping[str, int | None]) -> LayerTechnique | None:
     """Return the way whose layers, by its name, cost the least together; None if none has any."""
     costs = {way: count * COST[way.tested] for way in WAYS if (count := layers[way.name]) is not None}
     return min(costs, key=lambda way: costs[way], default=None)
@@ -93,7 +93,7 @@ class RandomFur:
             self._made.append(trial(patch, self.theta, RAYS, one))
         return self._made[number]
 
-    def largest(self, way: FurWay, layers: int, goal: float) -> float:
+    def largest(self, way: LayerTechnique, layers: int, goal: float) -> float:
         """Return an upper limit of the mean square of so many layers' errors, by as many patches as decide on a goal.
 
         Of all rays, with a chance of some 98 %.
@@ -108,7 +108,7 @@ class RandomFur:
                     break
         return mean + SAFE * noise
 
-    def least_layers(self, way: FurWay, tolerance: float) -> int | None:
+    def least_layers(self, way: LayerTechnique, tolerance: float) -> int | None:
         """Return the fewest layers that hold, to one in `COARSE`; None if no number up to `MOST` does."""
         goal = tolerance**2
         return least_layers(lambda layers: self.largest(way, layers, goal), goal, MOST, COARSE)

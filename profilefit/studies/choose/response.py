@@ -25,7 +25,8 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.refracting_rational import REFRACTING
-from profilefit.scenes.skin.law import DARKEST, albedo_of
+from profilefit.scenes.skin.law import DARKEST
+from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.step_edge import step_response
 
 Floats = NDArray[np.float64]

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.meshes import ball, bumps
 from profilefit.scenes.heart.passes import gather_of
 from profilefit.scenes.heart.truth import sphere_blur
-from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Mesh, Part, Scene, unit
@@ -136,8 +135,9 @@ def _part(mesh: Mesh) -> Part:
 def _blurred(atlas: Atlas, light: Floats, sigma: float) -> Floats:
     """Return an irradiance (rows, columns) blurred by one Gaussian [mm]."""
     texels = np.repeat(light[..., None], 4, axis=-1).astype(np.float32)
-    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(texels).tobytes())
-    return pixels(atlas.blur(Kernel(np.array([sigma**2]), np.ones(1))))[..., 0].astype(float)
+    atlas.renderer.write("irradiance_map", texels)
+    atlas.blur(Kernel(np.array([sigma**2]), np.ones(1)))
+    return atlas.read(BLURRED)[..., 0].astype(float)
 
 
 def _cells(

@@ -15,7 +15,7 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.fur.chart import over_layers, wide_patch
 from profilefit.scenes.fur.request import FurRequest, read
-from profilefit.scenes.fur.scene import bench
+from profilefit.scenes.fur.scene import reference_render
 from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.shader.context import opened, renderer
@@ -73,8 +73,8 @@ def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FULL) -> 
 
 def picture(context: moderngl.Context, sizes: FurSizes = FULL) -> Panel:
     """Return the example's ball, its light against rays to every strand."""
-    with bench(context, request()) as found:
-        points = tuple(_point("ball", found.point(way, one, sizes.turns)) for way in WAYS for one in sizes.layers)
+    with reference_render(context, request()) as drawn:
+        points = tuple(_point("ball", one) for way in WAYS for one in drawn.points(way, sizes.layers, sizes.turns))
     return Panel(
         "ball",
         f"examples/{FILE}, layers",

@@ -15,11 +15,11 @@ import numpy as np
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.phase import HenyeyGreenstein
 from profilefit.recipes.folder import shipped
-from profilefit.scenes.sea.bench import SeaBench, bench
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.reference import caustic_photons, misfit
 from profilefit.scenes.sea.request import SeaRequest, read
+from profilefit.scenes.sea.scene import SeaRender, reference_render
 from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
 from profilefit.scenes.sea.waves import Waves, random_sea
 from profilefit.shader.context import opened, renderer
@@ -51,7 +51,7 @@ FULL, QUICK = SeaSizes(), SeaSizes((6, 24), 100_000, (128, 256), 1024, (4, 16, 6
 def measure(sizes: SeaSizes = FULL, track: Track = silent) -> TradeoffPart:
     """Return the example's view, caustic maps before and beyond the first fold, and shafts."""
     with opened() as context:
-        with bench(context, request(), sizes.paths) as found:
+        with reference_render(context, request(), sizes.paths) as found:
             drawn = (view(found, sizes, track), *maps(context, sizes, track))
         notes = (f"drawn by {renderer(context)}",)
     return TradeoffPart("sea", "Under the sea", (*drawn, shafts(sizes)), notes)
@@ -63,13 +63,13 @@ def request() -> SeaRequest:
     return read(str(path), read_toml(path))
 
 
-def view(found: SeaBench, sizes: SeaSizes = FULL, track: Track = silent) -> Panel:
+def view(found: SeaRender, sizes: SeaSizes = FULL, track: Track = silent) -> Panel:
     """Return a picture by each law of the water's light, over pieces of a ray."""
-    errors = {(kind, one): found.rmse(found.view(kind, one)[0]) for kind in KINDS for one in sizes.samples}
+    errors = {(kind, one): found.judge.rmse(found.picture(kind, one)) for kind in KINDS for one in sizes.samples}
     times: dict[tuple[str, int], list[float]] = {each: [] for each in errors}
     for _ in track(range(sizes.turns), "views"):
         for each in times:
-            times[each].append(found.view(*each)[1])
+            times[each].append(found.time(*each))
     points = tuple(
         Point("view", kind, str(one), WithSpread.of(times[kind, one]), WithSpread.exactly(off), facts={"pieces": one})
         for (kind, one), off in errors.items()

@@ -34,7 +34,7 @@ def test_errors_fall_with_samples_and_are_drawn(context, scene, few, tmp_path, c
         stage.draw(scene)
         mfp = tuple(2.0 * length for length in scene.material.mfp)
         truth = stage.scatter(few["hazard"].law, mfp, few["hazard"].drawn(256, seed=9)).astype(float)
-        judge = Judged(stage, mfp, truth, stage.buffers().mask > 0.5, None)
+        judge = Judged(truth, stage.buffers().mask > 0.5, stage=stage, mfp=mfp)
         found = render_errors.measured(judge, few, (1, 16), 2, 2)
         rows = [shots(judge, [(few["hazard"], 4)], 1)]
         render_pictures.draw(judge, rows, tmp_path / "picture.png", ("four",), "this")
@@ -69,7 +69,7 @@ def test_measures_are_0_for_the_truth_and_know_a_difference():
     truth = np.random.default_rng(1).random((32, 32, 3))
     mask = np.zeros((32, 32), bool)
     mask[:16] = True
-    judge = Judged(None, (1.0, 1.0, 1.0), truth, mask, None)
+    judge = Judged(truth, mask, stage=None, mfp=(1.0, 1.0, 1.0))
     assert judge.rmse(truth) == 0
     assert judge.flip(truth) == pytest.approx(0, abs=1e-6)
     assert judge.rmse(1.1 * truth) == pytest.approx(0.1 * np.sqrt(4 / 3), rel=0.05)  # of even numbers in [0, 1]

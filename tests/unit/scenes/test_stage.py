@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
+from profilefit.scenes.skin.chart import covered, covering
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.buffers import SURFACE, flat, step_edge
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
-from profilefit.scenes.stage.stage import Stage, covered, covering
+from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE
 from profilefit.scenes.stage.world import Camera
 from tests.unit.scenes.scenes import RADIUS, ball, scene
@@ -133,11 +134,11 @@ def test_leaves_the_state_as_it_was(context, burley):
     assert own.read() == before
 
 
-def test_times_and_compiles_apart(stage, burley):
+def test_times_and_compiles_once(stage, burley):
     stage.draw(scene((0.0, 1.0, 0.0)))
     assert len(stage.time(burley, 2.0, Sampling(4), repeats=3)) == 3
     assert all(0 < one < 1e4 for one in stage.time(burley, 2.0, Sampling(4), repeats=2, passes="frame"))
-    assert set(stage.compile_milliseconds) == {"scatter burley", "combine burley"}
+    assert stage.renderer.compiled == ["shadow", "surface", "scatter burley", "combine burley"]
 
 
 @pytest.mark.slow
@@ -215,7 +216,7 @@ def test_release_frees_the_gpu(context, burley):
     np.testing.assert_array_equal(
         unlit, stage.scatter(burley, 2.0, Sampling(4)) / np.float32(np.pi)
     )  # no scene, no light
-    textures = [stage.targets.map(name) for name in (*SURFACE, EXITANCE, RADIANCE)]
+    textures = [stage.renderer.map(name) for name in (*SURFACE, EXITANCE, RADIANCE)]
     stage.release()
     assert all(isinstance(texture.mglo, moderngl.InvalidObject) for texture in textures)
     for use in (

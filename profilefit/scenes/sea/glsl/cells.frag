@@ -1,4 +1,3 @@
-#version 330
 // The share of each triangle that lies on this pixel, exactly.
 flat in vec4 first;
 flat in vec4 last;

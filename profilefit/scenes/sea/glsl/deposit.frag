@@ -1,4 +1,3 @@
-#version 330
 // The same light for each fragment of a shape.
 flat in float light;
 out float deposit;

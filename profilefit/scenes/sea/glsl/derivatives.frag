@@ -1,4 +1,3 @@
-#version 330
 // Light by the lengths of two derivatives, as many shaders have it: no area where they are not at right angles.
 in vec2 old_place;
 in float flux;

@@ -1,4 +1,3 @@
-#version 330
 // One map of caustics into its place in a column of them.
 uniform sampler2D light_map;
 uniform int below;  // rows of the column below this one

@@ -1,4 +1,3 @@
-#version 330
 // The scene laid out over its texture, with a margin around it.
 in vec3 position;
 in vec3 normal;

@@ -1,4 +1,3 @@
-#version 330
 in float depth;
 out float nearest;
 

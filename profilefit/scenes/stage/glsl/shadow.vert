@@ -1,4 +1,3 @@
-#version 330
 // The scene as the light sees it: the depth along the light [mm].
 in vec3 position;
 uniform mat4 light_clip;

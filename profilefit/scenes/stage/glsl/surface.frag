@@ -1,4 +1,3 @@
-#version 330
 // Irradiance, reflectance, position and normal of what the camera sees; how far the light came through the part.
 in vec3 world_position;
 in vec3 world_normal;

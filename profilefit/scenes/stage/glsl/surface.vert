@@ -1,4 +1,3 @@
-#version 330
 // The scene as the camera sees it.
 in vec3 position;
 in vec3 normal;

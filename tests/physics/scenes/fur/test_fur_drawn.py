@@ -6,9 +6,10 @@ import pytest
 from profilefit.scenes.fur.ball import NOTHING, SKIN, Ball, FurView, random_ball
 from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.law import occlusion, shadow, shell_shadow, visibility
-from profilefit.scenes.fur.passes import FurPasses, FurSurface
+from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, random_patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera
 
 SIZE = 64, 64
@@ -20,9 +21,10 @@ def test_layers_in_opengl_are_those_of_rays(context, degrees, lean):
     """But for rays that pass an outline, or a border between two strands, by less than a texel of the map."""
     patch, theta = random_patch(16.0, 0.1, 1.0, 3.0, 5, lean), np.radians(degrees)
     view, start = patch_view(patch, theta, SIZE)
-    with FurPasses(context, FurSurface.of_patch(patch, 16.0), SIZE) as passes:
+    surface = FurSurface.of_patch(patch, 16.0)
+    with Renderer(context, SIZE) as renderer:
         for way, layers in ((LINEAR, 12), (QUADRATIC, 12), (FITTED, 12), (SWEPT, 6), (SWEPT_TWO, 6)):
-            found = np.maximum(passes.hits(view, way, layers)[..., 3].ravel(), 0.0)
+            found = np.maximum(renderer.image(surface.layered(view, way, layers))[..., 3].ravel(), 0.0)
             if way.tested:
                 expected = by_slabs(patch, theta, start, layers, way.tested)
             else:
@@ -31,7 +33,7 @@ def test_layers_in_opengl_are_those_of_rays(context, degrees, lean):
             assert same.mean() > (0.98 if way.tested else 0.999), (way.name, same.mean())
             assert abs(found.mean() - expected.mean()) < 0.01
             if not way.tested:  # the control: other layers are others
-                other = np.maximum(passes.hits(view, way, layers + 3)[..., 3].ravel(), 0.0)
+                other = np.maximum(renderer.image(surface.layered(view, way, layers + 3))[..., 3].ravel(), 0.0)
                 assert np.mean(np.abs(other - expected) < 1e-3) < 0.95
 
 
@@ -44,8 +46,8 @@ def test_discs_drawn_cover_what_the_union_says(context, exponent):
     for degrees, layers in ((20.0, 8), (45.0, 8), (45.0, 24), (58.0, 16)):
         theta = np.radians(degrees)
         view, _ = patch_view(patch, theta, SIZE)
-        with FurPasses(context, surface, size) as passes:
-            share = np.mean(passes.hits(view, exponent, layers)[..., 3] >= 0.0)
+        with Renderer(context, size) as renderer:
+            share = np.mean(renderer.image(surface.layered(view, exponent, layers))[..., 3] >= 0.0)
         drawn = share * patch.side**2 / shadow(0.1, 1.0, theta)
         assert drawn == pytest.approx(shell_shadow(layers, exponent.exponent, 0.1, 1.0, theta), rel=0.01)
 
@@ -84,9 +86,10 @@ def test_layers_on_a_ball_tend_to_its_truth(context):
     ball, view = small_ball()
     size = 160, 120
     true = ball.cast(view, size)
-    with FurPasses(context, FurSurface.of_ball(ball), size) as passes:
+    surface = FurSurface.of_ball(ball)
+    with Renderer(context, size) as renderer:
         wrong = [
-            np.mean(np.abs(passes.hits(view, way, layers)[..., 3] - true[..., 3]) > 0.02)
+            np.mean(np.abs(renderer.image(surface.layered(view, way, layers))[..., 3] - true[..., 3]) > 0.02)
             for way, layers in ((SWEPT_TWO, 64), (SWEPT, 64), (SWEPT, 8), (LINEAR, 8))
         ]
     assert wrong[0] < 0.01

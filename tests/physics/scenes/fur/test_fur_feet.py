@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from benchmarks.fur_patches import spaced_patch, tufted_patch
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import feet_factor, shadow, shared_shadow, visibility
 from profilefit.scenes.fur.truth import (
@@ -15,9 +16,7 @@ from profilefit.scenes.fur.truth import (
     cast,
     random_patch,
     rays,
-    spaced_patch,
     struck,
-    tufted_patch,
 )
 
 

@@ -5,8 +5,9 @@ import pytest
 
 from profilefit.scenes.fur.ball import NOTHING, SKIN, FurView, random_ball
 from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow, shared_shadow
-from profilefit.scenes.fur.passes import BACKGROUND, Coat, FurPasses, FurSurface
+from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat
 from profilefit.scenes.fur.request import Shading
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera, Light
 from tests.fixtures import slow
 
@@ -19,8 +20,9 @@ LIGHT = Light((-0.7, 0.3, 0.6), (3.0, 2.8, 2.5))
 def drawn(context, shading, hits, view):
     ball = random_ball(50, 10.0, RADIUS, LENGTH, FORCE, 3)
     coat = Coat(ball, DENSITY, COLOUR, BARE, LIGHT, AMBIENT, shading)
-    with FurPasses(context, FurSurface.of_ball(ball), SIZE) as passes:
-        return passes.radiance(coat.shade(view), hits)
+    with Renderer(context, SIZE) as renderer:
+        renderer.write(HITS, hits)
+        return renderer.image(coat.shade(view))[..., :3].astype(float)
 
 
 def written_out(shading, hit, to_eye):
@@ -91,15 +93,15 @@ def test_a_lobe_is_as_bright_at_every_exponent():
 
 @pytest.mark.slow
 def test_rays_are_averaged_before_they_are_encoded(context):
-    """The bench's picture is the mean of linear radiance: one of encoded rays is darker where a pixel has contrast."""
+    """The picture is the mean of linear radiance: one of encoded rays is darker where a pixel has contrast."""
     from profilefit.scenes.fur import scene
     from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 
     small = {"scene": "fur", "camera": {"resolution": [24, 18]}, "technique": {"supersampling": 4}}
-    with scene.bench(context, scene.read("fur.toml", small)) as found:
-        white = found.exposure
-        once = srgb_codes(white * found.truth)
-        each = found.averaged(srgb_codes(white * found.fine))
+    with scene.reference_render(context, scene.read("fur.toml", small)) as found:
+        judge, white = found.judge, found.judge.exposure
+        once = srgb_codes(white * judge.reference)
+        each = scene.averaged(srgb_codes(white * found.fine), 4)
         assert np.all(each <= once + 1e-6)
-        assert np.mean((once - each)[found.mask]) > 2.0
-        np.testing.assert_array_equal(to_srgb(found.truth, white), np.round(once))
+        assert np.mean((once - each)[judge.mask]) > 2.0
+        np.testing.assert_array_equal(to_srgb(judge.reference, white), np.round(once))

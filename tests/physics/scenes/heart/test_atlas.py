@@ -8,12 +8,11 @@ from scipy.ndimage import binary_erosion
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.atlas import Atlas, atlas_size
+from profilefit.scenes.heart.atlas import BLURRED, Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
 from profilefit.scenes.heart.meshes import CHARTS_END, ball, bumps, heart
 from profilefit.scenes.heart.truth import sphere_blur, summed
-from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
 
@@ -40,12 +39,13 @@ def sphere(stage):
 def lit(atlas: Atlas, light: np.ndarray) -> None:
     """Irradiance (rows, columns) of the atlas, in place of the scene's."""
     texels = np.repeat(light[..., None], 4, axis=-1).astype(np.float32)
-    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(texels).tobytes())
+    atlas.renderer.write("irradiance_map", texels)
 
 
 def blurred(atlas: Atlas, light: np.ndarray, kernel: Kernel = KERNEL) -> np.ndarray:
     lit(atlas, light)
-    return pixels(atlas.blur(kernel))[..., 0].astype(float)
+    atlas.blur(kernel)
+    return atlas.read(BLURRED)[..., 0].astype(float)
 
 
 def cosine(atlas: Atlas, direction=(0.6, 0.64, 0.48)) -> np.ndarray:
@@ -187,7 +187,8 @@ def test_a_heart_is_blurred_as_its_sum(stage, apart):
             one.draw(stage, part)
             lit(one, 1.0 + cosine(one))
         inside = atlas.read("position_map")[..., 3] > 0.5
-        found = pixels(atlas.blur(kernel))[..., 0].astype(float)[inside]
+        atlas.blur(kernel)
+        found = atlas.read(BLURRED)[..., 0].astype(float)[inside]
         own, seams = atlas.elements(), (inside & ~binary_erosion(inside, np.ones((3, 3))))[inside]
         for chosen, bound in (
             (slice(None, None, 51 * apart), 0.008),

@@ -23,7 +23,7 @@ def request_small(monkeypatch):
 @pytest.mark.slow
 def test_ways_and_frames(context, request_small):
     light = scene.light_of(request_small.stack, 6)
-    with scene.bench(context, request_small, light, KEPT) as found:
+    with scene.reference_render(context, request_small, light, KEPT) as found:
         assert np.count_nonzero(found.judge.mask) == KEPT
         ways = chart.ways(found, request_small, {"screen": (4, 64), "none": (1,)}, turns=2)
         few, many = ways["screen"]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.heart_fit import SplitLight, errors, fitted
 from profilefit.errors import InputError
 from profilefit.scenes.heart import crossover_of
-from profilefit.scenes.heart.fit import SplitLight, errors, fitted
 
 
 def test_a_balance_is_found_again():

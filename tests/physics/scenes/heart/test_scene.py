@@ -77,18 +77,18 @@ def test_the_split_is_nearest_to_the_truth(context, coarse):
     of = scene.read("heart.toml", {**content(), **SMALL})
     light = scene.light_of(of.stack, of.gaussians)
     np.testing.assert_allclose((light.kernel.energy, light.exact.energy), 1.0, atol=1e-9)
-    with scene.bench(context, of, light) as bench:
-        judge, own = bench.judge, bench.truth_error
+    with scene.reference_render(context, of, light) as drawn:
+        judge, stage = drawn.judge, drawn.stage
         errors = {
-            kind: judge.rmse(judge.stage.scatter(bench.way(kind), judge.mfp, of.sampling)) for kind in scene.KINDS
+            kind: judge.rmse(stage.scatter(drawn.technique(kind), light.mfp, of.sampling)) for kind in scene.KINDS
         }
         inside = judge.mask
-        lit = judge.stage.buffers().irradiance[inside].mean(axis=0)
-    assert own.rms < 0.003
+        lit = stage.buffers().irradiance[inside].mean(axis=0)
+    assert judge.truth_error.rms < 0.003
     assert errors["split"] < 0.02
     assert errors["split"] < min(errors["texture"], errors["screen"])
     assert errors["none"] > 4.0 * errors["split"]
-    np.testing.assert_allclose(judge.truth[inside].mean(axis=0), light.colour * lit, rtol=0.05)
+    np.testing.assert_allclose(judge.reference[inside].mean(axis=0), light.colour * lit, rtol=0.05)
 
 
 def test_a_picture_beside_its_truth(context, coarse):
@@ -109,6 +109,6 @@ def test_a_view_of_nothing_that_is_judged_is_one_line(context):
     of = scene.read("sheet.toml", told)
     with (
         pytest.raises(InputError, match="the view must show some of the sheet that"),
-        scene.bench(context, of, scene.light_of(of.stack, of.gaussians)),
+        scene.reference_render(context, of, scene.light_of(of.stack, of.gaussians)),
     ):
         pass

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from profilefit.scenes.heart import trials
-from profilefit.scenes.heart.atlas import Atlas
+from benchmarks import heart_trials as trials
+from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.meshes import heart
 from profilefit.scenes.heart.passes import Balanced
-from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene
@@ -45,7 +44,8 @@ def test_a_heart_of_six_charts_is_a_furnace(context):
     with Stage(context, (16, 16), 64) as stage, Atlas(context, size, min(margin, 4)) as atlas:
         stage.draw(Scene((part,), ambient=(0.5,) * 3, camera=Camera(height=40.0), light=Light(irradiance=(0.0,) * 3)))
         atlas.draw(stage, part)
-        found = pixels(atlas.blur(KERNEL))
+        atlas.blur(KERNEL)
+        found = atlas.read(BLURRED)
         inside = atlas.read("position_map")[..., 3] > 0.5
     assert np.count_nonzero(inside) > 3000
     np.testing.assert_allclose(found[inside][:, :3], 0.5, atol=1e-5)

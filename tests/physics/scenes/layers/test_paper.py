@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import profilefit
+from benchmarks import zhao as paper
+from benchmarks.zhao import CORRECTED, PRINTED, Corrections
 from mcml_sim import Layer, Medium, Setting, half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.phase import HenyeyGreenstein
 from profilefit.errors import InputError
-from profilefit.scenes.layers import paper
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.paper import CORRECTED, PRINTED, Corrections
 
 STACK = Medium((Layer(1.3, 0.3, 4.0, 0.0, 0.2), Layer(1.3, 0.1, 2.0, 0.0)))
 

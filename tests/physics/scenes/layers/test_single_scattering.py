@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks import zhao as paper
 from mcml_sim import Layer, Medium, Setting, half_space
 from mcml_sim.exact.single_scattering import entered, ring_shares
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from profilefit.errors import InputError
-from profilefit.scenes.layers import paper
 from profilefit.scenes.layers.law import single_scattering
 
 TISSUE = Medium((Layer(1.4, 0.3, 4.0, 0.7, 0.2), Layer(1.4, 0.1, 2.0, 0.4)))

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.special import j1, jn_zeros
 
+from benchmarks.sea_photons import trace_beam
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.errors import InputError
 from profilefit.scenes.sea import law
@@ -15,7 +16,6 @@ from profilefit.scenes.sea.law import (
     water_gaussians,
     water_mtf,
 )
-from profilefit.scenes.sea.photons import trace_beam
 
 ONE = ((1.0, 0.924),)
 TWO = ((0.995, 0.935), (0.005, -0.41))

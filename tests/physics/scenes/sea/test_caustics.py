@@ -5,12 +5,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.sea_filter import adaptive_filter, sigma
 from profilefit.errors import InputError
 from profilefit.scenes.sea.caustics import Caustics, Splat, caustic_map, focus, splat_for
 from profilefit.scenes.sea.hits import first_hit
-from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons, misfit, photons, sigma
+from profilefit.scenes.sea.reference import caustic_photons, misfit, photons
 from profilefit.scenes.sea.truth import caustic_boxes
 from profilefit.scenes.sea.waves import SUN, Waves, random_floor, random_sea, refracted
+from profilefit.scenes.stage.renderer import Renderer
 
 TILE, DEPTH, N = 10.0, 5.0, 1.34
 STEP = 2.0 * np.pi / TILE
@@ -186,7 +188,8 @@ def test_hits_on_an_uneven_floor(context):
     """Those of the shader's lattice are those of float64, at S about 1; the light is all there."""
     floor, tilt, vertices = random_floor(0.4, TILE, DEPTH, seed=3), 0.9, 48
     waves = sea(BEFORE)
-    with Caustics(context, waves, vertices, 64, DEPTH, tilt, N, floor) as drawn:
+    with Renderer(context, (1, 1)) as renderer:
+        drawn = Caustics(renderer, waves, vertices, 64, DEPTH, tilt, N, floor)
         hits, drift = drawn.hits(), drawn.drift * TILE / 64
         light = drawn.light(Splat.CELLS)
     x = (np.arange(vertices) + 0.5) * TILE / vertices

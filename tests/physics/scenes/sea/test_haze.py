@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.sea_photons import scattered_once, trace_view
 from profilefit.errors import InputError
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze, table, ways
 from profilefit.scenes.sea.law import beam_share, water_mtf
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.photons import scattered_once, trace_view
 from profilefit.scenes.sea.request import lobes_of
 from profilefit.scenes.sea.waves import Waves
 from profilefit.scenes.sea.world import World

@@ -8,7 +8,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.sea import hits
 from profilefit.scenes.sea.hits import dense_hit, first_hit, newton_hit, shah_hit, steepness, to_plane, wrong_shares
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
-from profilefit.scenes.stage.buffers import float_texture
+from profilefit.scenes.stage.renderer import float_texture
 from profilefit.shader.context import program
 from profilefit.shader.emit import text_beside
 
@@ -145,7 +145,7 @@ def by_vertices(context, floor, origin, ray):
     texts = (text_beside(hits.__name__, f"glsl/{name}.glsl") for name in ("waves", "hits"))
     vertex = "\n".join(["#version 330", *texts, FEEDBACK])
     compiled = program(context, "hits", "#version 330\nvoid main() {}", vertex, varyings=["distance"])
-    waves = floor.texels()
+    waves = floor.texels
     table = float_texture(context, (waves.shape[1], 1), 4, waves)
     table.use(0)
     compiled["floor_waves"], compiled["tile"] = 0, floor.tile

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from benchmarks.sea_photons import scattered_once, trace_view
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.scenes.sea import paths
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.hits import dense_hit, newton_hit, to_plane
 from profilefit.scenes.sea.paths import Sunlight, followed, met, traced
-from profilefit.scenes.sea.photons import scattered_once, trace_view
 from profilefit.scenes.sea.request import lobes_of
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
 from profilefit.scenes.sea.world import World

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from benchmarks.sea_photons import trace_beam, trace_view
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
 from profilefit.errors import InputError
-from profilefit.scenes.sea.photons import trace_beam, trace_view, turn
+from profilefit.scenes.sea.paths import turn
 
 SHARP = HenyeyGreenstein(0.924)
 DEPTHS, RADII = np.array([0.3, 1.0, 2.5]), np.array([0.05, 0.5, 2.0])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from benchmarks.sea_photons import deep_radiance, fading, scaled_once, share_once, trace_view
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
 from profilefit.errors import InputError
-from profilefit.scenes.sea.photons import trace_view
 from profilefit.scenes.sea.shafts import (
     Bundle,
     ViewRay,
@@ -16,12 +16,8 @@ from profilefit.scenes.sea.shafts import (
     by_prisms,
     by_quadrature,
     by_slices,
-    deep_radiance,
     determinant,
-    fading,
     flux_below,
-    scaled_once,
-    share_once,
 )
 
 WAVES = ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))

@@ -1,6 +1,7 @@
 """Views under the sea: what a pixel shows against its optics by numpy, the light of sky and floor, and the truth."""
 
 import tomllib
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +11,16 @@ from scipy.integrate import quad
 
 import profilefit
 from profilefit.scenes.sea import passes as views
-from profilefit.scenes.sea.bench import SeaBench, bench, truth_of
 from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze
-from profilefit.scenes.sea.passes import Passes, axes, glow, mirrored
+from profilefit.scenes.sea.passes import SeaPasses, axes, glow, mirrored
 from profilefit.scenes.sea.paths import Sunlight, followed
 from profilefit.scenes.sea.request import lobes_of, read
+from profilefit.scenes.sea.scene import WHITE, halves_of, reference_render
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea
 from profilefit.scenes.sea.world import World
+from profilefit.scenes.stage.judge import Judge
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera
 from tests.fixtures import slow
 
@@ -25,7 +28,7 @@ TILE, N, DEPTH = 5.0, 1.34, 4.0
 EDGE = np.sqrt(1.0 - 1.0 / N**2)  # cosine of Snell's window
 NONE, PETZOLD = (0.0,) * 3, lobes_of("petzold")
 CALM, LEVEL = Waves(TILE), Waves(TILE, mean=-DEPTH)
-FACES = Splat.FACES, Splat.FACES
+
 EXAMPLE = Path(profilefit.__file__).parents[1] / "examples" / "sea.toml"
 
 
@@ -92,6 +95,16 @@ def directions(camera, size):
     return found / np.linalg.norm(found, axis=-1, keepdims=True)
 
 
+@contextmanager
+def drawn(context, world, splat=Splat.FACES, texels=16):
+    """A world with its maps of light, as a function from camera, size, kind and pieces to radiance."""
+    with Renderer(context, (1, 1)) as renderer:
+        passes = SeaPasses(renderer, world, (splat, splat), texels, texels, 4)
+        for own in passes.light.values():
+            renderer.run(*own)
+        yield lambda *view: renderer.image(passes.view(*view, 16))[..., :3].astype(float)
+
+
 @pytest.fixture
 def few_depths(monkeypatch):
     """Of the light of sky and floor that water scatters, where there is none, or where it need not be right."""
@@ -113,9 +126,8 @@ def test_a_calm_sea_that_scatters_nothing(context, few_depths, kind):
     """Floor, its mirror image, and the sky in Snell's window, to 2e-3; without light to and fro it would be off."""
     world, size = absorbing(0.5), (48, 40)
     camera = toward((1.0, 2.0, -1.5), (1.0, 0.6, -0.1), 2.6)
-    with Passes(context, world, FACES, 16, 16, 4) as passes:
-        passes.light()
-        found, _ = passes.view(camera, size, kind, 8, 16)
+    with drawn(context, world) as view:
+        found = view(camera, size, kind, 8)
     way = directions(camera, size)
     expected, once = (optics(world, camera.eye, way, to_and_fro) for to_and_fro in (True, False))
     bright, up = expected.max(axis=(0, 1)), way[..., 2]
@@ -132,9 +144,8 @@ def test_a_level_floor_from_near_it(context, few_depths, above):
     """No pixel is black, down to a centimetre above the floor."""
     world = absorbing(0.5)
     camera = toward((0.0, 2.5, above - DEPTH), (1.0, 0.0, -0.2), 1.2)
-    with Passes(context, world, FACES, 16, 16, 4) as passes:
-        passes.light()
-        found, _ = passes.view(camera, (24, 20), SINGLE, 8, 16)
+    with drawn(context, world) as view:
+        found = view(camera, (24, 20), SINGLE, 8)
     way = directions(camera, (24, 20))
     down = way[..., 2] < -0.05
     assert down.sum() > 200
@@ -166,9 +177,8 @@ def test_snells_window(context, few_depths):
     """Over a black floor: the sky, n^2 times as bright, within 48 degrees of the vertical, and nothing beyond."""
     world, size = absorbing(0.0, NONE), (41, 41)
     camera = toward((1.0, 2.0, -1.5), (0.05, 0.0, 1.0), 3.2)
-    with Passes(context, world, FACES, 16, 16, 4) as passes:
-        passes.light()
-        found, _ = passes.view(camera, size, SINGLE, 8, 16)
+    with drawn(context, world) as view:
+        found = view(camera, size, SINGLE, 8)
     up = directions(camera, size)[..., 2]
     inside, outside = up > EDGE + 0.005, up < EDGE - 0.005
     cosine = up[inside, None]
@@ -192,10 +202,9 @@ def test_the_haze_of_a_view_is_that_of_its_quadrature(context, few_directions, k
     camera = toward((1.0, 2.0, -1.5), (1.0, 0.6, 0.0), 2.0)
     up = directions(camera, size)[:, 1, 2]
     expected = np.array([[sun[i] * sunlit_haze(omega[i], 1.5 * c[i], -u, PETZOLD, kind) for i in range(3)] for u in up])
-    with Passes(context, world, FACES, 16, 16, 4) as passes:
-        passes.light()
+    with drawn(context, world) as view:
         found, few, other = (
-            passes.view(camera, size, one, n, 16)[0][:, 1]
+            view(camera, size, one, n)[:, 1]
             for one, n in ((kind, 24), (kind, 4), (SCALED if kind == SINGLE else SINGLE, 24))
         )
     off, coarse, far = (np.abs(one / expected - 1.0) for one in (found, few, other))
@@ -251,30 +260,25 @@ def test_every_view_of_water_that_only_scatters(context, few_directions, kind):
         NONE, (0.05, 0.2, 1.0), PETZOLD, N, sea, floor, (1.0, 0.5, 0.0), 0.5, (3.0, 2.0, 1.0), (0.3, 0.4, 0.5)
     )
     around = [(-1, 0, 0), (0, 1, 0), (0.01, 0, 1), (0.01, 0, -1), (1, 1, 1e-9)]
-    with Passes(context, world, (Splat.CELLS, Splat.CELLS), 32, 32, 4) as passes:
-        passes.light()
+    with drawn(context, world, Splat.CELLS, 32) as view:
         for level in (floor.highest + 1e-3, -2.0, sea.lowest - 1e-3):
             for way in (*around, world.beam, -world.beam):
-                found, _ = passes.view(toward((1.0, 2.0, level), way, 2.0), (9, 9), kind, 8, 16)
+                found = view(toward((1.0, 2.0, level), way, 2.0), (9, 9), kind, 8)
                 assert np.all(np.isfinite(found))
                 assert np.all(found[..., :2] > 0.0)
-            sunward = passes.view(toward((1.0, 2.0, level), -world.beam, 0.2), (9, 9), kind, 8, 16)[0].sum(axis=-1)
+            sunward = view(toward((1.0, 2.0, level), -world.beam, 0.2), (9, 9), kind, 8).sum(axis=-1)
             assert np.argmax(sunward) == 40  # the middle, straight into the beam
-    with Passes(context, replace(world, sun=NONE, sky=NONE), (Splat.CELLS, Splat.CELLS), 32, 32, 4) as dark:
-        dark.light()
-        np.testing.assert_allclose(
-            dark.view(toward((1.0, 2.0, -2.0), (1, 0, 0), 2.0), (9, 9), kind, 8, 16)[0], 0.0, atol=1e-20
-        )
+    with drawn(context, replace(world, sun=NONE, sky=NONE), Splat.CELLS, 32) as dark:
+        np.testing.assert_allclose(dark(toward((1.0, 2.0, -2.0), (1, 0, 0), 2.0), (9, 9), kind, 8), 0.0, atol=1e-20)
 
 
 @pytest.mark.parametrize(("a", "b"), [((20.0, 0.05, 0.03), (0.05,) * 3), (NONE, (0.01, 0.01, 100.0))])
 def test_water_that_lets_next_to_nothing_through_in_one_colour(context, few_directions, a, b):
     sea, floor = random_sea(0.12, TILE, 4), random_floor(0.08, TILE, DEPTH, 2)
     world = World(a, b, PETZOLD, N, sea, floor, (0.4,) * 3, 0.5, (3.0,) * 3, (0.3,) * 3)
-    with Passes(context, world, (Splat.CELLS, Splat.CELLS), 32, 32, 4) as passes:
-        passes.light()
+    with drawn(context, world, Splat.CELLS, 32) as view:
         for kind in KINDS:
-            found, _ = passes.view(toward((1.0, 2.0, -2.0), (-1, 0, 0.1), 1.2), (9, 9), kind, 8, 16)
+            found = view(toward((1.0, 2.0, -2.0), (-1, 0, 0.1), 1.2), (9, 9), kind, 8)
             assert np.all(np.isfinite(found)), kind
             assert np.all(found >= 0.0)
 
@@ -297,10 +301,10 @@ def test_errors_leave_the_truths_own_noise_out():
     rng = np.random.default_rng(3)
     truth = rng.uniform(0.5, 1.5, (96, 128, 3))
     halves = truth + 0.8 * rng.standard_normal((2, *truth.shape))
-    found = SeaBench(None, None, halves)
+    found = Judge.of_halves(halves, WHITE)
     picture = truth + 0.3 * rng.standard_normal(truth.shape)
     judged = found.rmse(picture)
-    biased = np.sqrt(np.mean((picture - found.truth) ** 2))
+    biased = np.sqrt(np.mean((picture - found.reference) ** 2))
     square = np.mean(found.relative_error(picture) ** 2)
     print(f"rmse {judged:.4f} of 0.3, by the mean of the halves {biased:.4f}; error map {np.sqrt(square):.4f}")
     assert abs(judged - 0.3) < 0.02
@@ -326,12 +330,13 @@ def example():
 @pytest.mark.slow
 def test_the_example(context, example):
     """Broadened light is nearest to the truth; more pieces change little, and left is not right."""
-    with bench(context, example, paths=300_000) as found:
-        errors = {kind: found.rmse(found.view(kind, 24)[0]) for kind in KINDS}
-        picture, more = (found.view(BROADENED, samples)[0] for samples in (24, 96))
-        other = truth_of(example, found.request.world, 300_000, seed=1)
+    with reference_render(context, example, paths=300_000) as drawn:
+        found = drawn.judge
+        errors = {kind: found.rmse(drawn.picture(kind, 24)) for kind in KINDS}
+        picture, more = (drawn.picture(BROADENED, samples) for samples in (24, 96))
+        other = halves_of(example, drawn.request.world, 300_000, seed=1)
         swapped, upside_down = found.rmse(picture[:, ::-1]), found.rmse(picture[::-1])
-        means = picture.mean(axis=(0, 1)) / found.truth.mean(axis=(0, 1))
+        means = picture.mean(axis=(0, 1)) / found.reference.mean(axis=(0, 1))
         print(errors, f"by 96 pieces {found.rmse(more):.4f}, mirrored {swapped:.2f}, upside down {upside_down:.2f}")
         print(f"truth's errors {found.truth_error}; means by its {means}")
         assert errors[BROADENED] < 0.17
@@ -342,9 +347,9 @@ def test_the_example(context, example):
         assert upside_down > 1.8 * errors[BROADENED]
         np.testing.assert_allclose(means, 1.0, atol=0.08)
         # The picture of another seed errs by its own noise, which is that of two independent halves.
-        noise = np.sqrt(np.mean((other[0] - other[1]) ** 2)) / 2.0 / np.mean(found.truth)
+        noise = np.sqrt(np.mean((other[0] - other[1]) ** 2)) / 2.0 / found.mean
         judged = found.rmse(other.mean(axis=0))
-        biased = np.sqrt(np.mean((other.mean(axis=0) - found.truth) ** 2)) / np.mean(found.truth)
+        biased = np.sqrt(np.mean((other.mean(axis=0) - found.reference) ** 2)) / found.mean
         square = np.sqrt(np.mean(found.relative_error(picture) ** 2))
         print(f"another truth: {judged:.4f}, its noise {noise:.4f}, with that of both {biased:.4f}; map {square:.4f}")
         assert 0.6 < judged / noise < 1.5

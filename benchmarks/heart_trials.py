@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from benchmarks.heart_fit import SplitLight
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
-from profilefit.scenes.heart.fit import SplitLight
-from profilefit.scenes.heart.law import Kernel, missed
+from profilefit.scenes.heart.law import Kernel, occlusion_error
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
 from profilefit.scenes.heart.truth import summed
-from profilefit.scenes.stage.buffers import INSIDE, pixels
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import evenly, sees, world
@@ -162,7 +162,7 @@ def measured(context: moderngl.Context, trial: RandomScene, most: int = LARGEST)
             atlas.texel,
             camera.height / side,
             np.sqrt(trial.kernel.variances),
-            missed(elements, ~unseen, trial.kernel, places[at], own),
+            occlusion_error(elements, ~unseen, trial.kernel, places[at], own),
             float(away.min()),
         )
 
@@ -178,7 +178,7 @@ def _lit(atlas: Atlas, trial: RandomScene) -> None:
     """The lamp's pattern over the irradiance of an atlas."""
     light, place = atlas.read("irradiance_map"), atlas.read("position_map")
     light[..., :3] = trial.striped(light[..., :3], place[..., :3].astype(float))
-    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(light).tobytes())
+    atlas.renderer.write("irradiance_map", light)
 
 
 def _chosen(trial: RandomScene, inside: NDArray[np.bool_], places: Floats) -> tuple[NDArray[np.intp], ...]:
@@ -199,6 +199,6 @@ def _splits(
             near[m] = stage.scatter(gather_of(parts[0], mfp), 1.0, sampling)[at] * parts[0].energy
         if m < count:
             far[m] = stage.scatter(gather_of(parts[1], mfp), 1.0, sampling)[at] * parts[1].energy
-            share[m] = pixels(stage.targets.map(EXITANCE))[at][:, 3]
+            share[m] = stage.renderer.read(EXITANCE)[at][:, 3]
             texture[m] = stage.scatter(Balanced.of(atlas, None, parts[1], 0.0, ATLAS, mfp), 1.0, sampling)[at]
     return near, far, texture, share
