@@ -141,8 +141,8 @@ def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
         last = np.abs(ray) > MIDDLE
         sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
         parts = [
-            _in_chunks(lambda k, size=size: np.moveaxis(np.asarray(_series(n, k, *size, slope)), 0, 1), part)
-            for part, size in zip((ray[~last], ray[last]), sizes, strict=True)
+            _in_chunks(partial(_series, n, x_nodes=x_nodes, angles=angles, slope=slope), part)
+            for part, (x_nodes, angles) in zip((ray[~last], ray[last]), sizes, strict=True)
         ]
     if not slope:  # what enters comes out again where nothing is absorbed, z = -1
         for light, name in enumerate(ILLUMINATIONS):
@@ -236,10 +236,10 @@ def _systems(
 
 @partial(jit, static_argnums=(2, 3, 4))
 def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
-    """Return the transform of each order of scattering, or its derivative by n: (k, 2, orders)."""
+    """Return the transform of each order of scattering, or its derivative by n: (2, k, orders)."""
 
     def at(n: jax.Array) -> jax.Array:
-        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles))(k)
+        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles), out_axes=1)(k)
 
     return jax.jvp(at, (n,), (1.0,))[1] if slope else at(n)
 

@@ -193,7 +193,7 @@ def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
 
     def run(_: int) -> RingEnergies:
         if anew:
-            table.made(float(case.setting.n), rule)
+            table.new_table(float(case.setting.n), rule)
         return RingEnergies(np.diff(annuli.half_spaces(case.setting, rule), axis=1), None)
 
     return run
