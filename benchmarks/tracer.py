@@ -11,8 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,8 +21,7 @@ import accuracy
 import gpu
 import numpy as np
 import problems
-from rich.console import Console
-from rich.table import Table
+from table import show
 from worker import ITEMS, Worker, peak_memory
 
 from mcml_sim import Estimate
@@ -46,18 +44,8 @@ class Report:
 
     sizes: problems.Sizes
     turns: int
-    console: Console = field(default_factory=lambda: Console(width=None if sys.stdout.isatty() else 120))
     numbers: dict[str, object] = field(default_factory=dict)
     verdicts: list[tuple[str, str, str, str]] = field(default_factory=list)
-
-    def table(self, title: str, columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-        """Print a table; all columns but the first are numbers."""
-        table = Table(box=None, pad_edge=False)
-        for i, column in enumerate(columns):
-            table.add_column(column, justify="left" if i == 0 else "right", no_wrap=i > 0)
-        for row in rows:
-            table.add_row(*row)
-        self.console.print(f"[bold]{title}[/bold]", table, "", highlight=False, sep="\n")
 
     def judge(self, what: str, at_least: float, aim: float | None, ratio: Ratio) -> None:
         """Return a line of the last table."""
@@ -73,7 +61,7 @@ def speed(report: Report) -> None:
     ours = problems.half_space_events()
     events = {"yardstick": scalar_events, "yardstick, r-z": scalar_events, "orders": order_events}
     events |= {"half space": ours, "half space, r-z": ours}
-    report.table(
+    show(
         f"One core{'' if PINNED else ' (not pinned: this system cannot)'}, best of {report.turns} turns",
         ("work", "M photons/s", "M events/s", "events/photon"),
         [_speed_row(name, rates, events.get(name)) for name in rates.by_name],
@@ -105,12 +93,12 @@ def speed(report: Report) -> None:
         ("orders", "yardstick", order_events / scalar_events),
         ("half space", "yardstick", 1.0),
     )
-    report.table(
+    show(
         "The same over the yardstick without an r-z tally",
         ("work", "ratio"),
         [(name, str(rates.ratio(name, over, factor))) for name, over, factor in others],
     )
-    report.table(
+    show(
         "What the kernel of the matched half space buys, photons/s over the kernel for any layers",
         ("work", "ratio"),
         [(name, str(rates.ratio(name, name.replace("space", "space by layers")))) for name in HALF_SPACES],
@@ -141,7 +129,7 @@ def efficiency(report: Report) -> None:
         rows.append(
             _efficiency_row(f"three layers, {name}", estimate, layered.photons, (mean, variance), 200_000, speedup)
         )
-    report.table(
+    show(
         "Answers and efficiency (variance x time of the scalar tracer over ours)",
         ("quantity", "scalar", "ours", "z", "variance ratio", "efficiency"),
         [row[1] for row in rows],
@@ -167,7 +155,7 @@ def _efficiency_row(
 def cores(report: Report) -> None:
     """Time two threads, and two processes with half the work each, over one pinned worker."""
     if len(ALL_CORES) < 2 or not PINNED:
-        report.console.print("two workers: needs two cores, and a system that pins processes\n")
+        print("two workers: needs two cores, and a system that pins processes\n")
         return
     one, two = ALL_CORES[-1], ALL_CORES[-2]
     rows = []
@@ -186,7 +174,7 @@ def cores(report: Report) -> None:
             ratio = Ratio(middle[len(middle) // 2], middle[0], middle[-1])
             rows.append((f"{item}, {name}", str(ratio)))
             report.judge(f"{name} over one pinned worker, {item}", at_least, None, ratio)
-    report.table("Two cores over one, by the clock", ("work", "ratio"), rows)
+    show("Two cores over one, by the clock", ("work", "ratio"), rows)
 
 
 def _time(runs: list[tuple[Worker, int, int]]) -> float:
@@ -208,13 +196,13 @@ def time_to_accuracy(report: Report) -> None:
         ("  the dearest of them", f"{need.scalar_photons.max():.3g}", f"{need.scalar_seconds.max():.4g}"),
         ("one order-resolved run", f"{need.orders_photons:.3g}", f"{need.orders_seconds:.4g}"),
     ]
-    report.table(
+    show(
         "Time to 1 % in each of 100 rings in [0.01, 5] mfp, 32 albedos, one core\n"
         f"(extrapolated: variances from {photons:.2g} order-resolved photons, rates from {report.turns} turns)",
         ("", "photons", "seconds"),
         rows,
     )
-    report.console.print(
+    print(
         f"The order-resolved run waits for alpha = {need.worst_alpha:.3f}, r = {need.worst_ring:.3g} mfp.\n"
         "Second moments of scalar weights, predicted and met, largest |z|: "
         + ", ".join(f"{abs(z).max():.1f} of {z.size} rings at alpha {alpha}" for alpha, z in checks.items())
@@ -239,7 +227,7 @@ def _prove(report: Report, need: accuracy.Need) -> None:
     errors = np.asarray(run.energy(accuracy.ALPHAS).standard_error)[:, accuracy.FIRST_RING :]
     worst = float((errors / energy).max())
     seconds = run.photons / rates.best("proof")
-    report.console.print(f"That run, made: {seconds:.3g} s, worst ring {100 * worst:.2f} %.\n")
+    print(f"That run, made: {seconds:.3g} s, worst ring {100 * worst:.2f} %.\n")
     report.numbers["order_resolved_run_made"] = {"seconds": seconds, "worst_relative_error": worst}
 
 
@@ -255,7 +243,7 @@ def memory(report: Report) -> None:
     for item in ITEMS:
         default = sizes.layered if item.startswith("three") else sizes.half_space
         peaks[item] = peak_memory(item, photons.get(item, default), ALL_CORES[-1]) / GIBIBYTE
-    report.table("Peak memory of a process", ("work", "GiB"), [(item, f"{peak:.2f}") for item, peak in peaks.items()])
+    show("Peak memory of a process", ("work", "GiB"), [(item, f"{peak:.2f}") for item, peak in peaks.items()])
     report.numbers["peak_memory_gib"] = peaks
     report.verdicts.append(("peak memory of any of these", "< 1 GiB", "", f"{max(peaks.values()):.2f} GiB"))
 
@@ -264,14 +252,14 @@ def on_gpu(report: Report) -> None:
     """Time the order-resolved run where jax sees a GPU."""
     found = gpu.measure(32 * report.sizes.orders)
     if found is None:
-        report.console.print("GPU: jax sees none here\n")
+        print("GPU: jax sees none here\n")
         return
     row = (
         f"simulate_orders on {found['device']}",
         f"{found['photons_per_second'] / MILLION:.1f}",
         f"{found['events_per_second'] / MILLION:.0f}",
     )
-    report.table("GPU", ("work", "M photons/s", "M events/s"), [row])
+    show("GPU", ("work", "M photons/s", "M events/s"), [row])
     report.numbers["gpu"] = dict(found)
     report.verdicts.append(("GPU, events/s", "5e9", "2e10", f"{found['events_per_second']:.2g}"))
 
@@ -292,7 +280,7 @@ def main() -> None:
     for name in arguments.only or PARTS:
         PART[name](report)
     if report.verdicts:
-        report.table("Targets, and what was measured", ("what", "at least", "aim", "measured"), report.verdicts)
+        show("Targets, and what was measured", ("what", "at least", "aim", "measured"), report.verdicts)
     if arguments.json:
         arguments.json.write_text(json.dumps(report.numbers, indent=2) + "\n", encoding="utf-8")
 

@@ -72,8 +72,8 @@ def add(
 def add_version(app: typer.Typer, package: str) -> None:
     """Add --version, which prints the version of both packages."""
 
-    def show(wanted: bool) -> None:
-        if wanted:
+    def show(is_asked: bool) -> None:
+        if is_asked:
             with interruptible(package):
                 from mcml_sim.files.version import __version__
 

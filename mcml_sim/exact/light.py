@@ -134,8 +134,8 @@ def once(setting: Setting) -> Floats:
     """Return ln D_1 + k_c x as cubics in ln x from SINGLE_NEAREST on, (intervals, 4)."""
     log = np.arange(np.log(SINGLE_NEAREST), np.log(SINGLE_FARTHEST) + STEP, STEP)
     far = single_scattering.critical_rate(setting) * np.exp(log)
-    found: Floats = CubicSpline(log, log_once(np.exp(log), setting) + far).c.T
-    return found
+    cubics: Floats = CubicSpline(log, log_once(np.exp(log), setting) + far).c.T
+    return cubics
 
 
 def log_once(x: Floats, setting: Setting) -> Floats:
@@ -156,8 +156,8 @@ def coefficients(values: Floats) -> Floats:
     degrees = values.shape[0]
     matrix = 2.0 / degrees * np.cos(np.outer(np.arange(degrees), np.pi * (np.arange(degrees) + 0.5) / degrees))
     matrix[0] *= 0.5
-    found: Floats = np.tensordot(matrix, values, 1)
-    return found
+    series: Floats = np.tensordot(matrix, values, 1)
+    return series
 
 
 def _chebyshev(degrees: int, s, most: float) -> Array:

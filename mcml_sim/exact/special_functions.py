@@ -156,3 +156,10 @@ def sinh_and_cosh(z: jax.Array) -> tuple[jax.Array, jax.Array]:
         (0.5 * less_one * (1.0 + inverse), 1.0 + 0.5 * less_one**2 * inverse, jnp.sin(z.imag), jnp.cos(z.imag))
     )
     return jax.lax.complex(sinh * cos, cosh * sin), jax.lax.complex(cosh * cos, sinh * sin)
+
+
+def panels(edges: Floats, nodes: int) -> tuple[Floats, Floats]:
+    """Return Gauss's nodes and weights in each of the panels between edges (m,), both ((m - 1) nodes,)."""
+    t, weight = np.polynomial.legendre.leggauss(nodes)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (t + 1.0)).ravel(), (half * weight).ravel()

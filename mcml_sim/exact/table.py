@@ -28,7 +28,7 @@ from mcml_sim.exact import cone
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.special_functions import square_root
+from mcml_sim.exact.special_functions import panels, square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
 from mcml_sim.files.kept import kept
 from mcml_sim.media.arrays import Floats
@@ -141,8 +141,8 @@ def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
         last = np.abs(ray) > MIDDLE
         sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
         parts = [
-            _in_chunks(lambda k, size=size: np.moveaxis(np.asarray(_series(n, k, *size, slope)), 0, 1), part)
-            for part, size in zip((ray[~last], ray[last]), sizes, strict=True)
+            _in_chunks(partial(_series, n, x_nodes=x_nodes, angles=angles, slope=slope), part)
+            for part, (x_nodes, angles) in zip((ray[~last], ray[last]), sizes, strict=True)
         ]
     if not slope:  # what enters comes out again where nothing is absorbed, z = -1
         for light, name in enumerate(ILLUMINATIONS):
@@ -236,10 +236,10 @@ def _systems(
 
 @partial(jit, static_argnums=(2, 3, 4))
 def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
-    """Return the transform of each order of scattering, or its derivative by n: (k, 2, orders)."""
+    """Return the transform of each order of scattering, or its derivative by n: (2, k, orders)."""
 
     def at(n: jax.Array) -> jax.Array:
-        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles))(k)
+        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles), out_axes=1)(k)
 
     return jax.jvp(at, (n,), (1.0,))[1] if slope else at(n)
 
@@ -256,7 +256,7 @@ def _lines(nodes: int) -> tuple[_Contour, ...]:
         start = 1j * START * kappa
         way = CORNER * DIRECTION - start
         first = FIRST_PANEL * kappa if kappa else FIRST_WAVE
-        s, ds = _panels(np.append(0.0, _grown(first, abs(way))), nodes)
+        s, ds = panels(np.append(0.0, _grown(first, abs(way))), nodes)
         lines.append(_Contour(start + way / abs(way) * s, way / abs(way) * ds))
     longest = max(line.k.size for line in lines)
     return tuple(
@@ -266,18 +266,12 @@ def _lines(nodes: int) -> tuple[_Contour, ...]:
 
 @lru_cache(maxsize=8)
 def _ray(nodes: int) -> _Contour:
-    rho, drho = _panels(np.append(_grown(CORNER, MIDDLE), _grown(MIDDLE, LAST_WAVE, LAST_GROWTH)[1:]), nodes)
+    rho, drho = panels(np.append(_grown(CORNER, MIDDLE), _grown(MIDDLE, LAST_WAVE, LAST_GROWTH)[1:]), nodes)
     return _Contour(DIRECTION * rho, DIRECTION * drho)
 
 
 def _grown(first: float, last: float, growth: float = GROWTH) -> Floats:
     return np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(growth))) + 1)
-
-
-def _panels(edges: Floats, nodes: int) -> tuple[Floats, Floats]:
-    t, weights = np.polynomial.legendre.leggauss(nodes)
-    half = 0.5 * np.diff(edges)[:, None]
-    return (edges[:-1, None] + half * (t + 1.0)).ravel(), (half * weights).ravel()
 
 
 @lru_cache(maxsize=16)

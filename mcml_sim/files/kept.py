@@ -44,12 +44,12 @@ def file_of(name: str) -> Path:
     return platformdirs.user_cache_path("mcml_sim") / f"{name}.npz"
 
 
-def _read(content: bytes, wanted: Collection[str]) -> Arrays:
+def _read(content: bytes, names: Collection[str]) -> Arrays:
     """Return the wanted arrays of a file; ValueError where its content is not that of `_content`."""
     arrays = read_npz(content, MOST_BYTES, text=("sha256",))
-    if not {"sha256", *wanted} <= arrays.keys():
+    if not {"sha256", *names} <= arrays.keys():
         raise ValueError("an array is missing")
-    chosen = {name: arrays[name] for name in wanted}
+    chosen = {name: arrays[name] for name in names}
     if str(arrays["sha256"]) != _digest(chosen):
         raise ValueError("its numbers are not those that were written")
     return chosen

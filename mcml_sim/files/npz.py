@@ -42,13 +42,13 @@ DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, 
            zipfile.BadZipFile, zlib.error)  # fmt: skip
 
 
-def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Collection[str] = ()) -> dict[str, NDArray]:
+def read_npz(content: bytes, most: int, shapes: Shapes | None = None, text: Collection[str] = ()) -> dict[str, NDArray]:
     """Return the arrays of an .npz file by name, in this machine's byte order; those that it lacks are left out.
 
     Args:
         content: of the file.
         most: bytes that all of them may fill; more is an error before any is unpacked.
-        wanted: shapes by name, None for any; other arrays are not looked at. None: all that the file has.
+        shapes: shapes by name, None for any; other arrays are not looked at. None: all that the file has.
         text: names of those that are one text each, in place of real numbers.
 
     ValueError says in one line what is wrong with the file.
@@ -59,9 +59,9 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
         if content.count(ENTRY) > MOST_MEMBERS:
             raise ValueError(f"more than {MOST_MEMBERS} arrays")
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = _members(archive, wanted)
+            members = _members(archive, shapes)
             sizes = [
-                _checked_size(archive, name, member, (wanted or {}).get(name), name in text)
+                _checked_size(archive, name, member, (shapes or {}).get(name), name in text)
                 for name, member in members.items()
             ]
             if sum(sizes) > most:
@@ -71,12 +71,12 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
         raise ValueError((str(error) or type(error).__name__).splitlines()[0][:LONGEST_REASON]) from None
 
 
-def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfile.ZipInfo]:
+def _members(archive: zipfile.ZipFile, shapes: Shapes | None) -> dict[str, zipfile.ZipInfo]:
     """Return the wanted members by the name of their array."""
     members: dict[str, zipfile.ZipInfo] = {}
     for member in archive.infolist():
         name = member.filename.removesuffix(SUFFIX)
-        if name == member.filename or (wanted is not None and name not in wanted):
+        if name == member.filename or (shapes is not None and name not in shapes):
             continue
         if name in members:
             raise ValueError(f"two arrays are named {_shown(name)}")

@@ -145,8 +145,8 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
         raise lines.error("the file version, 1.0 or mcmli2.0", shown(version))
     (word,) = lines.take(1, "the number of runs")
-    taken: set[str] = set()
-    return tuple(read_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
+    outputs: set[str] = set()
+    return tuple(read_run(lines, outputs) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
 
 
 class Lines:

@@ -98,11 +98,11 @@ class OrderBins:
 
     def weights(self, alpha: Floats) -> Floats:
         """Return what a photon of each bin adds to the reflectance at albedo alpha: (...) -> (..., bins)."""
-        return self.roulette_weights * self._each(alpha, lambda one: one**self.orders)
+        return self.roulette_weights * self._each(alpha, lambda alpha: alpha**self.orders)
 
     def weight_derivatives(self, alpha: Floats) -> Floats:
         """Return d weights / d alpha: (...) -> (..., bins)."""
-        return self.roulette_weights * self._each(alpha, lambda one: self.orders * one ** (self.orders - 1))
+        return self.roulette_weights * self._each(alpha, lambda alpha: self.orders * alpha ** (self.orders - 1))
 
     def _each(self, alpha: Floats, power: Callable[[float], NDArray]) -> Floats:
         """Return the mean per bin of a power of one albedo after the other: the orders of all would fill the memory."""

@@ -444,3 +444,39 @@ def test_a_scene_with_a_renderer_of_its_own_is_seen(tmp_path):
     ):
         (tmp_path / f"{name}.py").write_text(text)
         assert renders(tmp_path / f"{name}.py") == seen
+
+
+# Words that name nothing: a public function, class, argument or attribute says what it is.
+NAMELESS = frozenset(
+    "found one made told taken again alike off lit begun wanted right need".split()  # noqa: SIM905 - as it is read
+)
+
+
+def nameless(path: Path) -> list[str]:
+    """Return file:line of public functions, their arguments, classes and their attributes that have such a name."""
+    found = []
+    for node in ast.walk(parsed(path)):
+        names: list[str] = []
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            names.append(node.name)
+            if isinstance(node, ast.FunctionDef):
+                names += [each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+            else:
+                names += [each.target.id for each in node.body if isinstance(each, ast.AnnAssign)]
+        found += [f"{path}:{node.lineno}" for name in names if name.lower() in NAMELESS]
+    return found
+
+
+@pytest.mark.parametrize("place", [place for place in HELD if place != "benchmarks"])
+def test_public_names_say_what_they_are(place):
+    files = sorted((ROOT / place).rglob("*.py")) or [ROOT / place]
+    assert [line for path in files for line in nameless(path)] == []
+
+
+def test_names_that_say_nothing_are_seen(tmp_path):
+    """Negative control: a function, an argument, a class and an attribute; private ones may."""
+    path = tmp_path / "bad.py"
+    path.write_text(
+        "def found(): ...\ndef f(one): ...\nclass Made:\n    told: int\ndef _g(off): ...\nclass Offer: ...\n"
+    )
+    assert nameless(path) == [f"{path}:{line}" for line in (1, 2, 3, 3)]

@@ -25,6 +25,7 @@ from mcml_sim.exact.anisotropic import system as systems
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.exact.single_scattering import entered
+from mcml_sim.exact.special_functions import panels
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 
@@ -101,9 +102,7 @@ def _contour(kappa: float) -> tuple[Complexes, Complexes]:
         edges.append(min(edges[-1] * GROWTH, edges[-1] + WIDEST, LAST_WAVE))
     corner = (TOP - start) / rise
     edges = sorted({*edges, corner} if 0.0 < corner < LAST_WAVE else edges)
-    t, weight = np.polynomial.legendre.leggauss(NODES)
-    half = 0.5 * np.diff(edges)[:, None]
-    s, ds = (np.array(edges)[:-1, None] + half * (t + 1.0)).ravel(), (half * weight).ravel()
+    s, ds = panels(np.array(edges), NODES)
     climbs = start + s * rise < TOP
     return s + 1j * np.where(climbs, start + s * rise, TOP), ds * (1.0 + 1j * rise * climbs)
 

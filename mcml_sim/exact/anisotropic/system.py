@@ -29,6 +29,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.exact.anisotropic import harmonics
+from mcml_sim.exact.special_functions import panels
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
 
@@ -103,9 +104,8 @@ def depth_nodes(k: complex, per_panel: int) -> tuple[Complexes, Complexes]:
     near = np.append(0.0, np.geomspace(first, MIDDLE[0], PANELS))
     edges = np.concatenate([near, MIDDLE[1:], np.geomspace(MIDDLE[-1], FARTHEST, 4)[1:]])
     t, weight = np.polynomial.legendre.leggauss(per_panel)
-    half = 0.5 * np.diff(edges)[:, None]
     u, du = 0.5 * (t + 1.0) / edges[-1], 0.5 * weight / edges[-1]
-    x, dx = (edges[:-1, None] + half * (t + 1.0)).ravel(), (half * weight).ravel()
+    x, dx = panels(edges, per_panel)
     turn = np.exp(1j * TILT)
     return turn * np.append(x, 1.0 / u), turn * np.append(dx, du / u**2)
 

@@ -77,8 +77,8 @@ def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
 
 def pieces(rest: Floats) -> Floats:
     """Return f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
-    found: Floats = np.tensordot(rest, _cubics(), 1)
-    return found
+    cubics: Floats = np.tensordot(rest, _cubics(), 1)
+    return cubics
 
 
 @lru_cache(maxsize=1)
@@ -87,8 +87,8 @@ def _cubics() -> Floats:
     t = np.arange(4) * STEP / 3.0
     starts = KNOTS[3:-4]
     basis = BSpline.design_matrix((starts[:, None] + t * (1 - 1e-12)).ravel(), KNOTS, 3).toarray()
-    found: Floats = basis.T.reshape(-1, starts.size, 4) @ np.linalg.inv(np.vander(t, 4)).T
-    return found
+    cubics: Floats = basis.T.reshape(-1, starts.size, 4) @ np.linalg.inv(np.vander(t, 4)).T
+    return cubics
 
 
 def _polynomial(nodes: Floats, at: float) -> Floats:

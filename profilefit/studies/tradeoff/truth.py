@@ -275,7 +275,7 @@ def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
 
     def run(_: int) -> RingEnergies:
         if anew:
-            table.made(float(case.setting.n), rule)
+            table.new_table(float(case.setting.n), rule)
         return RingEnergies(np.diff(half_spaces(case.setting, rule), axis=1), None)
 
     return run

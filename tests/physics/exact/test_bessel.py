@@ -14,10 +14,7 @@ ORDERS = pytest.mark.parametrize("order", [0, 1])
 compiled = jax.jit(bessel_k, static_argnums=0)
 
 
-@pytest.fixture(autouse=True)
-def double():
-    with jax.enable_x64(True):
-        yield
+pytestmark = pytest.mark.usefixtures("x64")
 
 
 def wedge():

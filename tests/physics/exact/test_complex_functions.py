@@ -6,11 +6,7 @@ import pytest
 
 from mcml_sim.exact.special_functions import arctangent, inverse_sinh, logarithm, sinh_and_cosh, square_root
 
-
-@pytest.fixture(autouse=True)
-def double():
-    with jax.enable_x64(True):
-        yield
+pytestmark = pytest.mark.usefixtures("x64")
 
 
 def rays(first, last, moduli=(1e-30, 1e-12, 1e-3, 0.3, 0.99, 1.5, 30.0, 1e11)):

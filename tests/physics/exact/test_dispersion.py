@@ -8,11 +8,7 @@ import pytest
 from mcml_sim import exact
 from mcml_sim.exact.dispersion import LEAST_ALBEDO, SMALL_SQUARE, dispersion, squared_decay_rate
 
-
-@pytest.fixture(autouse=True)
-def double():
-    with jax.enable_x64(True):
-        yield
+pytestmark = pytest.mark.usefixtures("x64")
 
 
 def test_dispersion_is_its_formula():

@@ -16,10 +16,7 @@ INSIDE = np.s_[1:-2, 1:-2]  # away from the ends of both
 STEP = 1e-5
 
 
-@pytest.fixture(autouse=True)
-def double():
-    with jax.enable_x64(True):
-        yield
+pytestmark = pytest.mark.usefixtures("x64")
 
 
 def everything(alpha, r, xi):

@@ -12,6 +12,7 @@ import pytest
 
 from mcml_sim import Grid, InputError, Layer
 from mcml_sim.results.mci import MAX_BYTES, MAX_CELLS, MAX_RUNS, parse_mci, read_mci
+from tests.unit.hostile import mutations
 
 DATA = Path(__file__).parent / "data"
 MUTANTS = 12_000
@@ -216,103 +217,18 @@ def test_what_cannot_be_opened_is_said(tmp_path):
             read_mci(path)
 
 
-NASTY = (
-    *(
-        "nan",
-        "inf",
-        "-inf",
-        "1e999",
-        "1e-999",
-        "-1",
-        "-0",
-        "0",
-        "1e8",
-        "0x10",
-        "1_000",
-        "\u0663",
-        "99999999999999999999",
-    ),
-    *(
-        "65536 65536 1 #",
-        "",
-        "#",
-        "A",
-        "B",
-        "\u00a0",
-        "\u2028",
-        "\x0b",
-        "1e",
-        ".",
-        "+",
-        "1.0.0",
-        "'",
-        "65536",
-        "65537",
-        "1000",
-        "10000",
-    ),
-)
+def mutant(draw: random.Random, text: str) -> bytes:
+    """A file with one to three changes: of words, lines, bytes, or its end; its own words and lines among the new."""
+    words = (*mutations.MCI_WORDS, *("1e-999", "65536 65536 1 #", "", "#", "\u2028", "65537", "10000"), *text.split())
+    return mutations.text_mutant(draw, text, words, (*mutations.MCI_LINES, *text.split("\n")))
 
 
-def mutant(draw: random.Random, text: bytes) -> bytes:
-    """A file with one to four changes: of bytes, words, lines, numbers, or its end."""
-    for _ in range(draw.randint(1, 4)):
-        text = draw.choice((_bytes, _bytes, _words, _words, _words, _lines, _lines, _numbers, _numbers, _end))(
-            draw, text
-        )
-    return text
-
-
-def _bytes(draw, text):
-    at, size = draw.randrange(len(text) + 1), draw.randint(0, 3)
-    return text[:at] + draw.randbytes(draw.randint(0, 3)) + text[at + size :]
-
-
-def _words(draw, text):
-    found = list(re.finditer(rb"\S+", text))
-    if not found:
-        return text
-    at, other = draw.choice(found), draw.choice(found)
-    word = draw.choice([draw.choice(NASTY).encode(), other.group(), b"", at.group() * 2, b"7" * draw.randint(1, 400)])
-    return text[: at.start()] + word + text[at.end() :]
-
-
-def _lines(draw, text):
-    lines = text.split(b"\n")
-    at, other = draw.randrange(len(lines)), draw.randrange(len(lines))
-    change = draw.randrange(4)
-    if change == 0:
-        del lines[at]
-    elif change == 1:
-        lines.insert(at, lines[other])
-    elif change == 2:
-        lines[at], lines[other] = lines[other], lines[at]
-    else:
-        lines[at:at] = lines[other : other + 12]
-    return b"\n".join(lines)
-
-
-def _numbers(draw, text):
-    found = list(re.finditer(rb"[0-9]+", text))
-    if not found:
-        return text
-    at = draw.choice(found)
-    number = draw.choice([int(at.group()[:30]) + draw.choice((-1, 1)), 10 ** draw.randint(0, 20), draw.randint(0, 99)])
-    return text[: at.start()] + str(number).encode() + text[at.end() :]
-
-
-def _end(draw, text):
-    return text[: draw.randrange(len(text) + 1)]
-
-
-def seeds() -> list[bytes]:
+def seeds() -> list[str]:
     """Valid files to start from."""
-    files = [path.read_bytes() for path in sorted(DATA.glob("*.mci"))]
-    rows = "".join(
-        f"1.{at} {at} {10 * at} 0.{at} inf\n".replace("inf", "0.5" if at < 5 else "inf") for at in range(1, 6)
-    )
-    layered = f"1.0\r\n2\r\na.mco B\n7\n1 1\n9 9 9\n5\n1\n{rows}1\nb A\n8\n1e-3 1\n1 1 1\n1\n1\n1 0 0 1 1E8\n1\n"
-    return [*files, SMALL.encode(), layered.encode()]
+    files = [path.read_text() for path in sorted(DATA.glob("*.mci"))]
+    rows = "".join(f"1.{at} {at} {10 * at} 0.{at} {'0.5' if at < 5 else 'inf'}\n" for at in range(1, 6))
+    layered = f"1.0\n2\na.mco B\n7\n1 1\n9 9 9\n5\n1\n{rows}1\nb A\n8\n1e-3 1\n1 1 1\n1\n1\n1 0 0 1 1E8\n1\n"
+    return [*files, SMALL, layered]
 
 
 def require_bounded(runs):
@@ -351,7 +267,7 @@ def outcome(content: bytes) -> str:
 def test_a_mutated_file_is_refused_in_one_line_or_runs():
     draw = random.Random(7)
     started = seeds()
-    assert [outcome(seed) for seed in started] == [""] * 4
+    assert [outcome(seed.encode()) for seed in started] == [""] * 4
     begin = time.perf_counter()
     reasons = [outcome(mutant(draw, draw.choice(started))) for _ in range(MUTANTS)]
     assert time.perf_counter() - begin < 60  # about 3 s: nothing hangs
