@@ -14,7 +14,7 @@ from rich.console import RenderableType
 from mcml_sim.files.text_file import read_json
 from profilefit.errors import InputError
 from profilefit.recipes.kinds import is_line, is_number, shown
-from profilefit.report.tables.cells import column_table, significant
+from profilefit.report.tables.cells import row_table, significant
 from profilefit.report.tables.markdown import markdown_table
 
 FILE = "claims.json"
@@ -88,10 +88,9 @@ def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
 
 
 def _table(command: str, rows: Sequence[Claim]) -> RenderableType:
-    cells = zip(*(one.cells for one in rows), strict=True)
-    columns = dict(zip(("claim", "promised", "measured", "noise"), map(list, cells), strict=True))
     caption = f"held against: {rows[0].truth}; {rows[0].date}, load before {rows[0].load}"
-    return column_table(command, columns, caption, fold=("claim", "noise"))
+    header = ("claim", "promised", "measured", "noise")
+    return row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise"))
 
 
 def markdown_claims(folder: Path) -> str:

@@ -13,7 +13,7 @@ from profilefit.recipes import record
 from profilefit.recipes.reproduction import Reproduction
 from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
-from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark
+from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant, span, spark
 from profilefit.report.tables.evidence_tables import evidence_line
 from profilefit.report.tables.quality_tables import values_of, worst_measures
 
@@ -68,8 +68,7 @@ def reproduced(
         cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
         rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
     headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
-    columns = dict(zip(headers, map(list, zip(*rows, strict=True)), strict=True))
-    return column_table(REPRODUCED, columns, REPRODUCED_CAPTION, left=("record",), fold=("result",))
+    return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 
 
 def verdict(reproductions: Sequence[Reproduction]) -> str:
