@@ -14,7 +14,7 @@ from profilefit.recipes import evidence
 from profilefit.report.drawing import checked, inline
 from profilefit.report.page.markup import command, figure, paragraph
 
-Told = dict[str, Any]
+Content = dict[str, Any]
 ALL = "all"
 MOST_DRAWING = 2**24  # bytes; the largest of ours has a fourteenth of it
 
@@ -39,7 +39,7 @@ class EvidenceFolder:
                 f"{self.folder / name}.json: expected what `profilefit {name} --out` writes, got {given}"
             ) from error
 
-    def told(self, name: str) -> Told | None:
+    def content(self, name: str) -> Content | None:
         """Return the content of `name`.json; None if there is none. InputError on a file of another kind."""
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
@@ -63,14 +63,14 @@ class EvidenceFolder:
             raise ValueError(f"a drawing of more than {MOST_DRAWING} bytes, {path.name}")
         return figure(inline(checked(content.decode("utf-8")), name, title), title, on_paper)
 
-    def origin(self, told: Told) -> str:
+    def origin(self, content: Content) -> str:
         """Return when, where and by which command it was measured, and whether the records have changed since."""
-        made = told["made"]
+        made = content["made"]
         machine = made.get("machine") or {}
         when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
         parts = [paragraph(when, "dim"), command(str(made.get("command")))]
-        if told.get("of", ALL) != ALL:
-            of = told["of"]
+        if content.get("of", ALL) != ALL:
+            of = content["of"]
             listed = ", ".join(of) if isinstance(of, list) else str(of)
             parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
         if evidence.stale(made, self.records):

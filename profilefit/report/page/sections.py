@@ -11,7 +11,7 @@ from profilefit.report.figures.sum_figure import NAME as OF_SUMS
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
 from profilefit.report.page.fits import drawing
 from profilefit.report.page.markup import details, element, figure, markup, paragraph
-from profilefit.report.page.measured import EvidenceFolder, Told, missing
+from profilefit.report.page.measured import Content, EvidenceFolder, missing
 from profilefit.report.records import Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
@@ -57,8 +57,8 @@ COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median 
 
 def shader(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("check")
-    yield missing("check") if told is None else "\n".join([evidence.origin(told), *_check(told)])
+    content = evidence.content("check")
+    yield missing("check") if content is None else "\n".join([evidence.origin(content), *_check(content)])
     for name, title in RENDERS.items():
         path = evidence.folder / name
         if path.exists():
@@ -81,21 +81,21 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
             yield _picture(path.read_bytes(), title)
 
 
-def _check(told: Told) -> Iterator[str]:
-    counts = " and ".join(f"{len(told[key])} {key}" for key in GROUPS)
-    verdict = "all pass" if told["passed"] else "bounds are broken"
-    yield paragraph(f"{counts} on {told['device']}: {verdict}.", "bold")
+def _check(content: Content) -> Iterator[str]:
+    counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
+    verdict = "all pass" if content["passed"] else "bounds are broken"
+    yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, measures) in GROUPS.items():
-        if told[key]:
-            columns = _columns(told[key], measures)
+        if content[key]:
+            columns = _columns(content[key], measures)
             yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
-    if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in told[key] for line in one["broken"]]:
+    if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
-    if told["costs"]:
-        yield markup(column_table(COSTS, _costs(told["costs"]), left=("source",)))
+    if content["costs"]:
+        yield markup(column_table(COSTS, _costs(content["costs"]), left=("source",)))
 
 
-def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[str]]:
+def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, list[str]]:
     columns = {
         "law": [_label(one) for one in group],
         "result": ["FAIL" if one["broken"] else "pass" for one in group],
@@ -111,11 +111,11 @@ def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[s
     return columns
 
 
-def _label(one: Told) -> str:
+def _label(one: Content) -> str:
     return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
 
 
-def _costs(costs: Told) -> dict[str, list[str]]:
+def _costs(costs: Content) -> dict[str, list[str]]:
     works = list(next(iter(costs.values()))["ns"])
     columns = {"source": list(costs)}
     for work in works:
@@ -137,19 +137,19 @@ CHARTS = {
 
 def speed(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("tradeoff")
-    if told is None:
+    content = evidence.content("tradeoff")
+    if content is None:
         yield missing("tradeoff")
         return
     for name, title in CHARTS.items():
-        if name in told:
+        if name in content:
             # Parts may have been measured on different days.
-            yield evidence.origin({"made": told["made"], **told[name]})
+            yield evidence.origin({"made": content["made"], **content[name]})
             yield evidence.drawing(f"tradeoff-{name}", title)
-            yield details(f"{escape(title)} The numbers", _numbers(told[name]))
+            yield details(f"{escape(title)} The numbers", _numbers(content[name]))
 
 
-def _numbers(part: Told) -> str:
+def _numbers(part: Content) -> str:
     tables = []
     for panel in part["panels"].values():
         points = panel["points"]
@@ -177,15 +177,15 @@ FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folde
 
 def failures(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("stability")
-    if told is None:
+    content = evidence.content("stability")
+    if content is None:
         yield missing("stability")
         return
-    yield evidence.origin(told)
-    yield paragraph(HOLDS[bool(told["passed"])], "bold")
-    aside = sum(int(one["count"]) for one in told["regions"] if one["class"] == NOT_JUDGED)
+    yield evidence.origin(content)
+    yield paragraph(HOLDS[bool(content["passed"])], "bold")
+    aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == NOT_JUDGED)
     yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
-    columns = _advice(told["regions"])
+    columns = _advice(content["regions"])
     yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
     for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
@@ -193,8 +193,8 @@ def failures(evidence: EvidenceFolder) -> Iterator[str]:
         yield details(title, figure, is_open=path.stem == FIRST)
 
 
-def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
-    groups: dict[str, list[Told]] = {}
+def _advice(regions: Sequence[Content]) -> dict[str, list[str]]:
+    groups: dict[str, list[Content]] = {}
     for region in regions:
         # Earlier versions wrote a cause and its remedy.
         sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"

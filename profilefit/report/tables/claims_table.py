@@ -65,9 +65,9 @@ class Claim:
 def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
     """Return the origin of the claims in `folder`, and the claims; InputError where there are none."""
     path = folder / FILE
-    told = read_json(path)
+    claims = read_json(path)
     try:
-        return {**told["made"]}, [_claim(row) for row in told["rows"]]
+        return {**claims["made"]}, [_claim(row) for row in claims["rows"]]
     except (KeyError, TypeError, ValueError) as error:
         given = f"{type(error).__name__}: {error}"
         raise InputError(f"{path}: expected what `make claims` writes, got {given}") from error

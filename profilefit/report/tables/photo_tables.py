@@ -55,18 +55,18 @@ def photo_lines(photo: Photo) -> Iterator[str]:
     for colour, fit in photo.fits.items():
         x = dict(zip(fit.shot.names, fit.x, strict=True))
         glare = sum(value for name, value in x.items() if name.startswith("glare"))
-        told = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
+        lens = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
         widened = f"MISFIT, for which errors are widened by a factor of {fit.widening:.1f}"
         verdict = widened if fit.chance < DETECTED else "no misfit is detected"
         yield (
-            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {told}; chi-square {fit.chi2:.1f} "
+            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {lens}; chi-square {fit.chi2:.1f} "
             f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
         )
         if not fit.converged:
             yield f"{colour}: NO ANSWER: {fit.result}"
         for one in fit.rivals:
-            told = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
-            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {told}; chi-square {one.chi2 - fit.chi2:+.1f}"
+            values = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
+            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {values}; chi-square {one.chi2 - fit.chi2:+.1f}"
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"

@@ -37,24 +37,24 @@ def summary(records: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
     kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    told = [make(group) for make, group in kinds.items() if group]
+    shown = [make(group) for make, group in kinds.items() if group]
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
         if "fit" in content and not converged(content)
     ]
-    return Group(*_spaced(told), *failures, Text(CAPTION, style="dim"))
+    return Group(*_spaced(shown), *failures, Text(CAPTION, style="dim"))
 
 
 def outcome(path: Path) -> dict[str, Any]:
     """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
     content = record.read(path)
-    told: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
+    body: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
     if "fit" not in content:
-        return {**told, "readings": len(content.get("readings", []))}
+        return {**body, "readings": len(content.get("readings", []))}
     kept = ("published", "regenerated", *ERRORS)
     constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
-    return {**told, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
+    return {**body, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 
 
 def reproduced(
