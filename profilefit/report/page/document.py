@@ -17,8 +17,7 @@ from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
-from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, layers, promises, shader, speed
+from profilefit.report.page.sections import EvidenceFolder, failures, layers, promises, shader, speed
 from profilefit.report.records import Source
 
 Tracked = Callable[[list[str]], Iterable[str]]
