@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
+import numpy as np
 from PIL import Image
 
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
@@ -31,7 +32,8 @@ RULE = "*{stroke-linejoin: round; stroke-linecap: butt}"
 REACHING = re.compile(r"url\s*\(|[\\@<>&]|expression|script", re.IGNORECASE)
 POINTED_AT = re.compile(r"#([^)]+)")
 DIGITS = re.compile(r"-?\d+\.\d+")
-PLACES = ("d", "x", "y", "width", "height")  # attributes whose digits beyond a tenth of a point nobody sees
+PLACES = ("x", "y", "width", "height")  # attributes whose digits beyond a tenth of a point nobody sees
+MARKER = 1000  # letters of a path that is a marker, drawn often and so with one digit more
 QUALITY = 80  # of a photograph as WebP
 UNTURNED = re.compile(r"rotate\(-?0(?: [^)]*)?\)")
 # Neighbours that are one element: letters of a formula, each at its place, and lines of one style; definitions of none.
@@ -143,16 +145,27 @@ def _shorten(part: Element) -> None:
         part.text = None
     if (link := part.attrib.pop(HREF, None)) is not None:
         part.set("href", link if link.startswith("#") else address(base64.b64decode(link.partition(",")[2])))
-    digits = 2 if "id" in part.attrib else 1  # markers are drawn often
     for key in set(PLACES) & set(part.attrib):
-        places = DIGITS.sub(lambda text: f"{float(text[0]):.{digits}f}".rstrip("0").rstrip("."), part.attrib[key])
-        part.set(key, re.sub(r"\s*([A-Za-z])\s*", r"\1", places).strip())
+        part.set(key, DIGITS.sub(lambda text: f"{float(text[0]):.1f}".removesuffix(".0"), part.attrib[key]))
+    if d := part.get("d"):
+        part.set("d", _relative(d, 2 if "id" in part.attrib and len(d) < MARKER else 1))
     if turned := UNTURNED.sub("", part.attrib.pop("transform", "")).strip():
         part.set("transform", turned)
     if "style" in part.attrib:
         words = (one.partition(":") for one in part.attrib["style"].split(";") if one.strip())
         style = ((key.strip(), value.strip()) for key, _, value in words)
         part.set("style", ";".join(f"{key}:{value}" for key, value in style if key != "font-family"))
+
+
+def _relative(d: str, digits: int) -> str:
+    """Return a path with each point after its predecessor: to `digits` after the point, a step is a few letters."""
+    here, path, unit = np.zeros(2), "", 10.0**digits
+    for letter, numbers in re.findall(r"([MLQCz])([^MLQCz]*)", d):
+        points = np.rint(np.array(numbers.split(), float).reshape(-1, 2) * unit)
+        steps = points if letter == "M" else points - here
+        here = points[-1] if len(points) else here
+        path += (letter if letter == "M" else letter.lower()) + " ".join(f"{step / unit:g}" for step in steps.ravel())
+    return re.sub(r" (?=-)|(?<!\d)0(?=\.)", "", path)
 
 
 def classed(html: str) -> tuple[str, str]:

@@ -13,8 +13,7 @@ from profilefit.recipes import catalogue, evidence
 from profilefit.report.explorer import fragment
 from profilefit.report.page.document import PARTS, write_page
 from profilefit.report.page.fits import record_part
-from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, promises, shader, speed
+from profilefit.report.page.sections import EvidenceFolder, failures, promises, shader, speed
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()

@@ -81,10 +81,10 @@ def _data(folder: Folder) -> str:
 
 
 def _told(law: Offered, lines: dict[str, int]) -> dict[str, object]:
-    told = asdict(law)
-    for one in (told, told["refracting"] or {"text": ""}):
+    offer = asdict(law)
+    for one in (offer, offer["refracting"] or {"text": ""}):
         one["text"] = [lines[line] for line in one["text"].split("\n")]
-    return told
+    return offer
 
 
 def _shaders() -> dict[str, str]:

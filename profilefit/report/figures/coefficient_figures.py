@@ -154,8 +154,8 @@ def constants_figure(source: Source, out: Path, name: str = "constants") -> list
             (one["published"] - one["regenerated"]) / scale, place, linestyle="none", markersize=4.5,
             marker="D" if far else "o", color=VERMILION if far else BLUE,
         )  # fmt: skip
-        told = "held" if not one.get("free", True) else "–" if z is None else f"{z:+.1f}".replace("-", "−")
-        ax.annotate(told, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.0)
+        text = "held" if not one.get("free", True) else "–" if z is None else f"{z:+.1f}".replace("-", "−")
+        ax.annotate(text, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.0)
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     ax.set_xscale("symlog", linthresh=LINEAR)
     ax.set_xticks(TICKS, [f"{tick:+g}".replace("-", "−") if tick else "0" for tick in TICKS])

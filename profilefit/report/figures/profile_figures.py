@@ -143,8 +143,8 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     """Draw some of the rings, with the photons' standard error: even in r would crowd the start with none to see."""
     edges, energy, error = (data.arrays[key] for key in ("r_edges", "energy", "energy_error"))
     r = 0.5 * (edges[1:] + edges[:-1])
-    wanted = np.linspace(0.0, min(end, r[-1]), RINGS_SHOWN)
-    index = np.unique(np.searchsorted(r, wanted).clip(max=r.size - 1))
+    places = np.linspace(0.0, min(end, r[-1]), RINGS_SHOWN)
+    index = np.unique(np.searchsorted(r, places).clip(max=r.size - 1))
     index = index[energy[row][index] > 0]
     to_profile = 1.0 / (2 * np.pi * np.diff(edges))[index]  # E = 2 pi r R_d dr
     value, sigma = energy[row][index] * to_profile, error[row][index] * to_profile

@@ -32,16 +32,8 @@ COLOURS = {
 }
 # One of a kind, where all are there: a figure has room for these.
 ROWS = (
-    "liang, published",
-    "liang-whole",
-    "burley, published",
-    "burley_diffuse_mfp, published",
-    "dipole",
-    "better_dipole",
-    "beam_diffusion",
-    "gaussians-6",
-    "hazard",
-    "quantile",
+    *("liang, published", "liang-whole", "burley, published", "burley_diffuse_mfp, published", "dipole"),
+    *("better_dipole", "beam_diffusion", "gaussians-6", "hazard", "quantile"),
 )
 TICKS = {
     "α": (0.0, 0.1, 0.5, 0.9, 1.0),

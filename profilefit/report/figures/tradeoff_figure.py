@@ -66,14 +66,14 @@ class Label:
     y: float
 
 
-def place_labels(axes: Axes, labels: Sequence[Label], taken: Sequence[Bbox], size: float = 7.5) -> list[float]:
+def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], size: float = 7.5) -> list[float]:
     """Write the labels; square pixels that each shares with others or has outside the axes, 0 where there was room.
 
-    taken  boxes in pixels that should stay free, such as `box_of` of bars; the figure must be laid out already
+    occupied  boxes in pixels that should stay free, such as `box_of` of bars; the figure must be laid out already
     """
     renderer = renderer_of(axes)
     inside = axes.get_window_extent(renderer)
-    occupied = [*taken, *(box_of(axes, [(one.x, one.y)], size / 2) for one in labels)]
+    occupied = [*occupied, *(box_of(axes, [(one.x, one.y)], size / 2) for one in labels)]
     crowdings = []
     for one in labels:
         note = _note(axes, one, size)
@@ -129,9 +129,9 @@ def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase
     return Text.get_window_extent(note, renderer).padded(2.0)  # an Annotation's own has its arrow, too
 
 
-def _crowding(box: Bbox, taken: Sequence[Bbox], inside: Bbox) -> float:
+def _crowding(box: Bbox, occupied: Sequence[Bbox], inside: Bbox) -> float:
     """Return square pixels that a label would share with others, or have outside the axes."""
-    shared = sum(_area(Bbox.intersection(box, other)) for other in taken)
+    shared = sum(_area(Bbox.intersection(box, other)) for other in occupied)
     return shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside)))
 
 
@@ -206,13 +206,13 @@ def _spread(measured: WithSpread) -> list[list[float]]:
 
 
 def _label(axes: Axes, panel: Panel) -> None:
-    taken = [box for point in panel.points for box in _boxes(axes, point)] + list(_steps(axes, panel))
+    occupied = [box for point in panel.points for box in _boxes(axes, point)] + list(_steps(axes, panel))
     named: set[str] = set()
     labels = []
     for point in panel.points:
         labels.append(Label(text_of(point, point.method not in named), point.cost.value, point.error.value))
         named.add(point.method)
-    place_labels(axes, labels, taken)
+    place_labels(axes, labels, occupied)
 
 
 def text_of(point: Point, first: bool) -> str:

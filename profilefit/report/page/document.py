@@ -17,8 +17,7 @@ from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
-from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, layers, promises, shader, speed
+from profilefit.report.page.sections import EvidenceFolder, failures, layers, promises, shader, speed
 from profilefit.report.records import Source
 
 Tracked = Callable[[list[str]], Iterable[str]]
@@ -67,7 +66,7 @@ $style
 <header>
 <h1>$title</h1>
 <p class="lead">$lead</p>
-<p class="dim">$told</p>
+<p class="dim">$summary</p>
 <button id="theme" type="button" hidden>light or dark</button>
 </header>
 <nav aria-label="Contents"><ul>$links</ul></nav>
@@ -123,18 +122,18 @@ def _document(made: Mapping[str, str], count: int) -> str:
     records = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
     inside = {**made, "records": records}
     parts = {key: (title, inside[key]) for key, title in PARTS.items() if inside[key]}
-    told = f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}. {CONVENTIONS}"
-    return document(TITLE, LEAD, told, parts)
+    summary = f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}. {CONVENTIONS}"
+    return document(TITLE, LEAD, summary, parts)
 
 
-def document(title: str, lead: str, told: str, parts: Mapping[str, tuple[str, str]]) -> str:
+def document(title: str, lead: str, summary: str, parts: Mapping[str, tuple[str, str]]) -> str:
     """Return a page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
     rules, sections = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
     links = "".join(element("li", element("a", escape(head), href=f"#{key}")) for key, (head, _) in parts.items())
     return PAGE.substitute(
         title=escape(title),
         lead=escape(lead),
-        told=escape(told),
+        summary=escape(summary),
         style=_asset("page.css") + rules,
         script=_asset("page.js"),
         links=links,

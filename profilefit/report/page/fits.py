@@ -58,10 +58,10 @@ def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
 
 
 def _options(content: Content) -> str:
-    told = f"--preset {content['preset']} --seed {content['seed']}"
+    options = f"--preset {content['preset']} --seed {content['seed']}"
     photons = (content.get("truth") or {}).get("photons")
     usual = preset_photons(content["preset"], record_setting(content))
-    return told if photons in (None, usual) else f"{told} --photons {photons}"
+    return options if photons in (None, usual) else f"{options} --photons {photons}"
 
 
 def _photons(content: Content) -> str:

@@ -17,8 +17,8 @@ LETTERS = Console(file=None, color_system=None, highlight=False, markup=False)
 
 def element(tag: str, inside: str, **attributes: str) -> str:
     """Return `<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens."""
-    told = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
-    return f"<{tag}{told}>{inside}</{tag}>"
+    named = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
+    return f"<{tag}{named}>{inside}</{tag}>"
 
 
 def paragraph(text: str, class_: str = "") -> str:

@@ -43,31 +43,31 @@ def diffuse_law(setting: Setting) -> Named:
         raise SettingError(f"{error}; without --out the medium alone is measured") from None
 
 
-def medium_text(found: Photo, law: Named) -> str:
+def medium_text(photo: Photo, law: Named) -> str:
     """Return GLSL of a law for diffuse light, and after it albedo and mean free path by colour."""
-    fits = list(found.fits.values())
+    fits = list(photo.fits.values())
     values = {
         name: np.array([[one.values[of] for one in fits], [one.errors[of] for one in fits]])
         for name, of in (("albedo", "alpha"), ("mfp", "l"))
     }
     head = [
-        f"by photographs from {found.shot.sources[0]} on, {', '.join(found.fits)}: as alpha and mfp above",
+        f"by photographs from {photo.shot.sources[0]} on, {', '.join(photo.fits)}: as alpha and mfp above",
         "mfp in mm; errors of one standard deviation",
     ]
     return export_medium(law, fits_folder(), "medium", head, values)
 
 
-def photo_page(found: Photo, folder: Path, text: str) -> str:
+def photo_page(photo: Photo, folder: Path, text: str) -> str:
     """Return the page as HTML that needs no other file; `folder` holds the drawings, text is that of the shader."""
     parts = {
-        "medium": ("The medium", "\n".join([*map(markup, photo_tables(found)), *map(paragraph, photo_lines(found))])),
+        "medium": ("The medium", "\n".join([*map(markup, photo_tables(photo)), *map(paragraph, photo_lines(photo))])),
         "spot": ("The spot", _drawing(folder, SPOT, on_paper=True)),
         "fit": ("The fit", _drawing(folder, RINGS)),
-        "shader": ("For a shader", _shader(found, text)),
+        "shader": ("For a shader", _shader(photo, text)),
     }
-    shots = len(found.shot.sources)
-    told = f"{shots} exposure{'s' if shots != 1 else ''} from {found.shot.sources[0]} on, profilefit {__version__}."
-    return document(TITLE, LEAD, told, parts)
+    shots = len(photo.shot.sources)
+    summary = f"{shots} exposure{'s' if shots != 1 else ''} from {photo.shot.sources[0]} on, profilefit {__version__}."
+    return document(TITLE, LEAD, summary, parts)
 
 
 def _drawing(folder: Path, name: str, on_paper: bool = False) -> str:
@@ -75,8 +75,8 @@ def _drawing(folder: Path, name: str, on_paper: bool = False) -> str:
     return figure(inline(svg, name, DRAWN[name]), DRAWN[name], on_paper)
 
 
-def _shader(found: Photo, text: str) -> str:
-    at = f"--n {found.setting.n:g} --g {found.setting.g:g}"
+def _shader(photo: Photo, text: str) -> str:
+    at = f"--n {photo.setting.n:g} --g {photo.setting.g:g}"
     lines = command(f"profilefit export hazard-diffuse {at} --lang hlsl\nprofilefit export hazard {at}")
     shown = element("pre", element("code", escape(text)), tabindex="0")
     return paragraph(SHADER) + lines + details(f"medium.glsl, {len(text.splitlines())} lines", shown)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from html import escape
+from pathlib import Path
+from typing import Any
 
+from mcml_sim.files.text_file import MOST_JSON, parse_json
+from mcml_sim.files.whole_file import read_whole
+from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.report.drawing import address
+from profilefit.recipes.evidence import stale
+from profilefit.report.drawing import address, checked, inline
 from profilefit.report.figures.sum_figure import NAME as OF_SUMS
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
 from profilefit.report.page.fits import drawing
-from profilefit.report.page.markup import details, element, figure, markup, paragraph
-from profilefit.report.page.measured import EvidenceFolder, Told, missing
+from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
@@ -19,6 +25,75 @@ from profilefit.report.tables.stack_table import stack_table
 from profilefit.report.tables.sum_table import sum_tables
 from profilefit.report.tables.tradeoff_tables import with_spread
 from profilefit.studies.stability.cells import Verdict
+
+Content = dict[str, Any]
+ALL = "all"
+MOST_DRAWING = 2**24  # bytes; the largest of ours has a fourteenth of it
+
+
+@dataclass(frozen=True)
+class EvidenceFolder:
+    """A folder that `profilefit check`, `stability` and `tradeoff` wrote into with `--out`.
+
+    records  the folder whose records the page shows
+    """
+
+    folder: Path
+    records: Path
+
+    def section(self, name: str, parts: Callable[[EvidenceFolder], Iterator[str]]) -> str:
+        """Return the parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
+        try:
+            return "\n".join(parts(self))
+        except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
+            given = f"{type(error).__name__}: {error}"
+            raise InputError(
+                f"{self.folder / name}.json: expected what `profilefit {name} --out` writes, got {given}"
+            ) from error
+
+    def content(self, name: str) -> Content | None:
+        """Return the content of `name`.json; None if there is none. InputError on a file of another kind."""
+        path = self.folder / f"{name}.json"
+        expected = f"{path}: expected what `profilefit {name} --out` writes"
+        if not path.exists():
+            return None
+        try:
+            content = parse_json(read_whole(path, MOST_JSON))
+        except ValueError as error:
+            raise InputError(f"{expected}, got: {error}") from None
+        if not isinstance(content, dict) or not isinstance(content.get("made"), dict):
+            raise InputError(f"{expected}, got no key 'made'")
+        return content
+
+    def drawing(self, name: str, title: str, on_paper: bool = False) -> str:
+        """Return the figure `name`.svg beside it, or nothing."""
+        path = self.folder / f"{name}.svg"
+        if not path.exists():
+            return ""
+        content = read_whole(path, MOST_DRAWING)
+        if len(content) > MOST_DRAWING:
+            raise ValueError(f"a drawing of more than {MOST_DRAWING} bytes, {path.name}")
+        return figure(inline(checked(content.decode("utf-8")), name, title), title, on_paper)
+
+    def origin(self, content: Content) -> str:
+        """Return when, where and by which command it was measured, and whether the records have changed since."""
+        made = content["made"]
+        machine = made.get("machine") or {}
+        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
+        parts = [paragraph(when, "dim"), command(str(made.get("command")))]
+        if content.get("of", ALL) != ALL:
+            of = content["of"]
+            listed = ", ".join(of) if isinstance(of, list) else str(of)
+            parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
+        if stale(made, self.records):
+            parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
+        return "\n".join(parts)
+
+
+def missing(name: str) -> str:
+    """Return the text for a measurement that is absent."""
+    return paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")
+
 
 # `python -m benchmarks.render` makes them.
 RENDERS = {
@@ -57,8 +132,8 @@ COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median 
 
 def shader(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("check")
-    yield missing("check") if told is None else "\n".join([evidence.origin(told), *_check(told)])
+    content = evidence.content("check")
+    yield missing("check") if content is None else "\n".join([evidence.origin(content), *_check(content)])
     for name, title in RENDERS.items():
         path = evidence.folder / name
         if path.exists():
@@ -81,21 +156,21 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
             yield _picture(path.read_bytes(), title)
 
 
-def _check(told: Told) -> Iterator[str]:
-    counts = " and ".join(f"{len(told[key])} {key}" for key in GROUPS)
-    verdict = "all pass" if told["passed"] else "bounds are broken"
-    yield paragraph(f"{counts} on {told['device']}: {verdict}.", "bold")
+def _check(content: Content) -> Iterator[str]:
+    counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
+    verdict = "all pass" if content["passed"] else "bounds are broken"
+    yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, measures) in GROUPS.items():
-        if told[key]:
-            columns = _columns(told[key], measures)
+        if content[key]:
+            columns = _columns(content[key], measures)
             yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
-    if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in told[key] for line in one["broken"]]:
+    if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
-    if told["costs"]:
-        yield markup(column_table(COSTS, _costs(told["costs"]), left=("source",)))
+    if content["costs"]:
+        yield markup(column_table(COSTS, _costs(content["costs"]), left=("source",)))
 
 
-def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[str]]:
+def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, list[str]]:
     columns = {
         "law": [_label(one) for one in group],
         "result": ["FAIL" if one["broken"] else "pass" for one in group],
@@ -111,11 +186,11 @@ def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[s
     return columns
 
 
-def _label(one: Told) -> str:
+def _label(one: Content) -> str:
     return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
 
 
-def _costs(costs: Told) -> dict[str, list[str]]:
+def _costs(costs: Content) -> dict[str, list[str]]:
     works = list(next(iter(costs.values()))["ns"])
     columns = {"source": list(costs)}
     for work in works:
@@ -137,19 +212,19 @@ CHARTS = {
 
 def speed(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("tradeoff")
-    if told is None:
+    content = evidence.content("tradeoff")
+    if content is None:
         yield missing("tradeoff")
         return
     for name, title in CHARTS.items():
-        if name in told:
+        if name in content:
             # Parts may have been measured on different days.
-            yield evidence.origin({"made": told["made"], **told[name]})
+            yield evidence.origin({"made": content["made"], **content[name]})
             yield evidence.drawing(f"tradeoff-{name}", title)
-            yield details(f"{escape(title)} The numbers", _numbers(told[name]))
+            yield details(f"{escape(title)} The numbers", _numbers(content[name]))
 
 
-def _numbers(part: Told) -> str:
+def _numbers(part: Content) -> str:
     tables = []
     for panel in part["panels"].values():
         points = panel["points"]
@@ -177,15 +252,15 @@ FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folde
 
 def failures(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = evidence.told("stability")
-    if told is None:
+    content = evidence.content("stability")
+    if content is None:
         yield missing("stability")
         return
-    yield evidence.origin(told)
-    yield paragraph(HOLDS[bool(told["passed"])], "bold")
-    aside = sum(int(one["count"]) for one in told["regions"] if one["class"] == NOT_JUDGED)
+    yield evidence.origin(content)
+    yield paragraph(HOLDS[bool(content["passed"])], "bold")
+    aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == NOT_JUDGED)
     yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
-    columns = _advice(told["regions"])
+    columns = _advice(content["regions"])
     yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
     for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
@@ -193,8 +268,8 @@ def failures(evidence: EvidenceFolder) -> Iterator[str]:
         yield details(title, figure, is_open=path.stem == FIRST)
 
 
-def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
-    groups: dict[str, list[Told]] = {}
+def _advice(regions: Sequence[Content]) -> dict[str, list[str]]:
+    groups: dict[str, list[Content]] = {}
     for region in regions:
         # Earlier versions wrote a cause and its remedy.
         sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"

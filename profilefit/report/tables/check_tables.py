@@ -11,7 +11,7 @@ from rich.text import Text
 
 from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record import plain
-from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.shader.check import half
 from profilefit.shader.check.chosen import REGENERATED, checked, chosen
@@ -41,15 +41,24 @@ HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16
 def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
     """Return a line a law and a line a map."""
     parts: list[RenderableType] = []
-    if laws:
-        columns = {"law": [one.of.label for one in laws], **_places(laws)}
-        columns |= _columns(LAW_COLUMNS, [_law_cells(one) for one in laws]) | _verdicts(laws)
-        parts.append(column_table(f"Laws in float32, {device}", columns, CAPTION, left=("result",), fold=("law",)))
-    if maps:
-        columns = {"map": [one.of.label for one in maps], **_places(maps)}
-        columns |= _columns(MAP_COLUMNS, [_map_cells(one) for one in maps]) | _verdicts(maps)
-        parts.append(column_table(f"Maps in float32, {device}", columns, left=("result",), fold=("map",)))
+    for kind, names, cells, checks in _kinds(laws, maps):
+        caption, has_g = CAPTION if kind == "law" else "", any(one.of.setting.g for one in checks)
+        header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
+        rows = [
+            (one.of.label, *_setting(one.of)[1 : 2 + has_g], *cells(one), *_counts(one), _result(one)) for one in checks
+        ]
+        title = f"{kind.capitalize()}s in float32, {device}"
+        parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
     return parts
+
+
+def _kinds(laws: Sequence[LawCheck], maps: Sequence[MapCheck]) -> list[tuple[str, tuple[str, ...], Any, Sequence[Any]]]:
+    """Return word, headers, cells and checks of laws and of maps, where there are any."""
+    kinds: list[tuple[str, tuple[str, ...], Any, Sequence[Any]]] = [
+        ("law", LAW_COLUMNS, _law_cells, laws),
+        ("map", MAP_COLUMNS, _map_cells, maps),
+    ]
+    return [kind for kind in kinds if kind[-1]]
 
 
 def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
@@ -115,13 +124,9 @@ def markdown_check(folder: Path) -> str:
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
     """Return the README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
-    if laws:
-        header = ("law", "light", "n", "g", *(_flat(name) for name in (*LAW_COLUMNS, *COUNTS)), "result")
-        rows = [(one.of.label, *_setting(one.of), *_law_cells(one), *_counts(one), _result(one)) for one in laws]
-        parts.append(markdown_table(header, rows))
-    if maps:
-        header = ("map", "light", "n", "g", *(_flat(name) for name in (*MAP_COLUMNS, *COUNTS)), "result")
-        rows = [(one.of.label, *_setting(one.of), *_map_cells(one), *_counts(one), _result(one)) for one in maps]
+    for kind, names, cells, group in _kinds(laws, maps):
+        header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
+        rows = [(one.of.label, *_setting(one.of), *cells(one), *_counts(one), _result(one)) for one in group]
         parts.append(markdown_table(header, rows))
     checks: list[LawCheck | MapCheck] = [*laws, *maps]
     broken = [f"- `{_called(one)}`: {bound}" for one in checks for bound in one.broken]
@@ -183,21 +188,6 @@ def _at_index(one: Named) -> str:
     return one.label + where + (f", g = {one.setting.g:g}" if one.setting.g else "")
 
 
-def _places(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
-    """Return columns of n, and of g where one has it."""
-    g = {"g": [f"{one.of.setting.g:g}" for one in checks]} if any(one.of.setting.g for one in checks) else {}
-    return {"n": [f"{one.of.setting.n:g}" for one in checks], **g}
-
-
-def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, list[str]]:
-    return {header: [row[i] for row in rows] for i, header in enumerate(headers)}
-
-
-def _verdicts(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
-    columns = _columns(COUNTS, [_counts(one) for one in checks])
-    return {**columns, "result": [_result(one) for one in checks]}
-
-
 def _law_cells(one: LawCheck) -> tuple[str, ...]:
     """Return model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
     rounding = {name: value for name, value in one.rounding.items() if JUDGED[name] in one.spreads}
@@ -222,7 +212,3 @@ def _result(one: LawCheck | MapCheck) -> str:
 
 def _setting(one: Named) -> tuple[str, str, str]:
     return one.setting.illumination, f"{one.setting.n:g}", f"{one.setting.g:g}"
-
-
-def _flat(header: str) -> str:
-    return header.replace("\n", " ")

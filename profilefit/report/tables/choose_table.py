@@ -119,13 +119,13 @@ def fur_lines(need: FurNeed) -> list[str]:
     """Return how many layers fur needs, a line an angle, and the answer."""
     lines = []
     for angle, layers in need.layers.items():
-        told = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
+        counts = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
         best = need.cheapest(angle)
-        lines.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
-    wanted = f"(requested: {_percent(need.tolerance)} % of the length)"
+        lines.append(f"{angle} degrees: {counts}; cheapest: {'none' if best is None else _plain(best.name)}")
+    requested = f"(requested: {_percent(need.tolerance)} % of the length)"
     if need.way is None:
-        return [*lines, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
-    return [*lines, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
+        return [*lines, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {requested}"]
+    return [*lines, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {requested}"]
 
 
 def fur_content(need: FurNeed) -> dict[str, Any]:
@@ -182,11 +182,11 @@ def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> 
         "filters": _filters(choice),
         "export": export_hint(choice),
     }
-    told = [{**vars(layer), "verdict": _verdict(layer, choice)} for layer in layers]
-    if len(told) == 1:
-        made["one_layer"] = told[0]
-    elif told:
-        made["one_layer"] = [{"channel": name, **one} for name, one in zip(CHANNELS, told, strict=True)]
+    verdicts = [{**vars(layer), "verdict": _verdict(layer, choice)} for layer in layers]
+    if len(verdicts) == 1:
+        made["one_layer"] = verdicts[0]
+    elif verdicts:
+        made["one_layer"] = [{"channel": name, **one} for name, one in zip(CHANNELS, verdicts, strict=True)]
     return made
 
 

@@ -14,7 +14,7 @@ from rich.console import RenderableType
 from mcml_sim.files.text_file import read_json
 from profilefit.errors import InputError
 from profilefit.recipes.schema import is_line, is_number, shown
-from profilefit.report.tables.cells import column_table, significant
+from profilefit.report.tables.cells import row_table, significant
 from profilefit.report.tables.markdown import markdown_table
 
 FILE = "claims.json"
@@ -65,9 +65,9 @@ class Claim:
 def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
     """Return the origin of the claims in `folder`, and the claims; InputError where there are none."""
     path = folder / FILE
-    told = read_json(path)
+    claims = read_json(path)
     try:
-        return {**told["made"]}, [_claim(row) for row in told["rows"]]
+        return {**claims["made"]}, [_claim(row) for row in claims["rows"]]
     except (KeyError, TypeError, ValueError) as error:
         given = f"{type(error).__name__}: {error}"
         raise InputError(f"{path}: expected what `make claims` writes, got {given}") from error
@@ -88,10 +88,9 @@ def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
 
 
 def _table(command: str, rows: Sequence[Claim]) -> RenderableType:
-    cells = zip(*(one.cells for one in rows), strict=True)
-    columns = dict(zip(("claim", "promised", "measured", "noise"), map(list, cells), strict=True))
     caption = f"held against: {rows[0].truth}; {rows[0].date}, load before {rows[0].load}"
-    return column_table(command, columns, caption, fold=("claim", "noise"))
+    header = ("claim", "promised", "measured", "noise")
+    return row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise"))
 
 
 def markdown_claims(folder: Path) -> str:

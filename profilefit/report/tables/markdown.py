@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -160,13 +160,19 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
+def _table_of(
+    records: Mapping[str, Content], needed: str, header: Iterable[str], cells: Callable[[Content], Iterable[str]]
+) -> str:
+    """Return a row for each set of constants that a measure is known of; nothing where there is none."""
+    rows = [(owner, which, *cells(values)) for owner, which, values in _measured(records, needed)]
+    return markdown_table(("record", "constants", *header), rows) if rows else ""
+
+
 def _profile_quality(records: Mapping[str, Content]) -> str:
-    header = ("record", "constants", *(f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst")))
-    rows = [
-        (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values.get(key))))
-        for owner, which, values in _measured(records, "rel")
-    ]
-    return markdown_table(header, rows) if rows else ""
+    header = (f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst"))
+    return _table_of(
+        records, "rel", header, lambda of: [t for key in PROFILE_MEASURES for t in _mean_and_worst(key, of.get(key))]
+    )
 
 
 def _short_quality(records: Mapping[str, Content]) -> str:
@@ -186,21 +192,13 @@ def _short_quality(records: Mapping[str, Content]) -> str:
 
 
 def _inversion_quality(records: Mapping[str, Content]) -> str:
-    header = ("record", "constants", "inversion error mean", "inversion error worst")
-    rows = [
-        (owner, which, *_mean_and_worst("inversion_error", values["inversion_error"]))
-        for owner, which, values in _measured(records, "inversion_error")
-    ]
-    return markdown_table(header, rows) if rows else ""
+    key, header = "inversion_error", ("inversion error mean", "inversion error worst")
+    return _table_of(records, key, header, lambda of: _mean_and_worst(key, of[key]))
 
 
 def _albedo_quality(records: Mapping[str, Content]) -> str:
-    header = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
-    rows = [
-        (owner, which, *(albedo_number(measure, values[measure]) for measure in OF_MAP))
-        for owner, which, values in _measured(records, "delta_A")
-    ]
-    return markdown_table(header, rows) if rows else ""
+    header = (MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP)
+    return _table_of(records, "delta_A", header, lambda of: (albedo_number(name, of[name]) for name in OF_MAP))
 
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:

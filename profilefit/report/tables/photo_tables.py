@@ -12,7 +12,7 @@ from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes import record
-from profilefit.report.tables.cells import column_table, interval, significant, to_error
+from profilefit.report.tables.cells import interval, row_table, significant, to_error
 from profilefit.report.tables.fit_tables import p_value
 
 NAMES = ("mu_s'", "mu_a", "alpha", "l", "A")
@@ -24,23 +24,22 @@ CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says
 
 def photo_tables(photo: Photo) -> list[RenderableType]:
     """Return a line a colour and quantity, with what such photographs can know at best."""
-    columns: dict[str, list[str]] = {name: [] for name in ("colour", "", "value", "±", "95 %", "at best", "unit")}
+    rows = []
     for colour, fit in photo.fits.items():
         for name in NAMES:
             value, error = fit.values[name], fit.errors[name]
             best = photo.bounds[colour].get(name)
-            cells = (
+            rows.append((
                 colour if name == NAMES[0] else "", name, to_error(value, error), significant(error),
                 interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
-            )  # fmt: skip
-            for column, cell in zip(columns.values(), cells, strict=True):
-                column.append(cell)
+            ))  # fmt: skip
     title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
     caption = (
         "±: from the scatter over sectors, a correlated 1 %, and what is known of beam, surface, glare and scale; "
         "at best: by Fisher's information of such rings and of what is known"
     )
-    return [column_table(title, columns, caption, left=("colour", "", "unit"))]
+    header = ("colour", "", "value", "±", "95 %", "at best", "unit")
+    return [row_table(title, header, rows, caption, left=("colour", "", "unit"))]
 
 
 def photo_lines(photo: Photo) -> Iterator[str]:
@@ -56,18 +55,18 @@ def photo_lines(photo: Photo) -> Iterator[str]:
     for colour, fit in photo.fits.items():
         x = dict(zip(fit.shot.names, fit.x, strict=True))
         glare = sum(value for name, value in x.items() if name.startswith("glare"))
-        told = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
+        lens = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
         widened = f"MISFIT, for which errors are widened by a factor of {fit.widening:.1f}"
         verdict = widened if fit.chance < DETECTED else "no misfit is detected"
         yield (
-            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {told}; chi-square {fit.chi2:.1f} "
+            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {lens}; chi-square {fit.chi2:.1f} "
             f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
         )
         if not fit.converged:
             yield f"{colour}: NO ANSWER: {fit.result}"
         for one in fit.rivals:
-            told = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
-            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {told}; chi-square {one.chi2 - fit.chi2:+.1f}"
+            values = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
+            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {values}; chi-square {one.chi2 - fit.chi2:+.1f}"
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
@@ -118,13 +117,11 @@ def photo_content(photo: Photo) -> dict[str, Any]:
 
 def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[RenderableType]:
     """Return what a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
-    columns: dict[str, list[str]] = {"photographs": [], "colour": [], "mu_s'": [], "mu_a": []}
-    for setup, by_colour in bounds.items():
-        for colour, errors in by_colour.items():
-            columns["photographs"].append(setup)
-            columns["colour"].append(colour)
-            for name in NAMES[:2]:
-                columns[name].append(f"{100 * errors[name]:.1f} %")
+    rows = [
+        (setup, colour, *(f"{100 * errors[name]:.1f} %" for name in NAMES[:2]))
+        for setup, by_colour in bounds.items()
+        for colour, errors in by_colour.items()
+    ]
     caption = "by Fisher's information of rings of exact light that scatter by 0.3 %, a correlated 1 %, and what a fit "
     caption += "takes for known of surface, glare and lens"
-    return [column_table("At best", columns, caption, left=("photographs", "colour"))]
+    return [row_table("At best", ("photographs", "colour", *NAMES[:2]), rows, caption, left=("photographs", "colour"))]

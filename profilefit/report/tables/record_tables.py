@@ -26,7 +26,15 @@ from profilefit.report.records import (
     largest_error,
     z_score,
 )
-from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
+from profilefit.report.tables.cells import (
+    ABSENT,
+    column_table,
+    interval,
+    on_the_point,
+    row_table,
+    significant,
+    to_error,
+)
 from profilefit.report.tables.evidence_tables import evidence_tables
 from profilefit.report.tables.quality_tables import quality_tables, spark_table
 from profilefit.report.tables.stack_table import stack_tables
@@ -101,15 +109,12 @@ def intervals_table(content: Content) -> RenderableType:
     chains = content["posterior"]
     if not chains:
         return Text("No credible intervals: a chain starts from a fit that converged.")
-    cells: dict[str, list[str]] = {"": [], "from": [], "68 %": [], "95 %": []}
+    rows = []
     for name, constant in content["constants"].items():
         for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
-            levels = constant["intervals"][kind]
-            cells[""].append("" if place else name)
-            cells["from"].append(KINDS[kind])
-            cells["68 %"].append(interval(levels.get("68%")))
-            cells["95 %"].append(interval(levels.get("95%")))
-    return column_table("Credible intervals (emcee)", cells, left=("", "from"))
+            levels = (constant["intervals"][kind].get(level) for level in ("68%", "95%"))
+            rows.append(("" if place else name, KINDS[kind], *map(interval, levels)))
+    return row_table("Credible intervals (emcee)", ("", "from", "68 %", "95 %"), rows, left=("", "from"))
 
 
 def derived_table(derived: Content, surface: str = "") -> RenderableType:
@@ -187,15 +192,12 @@ def _second_opinions(content: Content) -> list[Line]:
 
 def stage_tables(stages: Content) -> list[RenderableType]:
     """Return the paper's own order: coefficient laws through per-albedo fits, and how a, b, c scale with l."""
-    cells: dict[str, list[str]] = {"": [], "through the points": [], "± photons": []}
+    rows = []
     states: list[Line] = []
     for letter, law in stages["coefficient_laws"].items():
         errors = law.get("standard_error", {}) if law["result"] == "converged" else {}
         for name, value in law["constants"].items():
-            error = errors.get(name)
-            cells[""].append(name)
-            cells["through the points"].append(to_error(value, error))
-            cells["± photons"].append(significant(error))
+            rows.append((name, to_error(value, errors.get(name)), significant(errors.get(name))))
         states.append((f"law of {letter}", _verdict(law["result"])))
         states.append(("", f"condition number {significant(law['condition_number'], 3)}"))
     failures = {mfp: count for mfp, count in stages.get("per_albedo_failures", {}).items() if count}
@@ -204,9 +206,8 @@ def stage_tables(stages: Content) -> list[RenderableType]:
     if stages.get("length_exponents"):
         powers = ", ".join(f"{letter} l^{power:.3f}" for letter, power in stages["length_exponents"].items())
         states.append(("with l", f"{powers}; similarity says −1, 0, 1"))
-    for key in ("through the points", "± photons"):
-        cells[key] = on_the_point(cells[key])
-    return [column_table("Stages: coefficient laws through the fits at each albedo", cells), _facts("", states)]
+    title, header = "Stages: coefficient laws through the fits at each albedo", ("", "through the points", "± photons")
+    return [row_table(title, header, rows, aligned=header[1:]), _facts("", states)]
 
 
 def _title(content: Content) -> RenderableType:

@@ -13,7 +13,7 @@ from profilefit.recipes import record
 from profilefit.recipes.regenerate import Reproduction
 from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
-from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark
+from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant, span, spark
 from profilefit.report.tables.evidence_tables import evidence_line
 from profilefit.report.tables.quality_tables import values_of, worst_measures
 
@@ -37,24 +37,24 @@ def summary(records: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
     kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    told = [make(group) for make, group in kinds.items() if group]
+    shown = [make(group) for make, group in kinds.items() if group]
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
         if "fit" in content and not converged(content)
     ]
-    return Group(*_spaced(told), *failures, Text(CAPTION, style="dim"))
+    return Group(*_spaced(shown), *failures, Text(CAPTION, style="dim"))
 
 
 def outcome(path: Path) -> dict[str, Any]:
     """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
     content = record.read(path)
-    told: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
+    body: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
     if "fit" not in content:
-        return {**told, "readings": len(content.get("readings", []))}
+        return {**body, "readings": len(content.get("readings", []))}
     kept = ("published", "regenerated", *ERRORS)
     constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
-    return {**told, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
+    return {**body, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 
 
 def reproduced(
@@ -68,8 +68,7 @@ def reproduced(
         cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
         rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
     headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
-    columns = dict(zip(headers, map(list, zip(*rows, strict=True)), strict=True))
-    return column_table(REPRODUCED, columns, REPRODUCED_CAPTION, left=("record",), fold=("result",))
+    return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 
 
 def verdict(reproductions: Sequence[Reproduction]) -> str:

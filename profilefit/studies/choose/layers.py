@@ -105,8 +105,8 @@ def one_layer(
 def _is_solved(stack: Medium) -> bool:
     """Return whether exact light is known of it, and of the half spaces that are tried for it."""
     n = stack.layers[0].n
-    alike = all(layer.g == 0 and layer.n == n and layer.mu_t > 0 for layer in stack.layers)
-    return alike and stack.is_half_space and n >= stack.n_above and stack.layers[0].mu_s > 0
+    is_isotropic = all(layer.g == 0 and layer.n == n and layer.mu_t > 0 for layer in stack.layers)
+    return is_isotropic and stack.is_half_space and n >= stack.n_above and stack.layers[0].mu_s > 0
 
 
 def of_each_colour(

@@ -54,8 +54,8 @@ class OneGaussian(Separable):
 @lru_cache(maxsize=256)
 def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
     """Return weights (count,) of sum 1 [-] and sigmas (count,) [mfp]."""
-    wanted = share(FITTED)
-    quartile = np.interp(-0.25, -wanted, FITTED)
+    target = share(FITTED)
+    quartile = np.interp(-0.25, -target, FITTED)
 
     def split(free: Floats) -> tuple[Floats, Floats]:
         share = np.exp(np.append(0.0, free[count:]))
@@ -63,7 +63,7 @@ def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
 
     def missed(free: Floats) -> Floats:
         weight, sigma = split(free)
-        return ndtr(-FITTED[:, None] / sigma) @ weight - wanted
+        return ndtr(-FITTED[:, None] / sigma) @ weight - target
 
     first = np.log(quartile * np.geomspace(0.3, 4.0, count)) if count > 1 else np.log([1.5 * quartile])
     start = np.append(first, np.zeros(count - 1))

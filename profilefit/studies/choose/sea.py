@@ -88,10 +88,10 @@ def _haze(of: SeaRequest, world: World) -> dict[str, float]:
     for view in _views(of):
         cosine = float(view @ world.beam)
         for c, omega in zip(world.c.tolist(), world.omega.tolist(), strict=True):
-            right = sunlit_haze(omega, c * depth, cosine, world.lobes, BROADENED)
-            for kind in CHEAPER if right > 0 else ():
-                off = abs(sunlit_haze(omega, c * depth, cosine, world.lobes, kind) / right - 1.0)
-                worst[kind] = max(worst[kind], off)
+            broadened = sunlit_haze(omega, c * depth, cosine, world.lobes, BROADENED)
+            for kind in CHEAPER if broadened > 0 else ():
+                error = abs(sunlit_haze(omega, c * depth, cosine, world.lobes, kind) / broadened - 1.0)
+                worst[kind] = max(worst[kind], error)
     return worst
 
 

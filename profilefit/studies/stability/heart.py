@@ -64,8 +64,8 @@ def of_ball(context: moderngl.Context) -> Cells:
         towards = atlas.read("normal_map")[..., :3].astype(float) @ np.array(LAMP)
         for sigma in SIGMAS:
             light = _blurred(atlas, 1.0 + towards, sigma * RADIUS)
-            right = sphere_blur(RADIUS, towards, [(sigma * RADIUS) ** 2], [1.0])
-            pairs.append([one[np.ix_(rows, columns)] for one in (light, right)])
+            exactly = sphere_blur(RADIUS, towards, [(sigma * RADIUS) ** 2], [1.0])
+            pairs.append([one[np.ix_(rows, columns)] for one in (light, exactly)])
     value, reference = np.stack(pairs, axis=1)
     axes = (
         ArgumentAxis("σ/R", "-", np.array(SIGMAS)),
@@ -91,11 +91,11 @@ def of_stretch(context: moderngl.Context) -> Cells:
                     for axis in (0, 1):
                         along = place[..., axis].astype(float)
                         light = _blurred(atlas, (along > 0).astype(float), sigma)
-                        right = 0.5 + 0.5 * erf(along / (np.sqrt(2.0) * sigma))
+                        exactly = 0.5 + 0.5 * erf(along / (np.sqrt(2.0) * sigma))
                         here = np.argwhere((place[..., 3] > 0.5) & (np.abs(along) < 0.25 * ROWS))
-                        off = np.abs(light - right)[tuple(here.T)]
-                        at = tuple(here[int(np.argmax(off))])
-                        value[i, j, axis], reference[i, j, axis] = light[at], right[at]
+                        error = np.abs(light - exactly)[tuple(here.T)]
+                        at = tuple(here[int(np.argmax(error))])
+                        value[i, j, axis], reference[i, j, axis] = light[at], exactly[at]
     axes = (
         ArgumentAxis("column / row", "-", np.array(RATIOS, float)),
         ArgumentAxis("σ", "rows", np.array(WIDTHS)),

@@ -28,25 +28,8 @@ REFLECTANCE = (1e-12, 1e-6, 1e-3, 0.01, 0.05, *(float(v) for v in np.linspace(0.
 RADIUS = (1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 1e3)
 FARTHER = (1e6, 1e8, 1e15)
 SHARE = (
-    1e-12,
-    1e-6,
-    1e-4,
-    1e-3,
-    5e-3,
-    0.0099,
-    0.0101,
-    0.02,
-    0.05,
-    0.1,
-    0.2,
-    0.3,
-    0.5,
-    0.7,
-    0.8,
-    0.9,
-    0.95,
-    0.99,
-    0.999,
+    *(1e-12, 1e-6, 1e-4, 1e-3, 5e-3, 0.0099, 0.0101, 0.02, 0.05),
+    *(0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 0.999),
 )
 LENGTH = (1e-3, 1.0, 1e3)
 POWERS = (10, 11, 24, 53)  # k of 2^-k and 1 - 2^-k: what half, float32 and float64 can and cannot hold
@@ -91,9 +74,8 @@ def reflectance(dtype: type) -> ArgumentAxis:
 
 def share(dtype: type) -> ArgumentAxis:
     """Return uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
-    return ArgumentAxis(
-        "ξ", "-", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(dtype), *_pairs(dtype, (0.1, 0.5))))
-    )
+    given = (*SHARE, *_ends(dtype), *_around_one(dtype), *_pairs(dtype, (0.1, 0.5)))
+    return ArgumentAxis("ξ", "-", _cells(dtype, given))
 
 
 def radius(dtype: type) -> ArgumentAxis:

@@ -6,8 +6,7 @@ import re
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import promises
+from profilefit.report.page.sections import EvidenceFolder, promises
 from profilefit.report.tables.claims_table import FILE, markdown_claims, read_claims
 
 ROW = {

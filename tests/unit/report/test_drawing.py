@@ -71,6 +71,19 @@ def test_ids_have_the_figures_prefix_and_are_all_there(original, page):
     assert not used & set(re.findall(r' id="([^"]*)"', other))
 
 
+def corners(d: str) -> list[np.ndarray]:
+    """The points (n, 2) of every line of a path, straight or relative; control points count as points."""
+    found, here = [], np.zeros(2)
+    for letter, text in re.findall(r"([A-Za-z])([^A-Za-z]*)", d):
+        numbers = [float(one) for one in re.findall(r"-?(?:\d+\.?\d*|\.\d+)", text)]
+        count = {"c": 3, "q": 2}.get(letter.lower(), 1)
+        for points in np.reshape(numbers, (-1, count, 2)):
+            points = points + here if letter.islower() else points
+            found = [*found, points] if letter == "M" else [*found[:-1], np.concatenate([found[-1], points])]
+            here = points[-1]
+    return found
+
+
 def lines(svg: str) -> list[np.ndarray]:
     """The points (n, 2) of every line and curve, wherever it is drawn."""
     root = ET.fromstring(svg[svg.index("<svg") : svg.rindex("</svg>") + 6])
@@ -80,15 +93,11 @@ def lines(svg: str) -> list[np.ndarray]:
     links = [one.get("href") or one.get("{http://www.w3.org/1999/xlink}href") for one in uses]
     drawn = [(one.get("d"), 0.0, 0.0) for one in paths if one.get("style", "") and "id" not in one.attrib]
     drawn += [(shapes[link], *(one.get(key, "0") for key in "xy")) for link, one in zip(links, uses, strict=True)]
-    return [
-        np.array(re.findall(r"-?\d+(?:\.\d+)?", line), float).reshape(-1, 2) + np.array(place, float)
-        for d, *place in drawn
-        for line in d.split("M")[1:]
-    ]
+    return [line + np.array(place, float) for d, *place in drawn for line in corners(d)]
 
 
 def test_every_line_is_where_it_was(original, page):
-    """Error bars, ticks and markers too, to a tenth of a point: two roundings of half of it."""
+    """Error bars, ticks and markers too, to two roundings of half of a tenth of a point."""
     before, after = lines(original), lines(page)
     assert len(before) == len(after) > 40
     for line in before:

@@ -15,8 +15,7 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.stack.sum_errors import constant_names
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
-from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import layers
+from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source, largest_error
 from profilefit.report.tables.sum_table import published, sum_sections, sum_tables
 from profilefit.scenes.skin.law import D_EON
