@@ -25,8 +25,7 @@ from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT
 from profilefit.measured.model import Light, u_of
 from profilefit.measured.noise import Noise
-from profilefit.recipes.record import record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records, record_setting
 
 Floats = NDArray[np.float64]
 RMS = 1.5

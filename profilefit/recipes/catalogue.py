@@ -17,8 +17,7 @@ from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.entry import Entry
 from profilefit.laws.rational import Normalisation, Rational
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import covers, record_setting
-from profilefit.recipes.record_folder import SEARCHLIGHT, Folder, Records
+from profilefit.recipes.record import SEARCHLIGHT, Folder, Records, covers, record_setting
 
 Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.

@@ -23,7 +23,7 @@ from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
 from profilefit.recipes.catalogue import LoadedLaw, not_found
 from profilefit.recipes.folder import known_folder
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 

@@ -30,7 +30,7 @@ from profilefit.recipes.pipelines import (
     read,
 )
 from profilefit.recipes.recipe import Recipe, RingLayout
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import Records
 from profilefit.recipes.run import RecipeRun, RecordContent, Work
 from profilefit.recipes.summary import curves, errors_by_name
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of

@@ -20,7 +20,7 @@ from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.fitting.sampling import SamplerQuality
 from profilefit.recipes.catalogue import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.report.tables.all_laws import (
     ALBEDOS,
     Floats,

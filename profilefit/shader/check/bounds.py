@@ -14,8 +14,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.recipes.catalogue import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
-from profilefit.recipes.record import record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records, record_setting
 from profilefit.recipes.targets import albedo_values
 
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted

@@ -14,7 +14,7 @@ from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.half import HalfCheck, check_half
 from profilefit.shader.check.law_check import LawCheck, check_laws
 from profilefit.shader.check.law_cost import Cost, law_costs

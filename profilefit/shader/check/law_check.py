@@ -25,7 +25,7 @@ from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.catalogue import Named
 from profilefit.recipes.pipelines import inversion_error
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, ShaderCheck, Spread, bad_numbers

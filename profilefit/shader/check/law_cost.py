@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import check_errors, full_screen, program

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.dense_grid import ULP, Count, ShaderCheck, bad_numbers

@@ -18,7 +18,7 @@ from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.recipes.catalogue import Named, profile_laws
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.dense_grid import ULP
 
