@@ -29,14 +29,14 @@ NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters o
 
 
 def names() -> tuple[str, ...]:
-    """The names of the profile laws; `gaussians:N` is a sum of N = 1 ... 8 Gaussians, `gaussians` one of six."""
+    """Return the names of the profile laws; `gaussians:N` is a sum of N = 1 ... 8 Gaussians, `gaussians` one of six."""
     return tuple(laws.PROFILES)
 
 
 def load(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Folder | None = None
 ) -> ProfileLaw:
-    """A profile law by name, one of `names()` or gaussians:1 ... gaussians:8.
+    """Load a profile law by name, one of `names()` or gaussians:1 ... gaussians:8.
 
     constants  "regenerated" (this project's records), "published", "published:<set>" or "<set>" (see
                `laws.published`), or the path of a record (.json); a law without constants has but one form
@@ -57,7 +57,7 @@ def load(
 def albedo_law(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Folder | None = None
 ) -> AlbedoLaw:
-    """A map between alpha and A by name; arguments as for `load`."""
+    """Load a map between alpha and A by name; arguments as for `load`."""
     if name not in laws.MAPS:
         raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
@@ -66,7 +66,7 @@ def albedo_law(
 
 
 def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisation:
-    """The map that scales profile laws to their reflectance; SettingError where the setting has none."""
+    """Load the map that scales profile laws to their reflectance; SettingError where the setting has none."""
     records = Records.of(folder or fits_folder())
     path = records.path_or_shipped(ALBEDO_RECORD, setting)
     if path.parent != records.folder:
@@ -78,7 +78,7 @@ def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisati
 
 
 def key_of(name: str) -> str:
-    """What the name of a profile law stands for: "gaussians" for "gaussians:6"; any other name for itself."""
+    """Return the name under which a profile law is listed: "gaussians:6" for "gaussians", any other name for itself."""
     known = laws.profile_classes()
     return str(known[name].entry.key) if name in known else name
 
@@ -101,7 +101,7 @@ def _checked(setting: Setting | None) -> Setting | None:
 def _constants(
     kind: type[Constants], which: str, requested: Setting | None, records: Records
 ) -> tuple[dict[str, float], Setting]:
-    """The constants of a law, and the setting that they belong to."""
+    """Return the constants of a law, and the setting that they belong to."""
     entry = kind.entry
     if which == "regenerated" or (which == "published" and not kind.constant_names()):
         where = requested or SEARCHLIGHT
@@ -118,7 +118,7 @@ def _constants(
 
 
 def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) -> dict[str, float]:
-    """The constants of every record that a law is made of; none for a law that has none."""
+    """Return the constants of every record that a law is made of; none for a law that has none."""
     if not kind.constant_names():
         return {}
     entry = kind.entry
@@ -159,7 +159,6 @@ def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str
 
 
 def _made(kind: type[Law], values: dict[str, float], which: str, **given: Any) -> Law:
-    """A law from its constants, every one of them there and none besides."""
     known = kind.constant_names()
     if set(values) != set(known):
         raise RecordError(f"constants {which} must be {', '.join(known)}, got {', '.join(values) or '(none)'}")
@@ -182,12 +181,12 @@ class LoadedLaw:
 
     @property
     def records(self) -> tuple[str, ...]:
-        """The names of those records."""
+        """Names of those records."""
         return tuple(path.stem for path in self.files)
 
     @property
     def label(self) -> str:
-        """What a table calls it: its record, or law and printed set."""
+        """Name in tables: its record, or law and printed set."""
         if self.records:
             return self.records[0]
         return f"{self.name}, {self.constants}" if self.constants else self.name
@@ -203,7 +202,7 @@ Found = LoadedLaw | None
 
 
 def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Profile laws with their constants; only those of the records `names`, where such are named.
+    """List profile laws with their constants; only those of the records `names`, where such are named.
 
     matched  only those of settings that have an exact profile
     Records of failed fits have no law.
@@ -213,13 +212,13 @@ def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> l
 
 
 def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
+    """List laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
     records = Records.of(folder)
     return [*_whole_laws(records, names, matched), *_single(records, names, ("inverse",), matched)]
 
 
 def all_profiles(folder: Folder) -> list[LoadedLaw]:
-    """Every profile law of every setting, and last the inverse cdfs that none of them is made of."""
+    """List every profile law of every setting, and last the inverse cdfs that none of them is made of."""
     records = Records.of(folder)
     whole = profile_laws(records, matched=False)
     taken = {name for one in whole for name in one.records}
@@ -227,7 +226,7 @@ def all_profiles(folder: Folder) -> list[LoadedLaw]:
 
 
 def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Maps between alpha and A; arguments as for `profile_laws`."""
+    """List maps between alpha and A; arguments as for `profile_laws`."""
     records, entries = Records.of(folder), _entries(laws.map_classes())
     return [
         *(_printed_laws(entries, records) if names is None else ()),
@@ -316,7 +315,6 @@ def not_found(name: str, folder: Folder, constants: str | None = None) -> InputE
 
 
 def _entries(classes: Mapping[str, Any]) -> list[Entry]:
-    """One for each class, whatever the names that it goes by."""
     return list({kind.entry.key: kind.entry for kind in classes.values()}.values())
 
 
@@ -338,7 +336,7 @@ def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]
 
 
 def _default(entry: Entry, has_constants: bool) -> str:
-    """The regenerated constants, or the only ones printed where none were regenerated."""
+    """Return the regenerated constants, or the only ones printed where none were regenerated."""
     if entry.records or not has_constants:
         return "regenerated"
     printed = [s.name for s in published.SETS if s.law == entry.printed]
@@ -350,14 +348,13 @@ def _default(entry: Entry, has_constants: bool) -> str:
 
 
 def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
-    """Every printed set of these, in the order of print."""
     known = {entry.printed: entry for entry in entries}
     sets = [(known[s.law], s.name) for s in published.SETS if s.law in known]
     return [_named(entry, which, _load(entry, which, None, records), records) for entry, which in sets]
 
 
 def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
-    """Printed sets, laws without constants, and laws made of all their regenerated records."""
+    """List printed sets, laws without constants, and laws made of all their regenerated records."""
     classes = laws.profile_classes()
     entries = _entries(classes)
     regenerated = _regenerated(records, entries, names, matched)
@@ -369,7 +366,7 @@ def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw
 
 
 def _regenerated(records: Records, entries: Sequence[Entry], names: Names, matched: bool) -> list[LoadedLaw]:
-    """These laws, in every setting whose records all are in the folder."""
+    """List these laws, in every setting whose records all are in the folder."""
     there = _usable(records.named(names), matched)
     settings = dict.fromkeys(record_setting(content) for content in there.values())
     found = []
@@ -382,7 +379,7 @@ def _regenerated(records: Records, entries: Sequence[Entry], names: Names, match
 
 
 def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[LoadedLaw]:
-    """Records that no law takes by its name alone; constants that they do not hold are as printed."""
+    """List records that no law takes by its name alone; constants that they do not hold are as printed."""
     entries = [*_entries(laws.profile_classes()), *_entries(laws.map_classes())]
     found = []
     for name, content in _usable(records.named(names), matched).items():
@@ -396,7 +393,7 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
 
 
 def _usable(records: Records, matched: bool) -> dict[str, dict[str, Any]]:
-    """The records of fits that converged."""
+    """Return the records of fits that converged."""
     found = records.contents(whole=True)
     return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
 

@@ -32,7 +32,7 @@ Done = TypeVar("Done")
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -43,7 +43,7 @@ def _shares(processes: int) -> list[list[int]]:
 
 
 class Workers:
-    """So many processes; jobs are done here if that is one.
+    """Processes that do jobs; jobs are done here if there is one.
 
     Leaving ends them at once, whatever they are at; what they write must be whole or absent whenever that is.
     """
@@ -74,7 +74,7 @@ class Workers:
         self._left.close()
 
     def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
-        """The number of each job and what `task` makes of it, as they come; jobs begin in their order.
+        """Return the number of each job and what `task` makes of it, as they come; jobs begin in their order.
 
         An error of a job rises here; ChildProcessError if a process was ended from outside.
         """
@@ -135,7 +135,7 @@ def _work(pipe: Connection, own: list[int]) -> None:
 
 
 def _done(job: Callable[[], Any]) -> tuple[Any, Exception | None, list[Warning | str]]:
-    """What a job gives, what went wrong, and what it warned of."""
+    """Return what a job gives, what went wrong, and what it warned of."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,22 +32,12 @@ from profilefit.recipes.pipelines import (
 )
 from profilefit.recipes.recipe import Recipe, RingLayout
 from profilefit.recipes.record import Records
-from profilefit.recipes.run import RecipeRun, RecordContent, Work
+from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.summary import curves, errors_by_name
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
-
-
-def request(name: str) -> Recipe | None:
-    """Return the recipe of a name or file, None if it is of something else."""
-    return pipelines.request(name, PIPELINES)
-
-
-def fit(recipe: Recipe, run: RecipeRun) -> Work:
-    """Return the record to be made of a recipe."""
-    return pipelines.work(recipe, run, PIPELINES)
 
 
 def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
@@ -144,3 +135,5 @@ PIPELINES: dict[str, Pipeline] = {
     "inverse": _inverse,
     "evidence": _evidence,
 }
+request = partial(pipelines.request, pipelines=PIPELINES)
+fit = partial(pipelines.work, pipelines=PIPELINES)

@@ -20,7 +20,7 @@ EPSILON = 0.005  # of the trimming (6)
 
 @dataclass(frozen=True)
 class Protocol7:
-    """What (6)-(7) leave unsaid: how wide rings are, where their centre is, what is trimmed where, what R' carries.
+    """Choices that (6)-(7) leave open: width of rings, place of their centre, what is trimmed where, what R' carries.
 
     rings    of the truth merged into one [-]
     centre   "middle", or "corrected": MCML's (i + 1/2 + 1 / (12 (i + 1/2))) dr
@@ -56,7 +56,7 @@ class Coefficients:
 
 
 def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
-    """The same rings for some of the albedos only; `alpha` must be among them."""
+    """Return the same rings for some of the albedos only; `alpha` must be among them."""
     rows = np.searchsorted(profiles.alpha, alpha)
     return Profiles(
         profiles.alpha[rows],
@@ -93,7 +93,6 @@ def _merged(profiles: Profiles, rings: int) -> tuple[Floats, Floats]:
 
 
 def _centres(edges: Floats, centre: str) -> Floats:
-    """Where a ring's mean stands [mfp]."""
     index = np.arange(edges.size - 1) + 0.5
     return (index + (1 / (12 * index) if centre == "corrected" else 0.0)) * edges[1]
 

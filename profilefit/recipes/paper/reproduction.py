@@ -1,4 +1,4 @@
-"""Which of the paper's constants come out of its own protocol, under which reading of what it leaves unsaid.
+"""Readings of what the paper leaves unsaid, and the constants that its own protocol gives under each.
 
 Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
 Software); equation numbers are that paper's. It does not state ring width, ring centre, the quantity that (6) trims,
@@ -122,7 +122,7 @@ def k2_law(alpha, p):
 
 
 def samplings() -> dict[str, Floats]:
-    """Where albedos may stand: evenly in alpha, in A, in sqrt(1 - alpha). A choice, and no data."""
+    """Return grids of albedos: even in alpha, in A, in sqrt(1 - alpha). A choice, and no data."""
     table = np.concatenate([np.linspace(0.01, 0.99, 197), 1.0 - np.geomspace(9e-3, 1e-5, 60)])
     of_reflectance = np.interp(np.linspace(0.05, 0.9, 20), np.asarray(exact.reflectance(table)), table)
     return {

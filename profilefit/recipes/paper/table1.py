@@ -79,7 +79,7 @@ class Table1Row:
 
 @dataclass(frozen=True)
 class HalvesCheck:
-    """Whether two printed halves average to the printed whole: a test of print alone.
+    """Return whether two printed halves average to the printed whole: a test of print alone.
 
     off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
     """
@@ -113,7 +113,7 @@ def printed_halves() -> tuple[HalvesCheck, ...]:
 
 
 def mean_squared_errors(law: Floats, data: Floats) -> Triple:
-    """Of the first half of the samples, the second half and all."""
+    """Return values of the first half of the samples, the second half and all."""
     first, second, whole = (float(np.mean((law[s] - data[s]) ** 2)) for s in _halves(data.size))
     return first, second, whole
 

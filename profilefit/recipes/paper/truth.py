@@ -21,7 +21,7 @@ RING_WIDTH, LAST_RADIUS = 0.01, 30.0
 
 
 class Truth(Protocol):
-    """Where reflectances and fine even rings come from."""
+    """Source of reflectances and fine even rings."""
 
     def reflectance(self, alpha: Floats) -> Floats:
         """A (m,) [-]."""
@@ -57,7 +57,7 @@ class ExactTruth:
 
 @dataclass(frozen=True)
 class TallyTruth:
-    """The same from photons: an order-resolved run on fine even rings up to 25 mfp or more."""
+    """Reflectances and rings of photons: an order-resolved run on fine even rings up to 25 mfp or more."""
 
     orders: Orders
 

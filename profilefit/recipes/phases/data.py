@@ -97,7 +97,7 @@ class PhaseData:
         return replace(self, angles=self.angles[seen], values=self.values[seen], sigma=sigma)
 
     def within(self, low: float, high: float) -> NDArray[np.bool_]:
-        """Which rows lie at angles low ... high [degrees]."""
+        """Return a mask (n,) of the rows at angles low ... high [degrees]."""
         degrees = np.degrees(self.angles)
         return (degrees >= low - 1e-9) & (degrees <= high + 1e-9)
 

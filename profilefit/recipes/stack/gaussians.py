@@ -98,7 +98,7 @@ def lights_of(
 
 
 def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
-    """The sum of 1 to 8 Gaussians nearest to the light of a stack of one index, relatively, over rings even in ln r.
+    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack of one index, over rings even in ln r.
 
     A is the stack's own. InputError as of `stack_law`, and on another count.
     """
@@ -131,7 +131,7 @@ def shared_gaussians(
 
 
 def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
-    """Exact light, so to speak: variances (N,) [length^2], even in their logarithm, and weights (lights, N) >= 0.
+    """Return many Gaussians in place of exact light: variances (N,) [length^2], even in ln, weights (lights, N) >= 0.
 
     Of exact lights with edges in one unit. Rings are right to 1e-3 (root mean square, relative) by some twenty-five
     Gaussians: too many to draw with, but they sum over any surface. Weights sum to 1.
@@ -150,7 +150,7 @@ def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
 
 
 def joint(lights: Sequence[SumLight], count: int) -> JointSum:
-    """The sum nearest to all lights, whose edges are in one unit; weights that would be negative are held at 0.
+    """Fit the sum nearest to all lights, whose edges are in one unit; weights that would be negative are held at 0.
 
     Given the variances, the weights are a problem of least squares with one optimum, which says which of them are 0.
     """
@@ -170,7 +170,7 @@ def joint(lights: Sequence[SumLight], count: int) -> JointSum:
 
 
 def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
+    """Refit: ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
 
     NaN where that fit does not converge.
     """
@@ -180,7 +180,7 @@ def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: Floats) -> Solution:
-    """The optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
+    """Return the optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         values, jacobian = _off(*_parted(offset + slopes @ parameters, len(lights)), lights)
@@ -195,7 +195,7 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
 
 
 def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
+    """Return the Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     variances, count = found.variances, found.variances.size
     values, jacobian = _off(variances, found.weights, lights)
     whole, end = jacobian.T @ jacobian, 0
@@ -214,7 +214,6 @@ def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
-    """The best non-negative weights (m, N) of these variances."""
     found = []
     for light in lights:
         rings = ring_shares(light.edges, variances) * (light.weight * light.whole / light.energy)[:, None]
@@ -245,7 +244,7 @@ def _places(weights: Floats) -> tuple[Floats, Floats]:
 
 
 def ring_shares(edges: Floats, variances: Floats) -> Floats:
-    """What each Gaussian of variances (N,) [length^2] has in rings between edges (n + 1,) [length]: (n, N) [-]."""
+    """Return shares (n, N) [-] of Gaussians of variances (N,) [length^2] in rings between edges (n + 1,) [length]."""
     return _shares(edges, variances)[0]
 
 
@@ -261,7 +260,7 @@ def _shares(edges: Floats, variances: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Solution:
-    """The best of several starts, nearly at its optimum: ln v_1, how ln v rises, ln w_i / w_1 of each, unbounded."""
+    """Return the best of several starts, nearly at its optimum: ln v_1, rises of ln v, ln w_i / w_1 of each, unbounded."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         level, weights, slopes = _of(parameters, len(lights))
@@ -282,7 +281,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
 
 
 def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
-    """Variances (N,) and weights (lights, N) of unbounded parameters."""
+    """Return variances (N,) and weights (lights, N) of unbounded parameters."""
     level, weights, _ = _of(parameters, lights)
     return np.exp(level), weights
 
@@ -303,7 +302,6 @@ def _of(parameters: Floats, lights: int) -> tuple[Floats, Floats, Floats]:
 
 
 def _parted(constants: Floats, lights: int) -> tuple[Floats, Floats]:
-    """Variances (N,) and weights (lights, N) of ln variances and weights in one row."""
     count = constants.size // (lights + 1)
     return np.exp(constants[:count]), constants[count:].reshape(lights, count)
 

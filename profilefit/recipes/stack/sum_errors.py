@@ -1,4 +1,4 @@
-"""What the constants of a sum of Gaussians depend on, and how far it is from the light of each colour."""
+"""Errors of the constants of a sum of Gaussians, and its distance from the light of each colour."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOT_OF = ("statistical_error", "discretisation_error")  # what exact light has n
 
 
 def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
-    """The constants of a sum in their order: v1 ... vN, red.w1 ... red.wN, ..."""
+    """Return the names of a sum's constants in their order: v1 ... vN, red.w1 ... red.wN, ..."""
     places = range(1, count + 1)
     return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in channels for i in places)]
 
@@ -30,7 +30,7 @@ def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
 def errors(
     found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], fewer: Sequence[SumLight] | None
 ) -> dict[str, Floats | None]:
-    """Errors (N + m N,) of variances [length^2] and weights [-], by the names that records have for them.
+    """Return the errors (N + m N,) of variances [length^2] and weights [-], by the names that records have for them.
 
     fewer  the same lights of fewer nodes, None where they are traced
 
@@ -67,7 +67,7 @@ def errors(
 
 
 def quality(light: SumLight, variances: Floats, weights: Floats) -> dict[str, float]:
-    """How far a sum of variances (N,) [length^2] and weights (N,) [-] is from light whose edges are in that length.
+    """Measure a sum of variances (N,) [length^2] and weights (N,) [-] against light whose edges are in that length.
 
     rel  mean relative error of the rings [-];  rms  its root mean square;  ks  largest error of the cdf at their edges
     """
