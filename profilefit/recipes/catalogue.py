@@ -23,7 +23,6 @@ Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.
 (ALBEDO_RECORD,) = Rational.entry.records
 Names = Sequence[str] | None
-Number = float | None
 REGENERATED = "regenerated"
 NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 
@@ -198,7 +197,6 @@ class LoadedLaw:
 
 
 Named = LoadedLaw  # its former name, for code outside of this package
-Found = LoadedLaw | None
 
 
 def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
@@ -252,48 +250,42 @@ def find(
         InputError: any other name, with the nearest names that there are.
         SettingError: there are no constants for n and g.
     """
-    records = Records.of(folder)
-    if (found := find_law(name, records, constants, n, g) or find_map(name, records, constants, n, g)) is not None:
+    records, options = Records.of(folder), {"constants": constants, "n": n, "g": g}
+    if (found := find_law(name, records, **options) or find_map(name, records, **options)) is not None:
         return found
     raise not_found(name, records, constants)
 
 
-def find_law(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+def find_law(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
     """Return a profile law or sampler as `find` does; None where the name is of something else."""
-    records = Records.of(folder)
-
-    def of_records() -> list[LoadedLaw]:
-        return [*profile_laws(records, (name,), False), *sampled_laws(records, (name,))]
-
-    return _found(name, records, constants, {"n": n, "g": g}, laws.profile_classes().get(name), of_records)
+    classes = laws.profile_classes()
+    return _found(name, Records.of(folder), classes.get(name), (profile_laws, sampled_laws), **options)
 
 
-def find_map(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+def find_map(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
     """Return a map between alpha and A as `find` does; None where the name is of something else."""
-    records, classes = Records.of(folder), laws.map_classes()
+    classes = laws.map_classes()
     own = {kind.entry.key: kind for kind in classes.values()} | classes
-    return _found(
-        name, records, constants, {"n": n, "g": g}, own.get(name), lambda: albedo_laws(records, (name,), False)
-    )
+    return _found(name, Records.of(folder), own.get(name), (albedo_laws,), **options)
 
 
 def _found(
     name: str,
     records: Records,
-    constants: str | None,
-    of: Mapping[str, Number],
     kind: Any,
-    of_records: Callable[[], Sequence[LoadedLaw]],
-) -> Found:
-    """Return the law of a record, else of a class of that name, in the setting of `of`; None where there is neither."""
+    lists: Sequence[Callable[..., list[LoadedLaw]]],
+    constants: str | None = None,
+    **of: Any,
+) -> LoadedLaw | None:
+    """Return the law of a record, else of a class of that name, with the n and g given; None where there is neither."""
     if name in records.paths and constants in (None, REGENERATED):
-        found = next(iter(of_records()), None)
+        found = next((law for each in lists for law in each(records, (name,), False)), None)
     elif kind is not None:
         which = constants or _default(kind.entry, bool(kind.constant_names()))
         found = _named(kind.entry, which, _load(kind.entry, which, None, records), records)
     else:
         return None
-    given: dict[str, Any] = {key: value for key, value in of.items() if value is not None}
+    given = {key: value for key, value in of.items() if value is not None}
     if found is None or (setting := replace(found.setting, **given)) == found.setting:
         return found
     entry = found.law.entry

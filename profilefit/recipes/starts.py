@@ -179,7 +179,10 @@ def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...],
         best = own if result == OWN_IS_BEST else best
     groups = _groups(found)
     unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *found)), ROUNDING)
-    outcomes = [Outcome(len(g), _cost(g[0]) / unit, g[0].result, _named(names, g[0])) for g in groups]
+    outcomes = [
+        Outcome(len(g), _cost(g[0]) / unit, g[0].result, dict(zip(names, map(float, g[0].parameters), strict=True)))
+        for g in groups
+    ]
     reached = sum(_same(one, best) for one in found) if best is not None else 0
     return RandomStarts(
         len(found),
@@ -220,7 +223,3 @@ def _as_cheap(one: Solution, other: Solution) -> bool:
 
 def _cost(one: Solution) -> float:
     return one.cost if np.isfinite(one.cost) else np.inf
-
-
-def _named(names: tuple[str, ...], one: Solution) -> dict[str, float]:
-    return dict(zip(names, map(float, one.parameters), strict=True))

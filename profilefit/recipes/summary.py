@@ -85,7 +85,13 @@ def described(
     result: Fit, profiles: Profiles, printed: dict[str, float], seed: int, max_chain: int
 ) -> tuple[dict[str, Any], Arrays]:
     """Return the part of a record that every fit has, and the samples beside it; `printed` are published constants."""
-    chains = _chains(result, seed, max_chain)
+    chains = []
+    if result.solution.converged:  # elsewhere the curvature describes no optimum, and the record says why
+        chains = [
+            posterior(result, kind, seed, max_chain)
+            for kind in ("statistical", "misfit")
+            if getattr(result, kind) is not None
+        ]
     off, width = discrepancy(result, profiles), discretisation_error(result)
     errors = {"model_error": np.sqrt(np.diag(off.covariance)), "discretisation_error": width}
     covariances = {"statistical": result.statistical, "misfit": result.misfit, "model": off.covariance}
@@ -99,7 +105,13 @@ def described(
             "condition_number": result.solution.condition_number,
             "residuals": result.structure,
         },
-        "posterior": {c.kind: _chain_facts(c) for c in chains},
+        "posterior": {
+            c.kind: {
+                **{key: getattr(c, key) for key in ("tau", "acceptance", "walkers", "steps", "result")},
+                "standard_deviation": dict(zip(c.names, c.standard_deviation, strict=True)),
+            }
+            for c in chains
+        },
         "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
     }
     if result.solution.converged:
@@ -155,15 +167,3 @@ def _left_out(profiles: Profiles, result: Fit) -> dict[str, int]:
         "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
         "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
     }
-
-
-def _chains(result: Fit, seed: int, max_chain: int) -> list[Posterior]:
-    if not result.solution.converged:
-        return []  # the curvature there describes no optimum, and the record says why
-    kinds = ["misfit"] if result.statistical is None else ["statistical", "misfit"]
-    return [posterior(result, kind, seed, max_chain) for kind in kinds]
-
-
-def _chain_facts(chain: Posterior) -> dict[str, Any]:
-    facts = {name: getattr(chain, name) for name in ("tau", "acceptance", "walkers", "steps", "result")}
-    return {**facts, "standard_deviation": dict(zip(chain.names, chain.standard_deviation, strict=True))}

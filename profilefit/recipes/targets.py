@@ -19,7 +19,7 @@ RUN_EDGES = np.concatenate(
 
 
 def albedo_values(albedos: Albedos, setting: Setting = SEARCHLIGHT) -> Floats:
-    """Return the albedos (count,) of a recipe, rising, even in its spacing, which may be the reflectance of `setting`."""
+    """Return the albedos (count,) of a recipe, rising, even in its spacing, maybe the reflectance of `setting`."""
     if albedos.spacing == "alpha":
         return np.linspace(albedos.low, albedos.high, albedos.count)
     if albedos.spacing == "reflectance":

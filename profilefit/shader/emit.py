@@ -174,30 +174,22 @@ def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: st
     if not PREFIX.fullmatch(name):
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
-    lines = [_declared(name, key, value, told.get(key, "")) for key, value in constants.items()]
+    lines = []
+    for key, value in constants.items():
+        lines.append(f"const float {name}_{key} = {literal(value)};" + (f" // {told[key]}" if told.get(key) else ""))
     own = _repeated("\n".join(["\n".join(lines) + "\n", *rest]), count).replace(PLACEHOLDER, f"{name}_")
     digest = f"0x{hashlib.sha256(own.encode()).hexdigest()[:7]}"  # a positive int in every language
     guarded = own if lang == "python" else GUARD.format(name=name, digest=digest, text=own)
     return translated(f"{common}\n{guarded}", lang)
 
 
-def _declared(name: str, key: str, value: float, remark: str) -> str:
-    return f"const float {name}_{key} = {literal(value)};" + (f" // {remark}" if remark else "")
-
-
 def literal(value: float) -> str:
     """Return a number as every shading language reads it: with a point, without a suffix."""
     if not math.isfinite(value):
         raise InputError(f"constants of a shader must be finite, got {value!r}")
-    return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0") if _is_extreme(value) else _plain(value)
-
-
-def _plain(value: float) -> str:
+    if value != 0 and not 1e-4 <= abs(value) < 1e7:
+        return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0")
     return np.format_float_positional(value, DIGITS, unique=True, fractional=False, trim="0")
-
-
-def _is_extreme(value: float) -> bool:
-    return value != 0 and not 1e-4 <= abs(value) < 1e7
 
 
 def _repeated(text: str, count: int) -> str:

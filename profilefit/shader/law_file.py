@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import __version__
-from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
@@ -212,7 +211,10 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     lines = [f"{named.name}, {named.constants or 'no constants'}: {kind}"]
     start = name or emit.prefix(named.law)
     lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
-    lines += ["", *_setting_lines(named.setting), ""]
+    setting = named.setting
+    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}"
+    surface += ", other media by reduced lengths" if setting.is_isotropic else ""
+    lines += ["", f"light: {LIGHT[setting.illumination]}", surface, *CONVENTIONS.splitlines(), ""]
     most = f"{start}_{emit.HIGHEST}"
     lines.append(DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"))
     lines.append(f"{most} = {emit.max_reflectance(named.law):.3g}: no half space of this n reflects more")
@@ -223,13 +225,6 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     for source in sources:
         lines += _provenance(source, f"{source.of}: ")
     return lines
-
-
-def _setting_lines(setting: Setting) -> list[str]:
-    light = f"light: {LIGHT[setting.illumination]}"
-    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}"
-    surface += ", other media by reduced lengths" if setting.is_isotropic else ""
-    return [light, surface, *CONVENTIONS.splitlines()]
 
 
 def _provenance(source: _Source, before: str) -> list[str]:

@@ -197,13 +197,9 @@ def _of_light(media: tuple[Medium, ...], illumination: str, tracing: Tracing) ->
         "arrays": {
             f"{channel}_{key}": array
             for channel, light in zip(CHANNELS, lights, strict=True)
-            for key, array in zip(ARRAYS, _arrays(light), strict=True)
+            for key, array in zip(ARRAYS, (*light[:3], light.noise, np.array([light.whole, light.inside])), strict=True)
         },
     }
-
-
-def _arrays(light: SumLight) -> tuple[np.ndarray, ...]:
-    return light.edges, light.energy, light.weight, light.noise, np.array([light.whole, light.inside])
 
 
 def _content(

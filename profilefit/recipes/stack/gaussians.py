@@ -98,7 +98,7 @@ def lights_of(
 
 
 def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
-    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack of one index, over rings even in ln r.
+    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack, over rings even in ln r.
 
     A is the stack's own. InputError as of `stack_law`, and on another count.
     """
@@ -260,7 +260,7 @@ def _shares(edges: Floats, variances: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Solution:
-    """Return the best of several starts, nearly at its optimum: ln v_1, rises of ln v, ln w_i / w_1 of each, unbounded."""
+    """Return the best of several starts, nearly at its optimum: ln v_1, its rises, ln w_i / w_1 of each, unbounded."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         level, weights, slopes = _of(parameters, len(lights))
