@@ -15,9 +15,9 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue, pipelines, starts
 from profilefit.recipes.catalogue import find_law as find
+from profilefit.recipes.paper.protocol import ExactTruth, TallyTruth, Truth
 from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
-from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
 from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
     Pipeline,

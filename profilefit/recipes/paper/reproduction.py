@@ -20,8 +20,7 @@ from mcml_sim import exact
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Solution, least_squares
 from profilefit.laws import published
-from profilefit.recipes.paper.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
-from profilefit.recipes.paper.truth import ExactTruth, Truth
+from profilefit.recipes.paper.protocol import Coefficients, ExactTruth, Protocol7, Truth, fit_coefficients, profiles_at
 
 Floats = NDArray[np.float64]
 # A law is reproduced when its curve is within 5 % rms of the printed one over the albedos, and each constant too.
