@@ -239,16 +239,9 @@ def find(
 
     A name of both is the profile law's; "albedo liang" is the map's.
 
-    Args:
-        name: of a record, law or map.
-        folder: where the regenerated records lie.
-        constants: as in `load`; None takes the regenerated ones or, where there are none, the only printed
-            set.
-        n, g: refractive index and mean cosine, if not those of the record or set [-].
-
-    Raises:
-        InputError: any other name, with the nearest names that there are.
-        SettingError: there are no constants for n and g.
+    constants  as in `load`; None takes the regenerated ones or, where there are none, the only printed set
+    n, g       refractive index and mean cosine, if not those of the record or set [-]
+    InputError, with the nearest names that there are, for any other name; SettingError for others without constants.
     """
     records, options = Records.of(folder), {"constants": constants, "n": n, "g": g}
     if (found := find_law(name, records, **options) or find_map(name, records, **options)) is not None:

@@ -75,20 +75,17 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
     run, xi = light.merged(exact.r_edges), tuple(np.asarray(own.rings.xi))
     photons = Profiles.from_orders(run, exact.alpha)
     seen = np.asarray(own.rings.used) > 0
-    used, counted = seen & photons.trusted & (photons.energy > 0), _counted(run, photons, xi)
+    used = seen & photons.trusted & (photons.energy > 0)
+    # Albedos that rest on enough photons, none of which were cut to an extent that matters.
+    error = np.asarray(run.reflectance(photons.alpha).standard_error)
+    uncut = np.asarray(run.cut(photons.alpha)) <= LARGEST_CUT * error
+    counted = uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
     limits = tuple(np.asarray(own.rings.limits))
     one, other = (
         fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
         for profiles in (exact, photons)
     )
     return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))
-
-
-def _counted(light: Orders, photons: Profiles, xi: tuple[float, ...]) -> NDArray[np.bool_]:
-    """Return the albedos (m,) that rest on enough photons, none of which were cut to an extent that matters."""
-    error = np.asarray(light.reflectance(photons.alpha).standard_error)
-    uncut = np.asarray(light.cut(photons.alpha)) <= LARGEST_CUT * error
-    return uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
 
 
 def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos_left_out: int) -> CrossCheck:

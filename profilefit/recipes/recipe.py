@@ -322,13 +322,9 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
         return tuple(float(v) for v in value)
     if annotation == "tuple[str, ...]" and isinstance(value, list) and all(map(is_line, value)):
         return tuple(value)
-    words = _spoken(annotation)
+    words = {"float": "finite number", "int": "whole number", "str": "text"}.get(annotation)
+    words = words or ("list of finite numbers" if "float" in annotation else "list of texts")
     texts = [value] if annotation == "str" else value
     if "str" in annotation and isinstance(texts, list) and all(isinstance(text, str) for text in texts):
         words += f" of one printable line and {LONGEST_TEXT} characters at most"  # it becomes comments in code
     raise RecipeError(f"{where}: {key} must be a {words}, got {shown(value)}")
-
-
-def _spoken(annotation: str) -> str:
-    names = {"float": "finite number", "int": "whole number", "str": "text"}
-    return names.get(annotation, "list of finite numbers" if "float" in annotation else "list of texts")

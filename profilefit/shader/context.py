@@ -32,7 +32,10 @@ def open_context() -> moderngl.Context:
     try:
         return moderngl.create_context(standalone=True, require=OPENGL, **BACKEND)
     except Exception as error:  # glcontext and moderngl raise bare Exceptions
-        raise ShaderError(_missing(str(error))) from None
+        library = re.search(r"lib[\w-]+\.so[.\d]*", str(error))
+        what = f"{library.group()} is missing" if library else "no driver answers"
+        needed = f"no OpenGL {OPENGL // 100}.{OPENGL // 10 % 10} without a window"
+        raise ShaderError(f"{needed}: {what} ({str(error).strip()}); on Debian apt-get install {PACKAGES}") from None
 
 
 @contextmanager
@@ -76,13 +79,6 @@ def check_errors(context: moderngl.Context, where: str) -> None:
 def renderer(context: moderngl.Context) -> str:
     """Return the device and its driver, in words."""
     return f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
-
-
-def _missing(message: str) -> str:
-    library = re.search(r"lib[\w-]+\.so[.\d]*", message)
-    what = f"{library.group()} is missing" if library else "no driver answers"
-    needed = f"{OPENGL // 100}.{OPENGL // 10 % 10}"
-    return f"no OpenGL {needed} without a window: {what} ({message.strip()}); on Debian apt-get install {PACKAGES}"
 
 
 def _located(name: str, source: str, message: str) -> str:

@@ -78,16 +78,10 @@ def export_subject(
 ) -> str:
     """Return the whole file of a record or law of any kind, or of what a scene exports.
 
-    Args:
-        subject: name of a record, law or map, path of a record, or what scenes export.
-        lang: one of `LANGUAGES`.
-        name: what the names in it begin with, by default its own; two media in one shader need two.
-        fits: folder of records; None stands for ./fits and those shipped.
-        scenes: what scenes export, as `profilefit.scenes.SOURCES`.
-        options: constants, n and g of a law, as for `catalogue.find`.
-
-    Raises:
-        InputError: a subject, language, name or option that there is not; RecordError on a damaged record.
+    subject  name of a record, law or map, path of a record, or what scenes export;  lang, name  as of `export`
+    fits     folder of records; None stands for ./fits and those shipped;  options  of a law, as for `catalogue.find`
+    scenes   what scenes export, as `profilefit.scenes.SOURCES`
+    InputError on what there is not; RecordError on a damaged record.
     """
     for kind in kinds.KINDS:
         module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module

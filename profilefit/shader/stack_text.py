@@ -96,11 +96,11 @@ def export_stack(record: StackRecord, lang: str = "glsl", name: str | None = Non
         return json_file(_plain(record))
     start = name or record.name.replace("-", "_")
     common = TRANSLATED.get(lang, lang)
-    texts = [
-        stack_text(record.laws, common, start, _remarks(record)),
-        single_text(record.stack.media, common, f"{start}_once"),
-    ]
-    return text_file(_head(record, start), lang, "\n".join(texts))
+    # Errors of the first interface's constants: deeper ones stand in the text at their thickness.
+    names = [(channel, name) for channel in CHANNELS for name in record.laws[0].constant_names()]
+    errors = {f"{c}_{name}": error_remark(record.content["constants"][f"{c}.1.{name}"]) for c, name in names}
+    once = single_text(record.stack.media, common, f"{start}_once")
+    return text_file(_head(record, start), lang, f"{stack_text(record.laws, common, start, errors)}\n{once}")
 
 
 def _head(record: StackRecord, start: str) -> list[str]:
@@ -124,13 +124,6 @@ def _head(record: StackRecord, start: str) -> list[str]:
         f"ks {max(worst['ks']):.2g}, A {worst['delta_A']:.2g}"
     ]
     return [*lines, f"sha256 of the data {content['data_digest']}", f"sha256 of the record {record.digest}"]
-
-
-def _remarks(record: StackRecord) -> dict[str, str]:
-    """Return the errors of the first interface's constants; deeper ones stand in the text at their thickness."""
-    names = [(channel, name) for channel in CHANNELS for name in record.laws[0].constant_names()]
-    constants = record.content["constants"]
-    return {f"{channel}_{name}": error_remark(constants[f"{channel}.1.{name}"]) for channel, name in names}
 
 
 def _plain(record: StackRecord) -> dict[str, Any]:

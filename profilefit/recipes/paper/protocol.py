@@ -80,8 +80,10 @@ def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
 
 def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
     """(7) at each albedo by unweighted least squares over the rings that (6) keeps; `mfp` in units of (6)'s strides."""
-    edges, energy = _merged(profiles, protocol.rings)
-    r = _centres(edges, protocol.centre)
+    rings, whole = protocol.rings, profiles.energy.shape[1] // protocol.rings  # what is left over at the end is dropped
+    energy = profiles.energy[:, : whole * rings].reshape(profiles.alpha.size, whole, rings).sum(axis=2)
+    edges, index = profiles.r_edges[: whole * rings + 1 : rings], np.arange(whole) + 0.5
+    r = (index + (1 / (12 * index) if protocol.centre == "corrected" else 0.0)) * edges[1]
     value = energy / (np.pi * np.diff(edges**2))
     quantities = {"R_d": value, "r R_d": r * value, "2 pi r R_d": 2 * np.pi * r * value}
     data = quantities[protocol.fitted]
@@ -91,18 +93,6 @@ def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) 
     starts = np.stack([_linear_start(r, row, keep > 0) for row, keep in zip(data / scale, used, strict=True)])
     solutions = solve_batch(_rational_misfit, starts, (np.broadcast_to(r, data.shape), data / scale, used))
     return Coefficients(profiles.alpha, np.stack([s.parameters for s in solutions]) * scale ** [1, 1, 0], cut)
-
-
-def _merged(profiles: Profiles, rings: int) -> tuple[Floats, Floats]:
-    """Edges [mfp] and energies [-] with every `rings` rings in one; what is left over at the end is dropped."""
-    whole = profiles.energy.shape[1] // rings
-    energy = profiles.energy[:, : whole * rings].reshape(profiles.alpha.size, whole, rings).sum(axis=2)
-    return profiles.r_edges[: whole * rings + 1 : rings], energy
-
-
-def _centres(edges: Floats, centre: str) -> Floats:
-    index = np.arange(edges.size - 1) + 0.5
-    return (index + (1 / (12 * index) if centre == "corrected" else 0.0)) * edges[1]
 
 
 def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:

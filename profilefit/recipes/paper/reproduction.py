@@ -175,12 +175,11 @@ def _reading(
     return Reading(equation, choices, constants, dict(printed), *distances, verdict, evidence, result)
 
 
-def _misfit_of(law: Callable) -> Callable:
-    return lambda p, item: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
-
-
 # One function object a law, so that each compiles once.
-_MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)}
+_MISFITS = {
+    law: lambda p, item, law=law: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
+    for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)
+}
 
 
 def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:
