@@ -45,6 +45,12 @@ def map_classes() -> "dict[str, Any]":
     return _classes(MAPS)
 
 
+def find_class(table: "Mapping[str, str]", name: str) -> "Any":
+    """Return the class of a name in one of the tables, without importing the others; None where there is none."""
+    base = name.partition(":")[0]
+    return _classes({base: table[base]}).get(name) if base in table else None
+
+
 def home(place: str) -> "Any":
     """The class at a home in one of the tables: "module.Class" of this package, or of another by its whole name."""
     module, _, kind = place.rpartition(".")

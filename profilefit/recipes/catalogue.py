@@ -83,9 +83,9 @@ def key_of(name: str) -> str:
 
 
 def _profile_law(name: str) -> type[ProfileLaw]:
-    known: dict[str, type[ProfileLaw]] = laws.profile_classes()
-    if name in known:
-        return known[name]
+    kind: type[ProfileLaw] | None = laws.find_class(laws.PROFILES, name)
+    if kind is not None:
+        return kind
     if name.startswith("gaussians:"):
         raise InputError(f"law must be gaussians:N with N a whole number in 1 ... {gaussians.MOST}, got {name!r}")
     raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
@@ -225,7 +225,8 @@ def all_profiles(folder: Folder) -> list[LoadedLaw]:
 
 def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
     """List maps between alpha and A; arguments as for `profile_laws`."""
-    records, entries = Records.of(folder), _entries(laws.map_classes())
+    records = Records.of(folder)
+    entries = _entries(_classes(laws.MAPS, records, names))
     return [
         *(_printed_laws(entries, records) if names is None else ()),
         *_regenerated(records, entries, names, matched),
@@ -251,8 +252,8 @@ def find(
 
 def find_law(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
     """Return a profile law or sampler as `find` does; None where the name is of something else."""
-    classes = laws.profile_classes()
-    return _found(name, Records.of(folder), classes.get(name), (profile_laws, sampled_laws), **options)
+    own = laws.find_class(laws.PROFILES, name)
+    return _found(name, Records.of(folder), own, (profile_laws, sampled_laws), **options)
 
 
 def find_map(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
@@ -299,8 +300,17 @@ def not_found(name: str, folder: Folder, constants: str | None = None) -> InputE
     return InputError(f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records")
 
 
+def _classes(table: Mapping[str, str], records: Records, names: Names) -> dict[str, Any]:
+    """Return the classes of a table by name; of records that are named, those of their laws."""
+    if names is None:
+        return laws.profile_classes() if table is laws.PROFILES else laws.map_classes()
+    own = sorted({content["law"] for content in records.named(names).contents(whole=True).values()})
+    each = [name for base in table for name in own if name.partition(":")[0] == base]
+    return {name: kind for name in each if (kind := laws.find_class(table, name)) is not None}
+
+
 def _entries(classes: Mapping[str, Any]) -> list[Entry]:
-    return list({kind.entry.key: kind.entry for kind in classes.values()}.values())
+    return list({kind: kind.entry for kind in classes.values()}.values())
 
 
 def _load(entry: Entry, which: str, setting: Setting | None, records: Records) -> Any:
@@ -340,7 +350,7 @@ def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]
 
 def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
     """List printed sets, laws without constants, and laws made of all their regenerated records."""
-    classes = laws.profile_classes()
+    classes = _classes(laws.PROFILES, records, names)
     entries = _entries(classes)
     regenerated = _regenerated(records, entries, names, matched)
     if names is not None:  # others are of none
@@ -365,7 +375,7 @@ def _regenerated(records: Records, entries: Sequence[Entry], names: Names, match
 
 def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[LoadedLaw]:
     """List records that no law takes by its name alone; constants that they do not hold are as printed."""
-    entries = [*_entries(laws.profile_classes()), *_entries(laws.map_classes())]
+    entries = [one for table in (laws.PROFILES, laws.MAPS) for one in _entries(_classes(table, records, names))]
     found = []
     for name, content in _usable(records.named(names), matched).items():
         wholes = [[path.stem for path in _files(one, record_setting(content), records)] for one in entries]

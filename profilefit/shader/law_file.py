@@ -291,8 +291,10 @@ def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[st
 
 def _printed(named: LoadedLaw) -> Any:
     """Return the printed set that a law's constants are, or None."""
+    if named.files:
+        return None
     own = named.law.entry.printed, named.constants
-    return next((s for s in published.SETS if not named.files and (s.law, s.name) == own), None)
+    return next((s for s in published.SETS if (s.law, s.name) == own), None)
 
 
 def _plain(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, Any]:
