@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -105,6 +105,15 @@ def evidence_folder(records: Path, requested: Path | None = None) -> Path:
     return requested or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)
 
 
+def _among(known: Iterable[str]) -> Callable[[str], Iterator[str]]:
+    """Return the completion of a word that is one of those known."""
+
+    def offered(incomplete: str) -> Iterator[str]:
+        return _starting(incomplete, known)
+
+    return offered
+
+
 def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     """Return the names of the records in the folder that the command has been given so far."""
     return _starting(incomplete, kinds.names(kinds.KINDS, _folder(ctx), forms=False))
@@ -131,24 +140,10 @@ def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     yield from _starting(incomplete, FUNCTIONS)
 
 
-def laws(incomplete: str) -> Iterator[str]:
-    """Return the names of profile laws."""
-    return _starting(incomplete, PROFILES)
-
-
-def fitted(incomplete: str) -> Iterator[str]:
-    """Return what `fit` takes for light: laws, and exact light."""
-    return _starting(incomplete, (EXACT, *PROFILES))
-
-
-def languages(incomplete: str) -> Iterator[str]:
-    """Return the languages of `export`."""
-    return _starting(incomplete, LANGUAGES)
-
-
-def parts(incomplete: str) -> Iterator[str]:
-    """Return the parts of `tradeoff`."""
-    return _starting(incomplete, PARTS)
+laws = _among(PROFILES)
+fitted = _among((EXACT, *PROFILES))
+languages = _among(LANGUAGES)
+parts = _among(PARTS)
 
 
 def constants(incomplete: str) -> Iterator[str]:

@@ -75,7 +75,7 @@ def report(
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen, show
         from mcml_sim.files.whole_file import require_folder
-        from profilefit.recipes.kinds import by_kind, no_records, records_of
+        from profilefit.recipes.kinds import KINDS, no_records, records_of
         from profilefit.report import every_law
         from profilefit.report.kinds import tables_of
         from profilefit.report.tables import law_tables
@@ -85,7 +85,9 @@ def report(
     _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
     chosen = records_of(names or (), fits)
-    groups = by_kind(chosen if names else None, folder)
+    groups = {kind: {} if names else kind.paths(folder) for kind in KINDS}
+    for kind, name, path in chosen:
+        groups[kind][name] = path
     if not chosen and (any(printed.values()) or html or not any(groups.values())):
         raise no_records(folder)
     outputs = {"quality": quality, "claims": claims, "markdown": markdown, "html": html, "figures": figures_to}

@@ -45,6 +45,12 @@ def map_classes() -> "dict[str, Any]":
     return _classes(MAPS)
 
 
+def find_class(table: "Mapping[str, str]", name: str) -> "Any":
+    """Return the class of a name in one of the tables, without importing the others; None where there is none."""
+    base = name.partition(":")[0]
+    return _classes({base: table[base]}).get(name) if base in table else None
+
+
 def home(place: str) -> "Any":
     """Return the class at a home: "module.Class" of this package, or the whole name of one in another package."""
     module, _, kind = place.rpartition(".")

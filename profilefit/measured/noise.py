@@ -36,8 +36,7 @@ from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
 from profilefit.measured.model import EXACT, Light, u_of
-from profilefit.recipes.record import record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records, record_setting
 
 Floats = NDArray[np.float64]
 # b^T b is the share of the photons that the rings hold: 1 only if none is lost, and more only by rounding.

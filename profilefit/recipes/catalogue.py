@@ -17,27 +17,25 @@ from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.entry import Entry
 from profilefit.laws.rational import Normalisation, Rational
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import covers, record_setting
-from profilefit.recipes.record_folder import SEARCHLIGHT, Folder, Records
+from profilefit.recipes.record import SEARCHLIGHT, Folder, Records, covers, record_setting
 
 Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.
 (ALBEDO_RECORD,) = Rational.entry.records
 Names = Sequence[str] | None
-Number = float | None
 REGENERATED = "regenerated"
 NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 
 
 def names() -> tuple[str, ...]:
-    """The names of the profile laws; `gaussians:N` is a sum of N = 1 ... 8 Gaussians, `gaussians` one of six."""
+    """Return the names of the profile laws; `gaussians:N` is a sum of N = 1 ... 8 Gaussians, `gaussians` one of six."""
     return tuple(laws.PROFILES)
 
 
 def load(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Folder | None = None
 ) -> ProfileLaw:
-    """A profile law by name, one of `names()` or gaussians:1 ... gaussians:8.
+    """Load a profile law by name, one of `names()` or gaussians:1 ... gaussians:8.
 
     constants  "regenerated" (this project's records), "published", "published:<set>" or "<set>" (see
                `laws.published`), or the path of a record (.json); a law without constants has but one form
@@ -58,7 +56,7 @@ def load(
 def albedo_law(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Folder | None = None
 ) -> AlbedoLaw:
-    """A map between alpha and A by name; arguments as for `load`."""
+    """Load a map between alpha and A by name; arguments as for `load`."""
     if name not in laws.MAPS:
         raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
@@ -67,7 +65,7 @@ def albedo_law(
 
 
 def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisation:
-    """The map that scales profile laws to their reflectance; SettingError where the setting has none."""
+    """Load the map that scales profile laws to their reflectance; SettingError where the setting has none."""
     records = Records.of(folder or fits_folder())
     path = records.path_or_shipped(ALBEDO_RECORD, setting)
     if path.parent != records.folder:
@@ -79,15 +77,15 @@ def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisati
 
 
 def key_of(name: str) -> str:
-    """What the name of a profile law stands for: "gaussians" for "gaussians:6"; any other name for itself."""
+    """Return the name under which a profile law is listed: "gaussians:6" for "gaussians", any other name for itself."""
     known = laws.profile_classes()
     return str(known[name].entry.key) if name in known else name
 
 
 def _profile_law(name: str) -> type[ProfileLaw]:
-    known: dict[str, type[ProfileLaw]] = laws.profile_classes()
-    if name in known:
-        return known[name]
+    kind: type[ProfileLaw] | None = laws.find_class(laws.PROFILES, name)
+    if kind is not None:
+        return kind
     if name.startswith("gaussians:"):
         raise InputError(f"law must be gaussians:N with N a whole number in 1 ... {gaussians.MOST}, got {name!r}")
     raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
@@ -102,7 +100,7 @@ def _checked(setting: Setting | None) -> Setting | None:
 def _constants(
     kind: type[Constants], which: str, requested: Setting | None, records: Records
 ) -> tuple[dict[str, float], Setting]:
-    """The constants of a law, and the setting that they belong to."""
+    """Return the constants of a law, and the setting that they belong to."""
     entry = kind.entry
     if which == "regenerated" or (which == "published" and not kind.constant_names()):
         where = requested or SEARCHLIGHT
@@ -119,7 +117,7 @@ def _constants(
 
 
 def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) -> dict[str, float]:
-    """The constants of every record that a law is made of; none for a law that has none."""
+    """Return the constants of every record that a law is made of; none for a law that has none."""
     if not kind.constant_names():
         return {}
     entry = kind.entry
@@ -160,7 +158,6 @@ def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str
 
 
 def _made(kind: type[Law], values: dict[str, float], which: str, **given: Any) -> Law:
-    """A law from its constants, every one of them there and none besides."""
     known = kind.constant_names()
     if set(values) != set(known):
         raise RecordError(f"constants {which} must be {', '.join(known)}, got {', '.join(values) or '(none)'}")
@@ -183,12 +180,12 @@ class LoadedLaw:
 
     @property
     def records(self) -> tuple[str, ...]:
-        """The names of those records."""
+        """Names of those records."""
         return tuple(path.stem for path in self.files)
 
     @property
     def label(self) -> str:
-        """What a table calls it: its record, or law and printed set."""
+        """Name in tables: its record, or law and printed set."""
         if self.records:
             return self.records[0]
         return f"{self.name}, {self.constants}" if self.constants else self.name
@@ -200,11 +197,10 @@ class LoadedLaw:
 
 
 Named = LoadedLaw  # its former name, for code outside of this package
-Found = LoadedLaw | None
 
 
 def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Profile laws with their constants; only those of the records `names`, where such are named.
+    """List profile laws with their constants; only those of the records `names`, where such are named.
 
     matched  only those of settings that have an exact profile
     Records of failed fits have no law.
@@ -214,13 +210,13 @@ def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> l
 
 
 def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
+    """List laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
     records = Records.of(folder)
     return [*_whole_laws(records, names, matched), *_single(records, names, ("inverse",), matched)]
 
 
 def all_profiles(folder: Folder) -> list[LoadedLaw]:
-    """Every profile law of every setting, and last the inverse cdfs that none of them is made of."""
+    """List every profile law of every setting, and last the inverse cdfs that none of them is made of."""
     records = Records.of(folder)
     whole = profile_laws(records, matched=False)
     taken = {name for one in whole for name in one.records}
@@ -228,8 +224,9 @@ def all_profiles(folder: Folder) -> list[LoadedLaw]:
 
 
 def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
-    """Maps between alpha and A; arguments as for `profile_laws`."""
-    records, entries = Records.of(folder), _entries(laws.map_classes())
+    """List maps between alpha and A; arguments as for `profile_laws`."""
+    records = Records.of(folder)
+    entries = _entries(_classes(laws.MAPS, records, names))
     return [
         *(_printed_laws(entries, records) if names is None else ()),
         *_regenerated(records, entries, names, matched),
@@ -243,59 +240,46 @@ def find(
 
     A name of both is the profile law's; "albedo liang" is the map's.
 
-    Args:
-        name: of a record, law or map.
-        folder: where the regenerated records lie.
-        constants: as in `load`; None takes the regenerated ones or, where there are none, the only printed
-            set.
-        n, g: refractive index and mean cosine, if not those of the record or set [-].
-
-    Raises:
-        InputError: any other name, with the nearest names that there are.
-        SettingError: there are no constants for n and g.
+    constants  as in `load`; None takes the regenerated ones or, where there are none, the only printed set
+    n, g       refractive index and mean cosine, if not those of the record or set [-]
+    InputError, with the nearest names that there are, for any other name; SettingError for others without constants.
     """
-    records = Records.of(folder)
-    if (found := find_law(name, records, constants, n, g) or find_map(name, records, constants, n, g)) is not None:
+    records, options = Records.of(folder), {"constants": constants, "n": n, "g": g}
+    if (found := find_law(name, records, **options) or find_map(name, records, **options)) is not None:
         return found
     raise not_found(name, records, constants)
 
 
-def find_law(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+def find_law(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
     """Return a profile law or sampler as `find` does; None where the name is of something else."""
-    records = Records.of(folder)
-
-    def of_records() -> list[LoadedLaw]:
-        return [*profile_laws(records, (name,), False), *sampled_laws(records, (name,))]
-
-    return _found(name, records, constants, {"n": n, "g": g}, laws.profile_classes().get(name), of_records)
+    own = laws.find_class(laws.PROFILES, name)
+    return _found(name, Records.of(folder), own, (profile_laws, sampled_laws), **options)
 
 
-def find_map(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+def find_map(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
     """Return a map between alpha and A as `find` does; None where the name is of something else."""
-    records, classes = Records.of(folder), laws.map_classes()
+    classes = laws.map_classes()
     own = {kind.entry.key: kind for kind in classes.values()} | classes
-    return _found(
-        name, records, constants, {"n": n, "g": g}, own.get(name), lambda: albedo_laws(records, (name,), False)
-    )
+    return _found(name, Records.of(folder), own.get(name), (albedo_laws,), **options)
 
 
 def _found(
     name: str,
     records: Records,
-    constants: str | None,
-    of: Mapping[str, Number],
     kind: Any,
-    of_records: Callable[[], Sequence[LoadedLaw]],
-) -> Found:
-    """Return the law of a record, else of a class of that name, in the setting of `of`; None where there is neither."""
+    lists: Sequence[Callable[..., list[LoadedLaw]]],
+    constants: str | None = None,
+    **of: Any,
+) -> LoadedLaw | None:
+    """Return the law of a record, else of a class of that name, with the n and g given; None where there is neither."""
     if name in records.paths and constants in (None, REGENERATED):
-        found = next(iter(of_records()), None)
+        found = next((law for each in lists for law in each(records, (name,), False)), None)
     elif kind is not None:
         which = constants or _default(kind.entry, bool(kind.constant_names()))
         found = _named(kind.entry, which, _load(kind.entry, which, None, records), records)
     else:
         return None
-    given: dict[str, Any] = {key: value for key, value in of.items() if value is not None}
+    given = {key: value for key, value in of.items() if value is not None}
     if found is None or (setting := replace(found.setting, **given)) == found.setting:
         return found
     entry = found.law.entry
@@ -316,9 +300,17 @@ def not_found(name: str, folder: Folder, constants: str | None = None) -> InputE
     return InputError(f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records")
 
 
+def _classes(table: Mapping[str, str], records: Records, names: Names) -> dict[str, Any]:
+    """Return the classes of a table by name; of records that are named, those of their laws."""
+    if names is None:
+        return laws.profile_classes() if table is laws.PROFILES else laws.map_classes()
+    own = sorted({content["law"] for content in records.named(names).contents(whole=True).values()})
+    each = [name for base in table for name in own if name.partition(":")[0] == base]
+    return {name: kind for name in each if (kind := laws.find_class(table, name)) is not None}
+
+
 def _entries(classes: Mapping[str, Any]) -> list[Entry]:
-    """One for each class, whatever the names that it goes by."""
-    return list({kind.entry.key: kind.entry for kind in classes.values()}.values())
+    return list({kind: kind.entry for kind in classes.values()}.values())
 
 
 def _load(entry: Entry, which: str, setting: Setting | None, records: Records) -> Any:
@@ -339,7 +331,7 @@ def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]
 
 
 def _default(entry: Entry, has_constants: bool) -> str:
-    """The regenerated constants, or the only ones printed where none were regenerated."""
+    """Return the regenerated constants, or the only ones printed where none were regenerated."""
     if entry.records or not has_constants:
         return "regenerated"
     printed = [s.name for s in published.SETS if s.law == entry.printed]
@@ -351,15 +343,14 @@ def _default(entry: Entry, has_constants: bool) -> str:
 
 
 def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
-    """Every printed set of these, in the order of print."""
     known = {entry.printed: entry for entry in entries}
     sets = [(known[s.law], s.name) for s in published.SETS if s.law in known]
     return [_named(entry, which, _load(entry, which, None, records), records) for entry, which in sets]
 
 
 def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
-    """Printed sets, laws without constants, and laws made of all their regenerated records."""
-    classes = laws.profile_classes()
+    """List printed sets, laws without constants, and laws made of all their regenerated records."""
+    classes = _classes(laws.PROFILES, records, names)
     entries = _entries(classes)
     regenerated = _regenerated(records, entries, names, matched)
     if names is not None:  # others are of none
@@ -370,7 +361,7 @@ def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw
 
 
 def _regenerated(records: Records, entries: Sequence[Entry], names: Names, matched: bool) -> list[LoadedLaw]:
-    """These laws, in every setting whose records all are in the folder."""
+    """List these laws, in every setting whose records all are in the folder."""
     there = _usable(records.named(names), matched)
     settings = dict.fromkeys(record_setting(content) for content in there.values())
     found = []
@@ -383,8 +374,8 @@ def _regenerated(records: Records, entries: Sequence[Entry], names: Names, match
 
 
 def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[LoadedLaw]:
-    """Records that no law takes by its name alone; constants that they do not hold are as printed."""
-    entries = [*_entries(laws.profile_classes()), *_entries(laws.map_classes())]
+    """List records that no law takes by its name alone; constants that they do not hold are as printed."""
+    entries = [one for table in (laws.PROFILES, laws.MAPS) for one in _entries(_classes(table, records, names))]
     found = []
     for name, content in _usable(records.named(names), matched).items():
         wholes = [[path.stem for path in _files(one, record_setting(content), records)] for one in entries]
@@ -397,7 +388,7 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
 
 
 def _usable(records: Records, matched: bool) -> dict[str, dict[str, Any]]:
-    """The records of fits that converged."""
+    """Return the records of fits that converged."""
     found = records.contents(whole=True)
     return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
 

@@ -1,4 +1,4 @@
-"""Two truths, one recipe: a fit to the exact half space is repeated on the tracer's photons, and must agree with it.
+"""Check of a fit to the exact half space, which is repeated on the tracer's photons and must agree with it.
 
 Both fits make the same objective small, with the working weights of that objective and not the inverse covariance of
 the photons, on the same rings and albedos: what rests on too few photons is left out of both. A law that is not the
@@ -59,7 +59,7 @@ class CrossCheck:
         return (self.photons - self.exact) / self.statistical_error
 
     def content(self) -> dict[str, Any]:
-        """What a record says of it."""
+        """Return what a record says of it."""
         columns = zip(self.names, self.exact, self.photons, self.statistical_error, self.z, strict=True)
         keys = ("exact", "photons", "statistical_error", "z")
         facts = ("chi2", "rank", "chance", "rings_left_out", "albedos_left_out", "result")
@@ -75,7 +75,11 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
     run, xi = light.merged(exact.r_edges), tuple(np.asarray(own.rings.xi))
     photons = Profiles.from_orders(run, exact.alpha)
     seen = np.asarray(own.rings.used) > 0
-    used, counted = seen & photons.trusted & (photons.energy > 0), _counted(run, photons, xi)
+    used = seen & photons.trusted & (photons.energy > 0)
+    # Albedos that rest on enough photons, none of which were cut to an extent that matters.
+    error = np.asarray(run.reflectance(photons.alpha).standard_error)
+    uncut = np.asarray(run.cut(photons.alpha)) <= LARGEST_CUT * error
+    counted = uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
     limits = tuple(np.asarray(own.rings.limits))
     one, other = (
         fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
@@ -84,15 +88,8 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
     return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))
 
 
-def _counted(light: Orders, photons: Profiles, xi: tuple[float, ...]) -> NDArray[np.bool_]:
-    """Albedos (m,) that rest on enough photons, none of which were cut to an extent that matters."""
-    error = np.asarray(light.reflectance(photons.alpha).standard_error)
-    uncut = np.asarray(light.cut(photons.alpha)) <= LARGEST_CUT * error
-    return uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
-
-
 def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos_left_out: int) -> CrossCheck:
-    """How far two fits of the same constants are apart, in units of the photons' noise."""
+    """Compare two fits of the same constants, in units of the photons' noise."""
     one, other = exact.solution.parameters, photons.solution.parameters
     covariance = np.asarray(photons.statistical)
     if problem := _problem(exact, photons):
@@ -108,7 +105,6 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
 
 
 def _problem(exact: Fit, photons: Fit) -> str | None:
-    """Why two fits cannot be compared, or None."""
     for name, one in (("exact", exact), ("photon", photons)):
         if not one.solution.converged:
             return f"the {name} fit failed: {one.result}"
@@ -118,7 +114,7 @@ def _problem(exact: Fit, photons: Fit) -> str | None:
 
 
 def mahalanobis(difference: Floats, covariance: Floats) -> tuple[float, int]:
-    """chi2 of a difference (p,) under a covariance (p, p), and the number of directions that it was measured in."""
+    """Return chi2 of a difference (p,) under a covariance (p, p), and the number of directions that count."""
     error = np.sqrt(np.diag(covariance))
     share, axes = np.linalg.eigh(covariance / np.outer(error, error))
     known = share > SMALLEST_SHARE * share.max()

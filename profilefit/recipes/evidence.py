@@ -22,7 +22,7 @@ from profilefit.recipes.folder import LOCAL
 
 
 def made(command: str, folder: Path) -> dict[str, Any]:
-    """How something was measured just now, by `command`, with the constants of the records in `folder`.
+    """Describe a measurement made just now, by `command`, with the constants of the records in `folder`.
 
     command, version [of profilefit], date [UTC, ISO 8601], machine {processor, cores}, and sha256 [of the records]
     """
@@ -36,12 +36,12 @@ def made(command: str, folder: Path) -> dict[str, Any]:
 
 
 def stale(origin: Mapping[str, Any], folder: Path) -> bool:
-    """Whether `made` was measured of other records than those in `folder`, or by another version."""
+    """Return whether `made` was measured of other records than those in `folder`, or by another version."""
     return (origin.get("version"), origin.get("sha256")) != (__version__, digest(folder))
 
 
 def digest(folder: Path) -> str:
-    """SHA-256 over the records of a folder: their names, lengths and bytes, in order."""
+    """Return the SHA-256 over the records of a folder: their names, lengths and bytes, in order."""
     sha = hashlib.sha256()
     for name, path in record.available(folder).items():
         content = path.read_bytes()
@@ -51,7 +51,7 @@ def digest(folder: Path) -> str:
 
 
 def require_apart(out: Path, records: Path, *files: str) -> None:
-    """InputError where a measurement's .json in `out` would be taken for a record; OutputError where none can be."""
+    """Raise InputError where a measurement's .json in `out` would pass for a record; OutputError where none can be."""
     taken = {records.resolve(), LOCAL.resolve()}
     if out.resolve() in taken:
         raise InputError(f"out must be another folder than that of the records, got {out}")
@@ -59,7 +59,7 @@ def require_apart(out: Path, records: Path, *files: str) -> None:
 
 
 def processor() -> str:
-    """The processor's name, as the system reports it."""
+    """Return the processor's name, as the system reports it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:  # not Linux

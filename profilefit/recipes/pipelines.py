@@ -63,19 +63,15 @@ def work(recipe: Recipe, run: RecipeRun, pipelines: Mapping[str, Pipeline]) -> W
             run.say(text)
         return {**_header(recipe, run, light), **content}, arrays
 
-    part = partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light)
-    return Work(recipe.name, (part,), finish, order=_order(recipe))
-
-
-def _order(recipe: Recipe) -> tuple[int, ...]:
-    """Return the stage of a recipe, and by what it begins among others.
-
-    Those that span indices, and those with random starts, take longest: none is left when all others are done. Twins of
-    two illuminations do not run side by side: the second takes over what XLA compiled for the first.
-    """
-    stage, spans = {"albedo": MAPS, "evidence": COMPARISONS}.get(recipe.pipeline, LAWS), bool(recipe.indices)
+    spans = bool(recipe.indices)
+    # Those that span indices, and those with random starts, take longest: none is left when others are done. Twins of
+    # two illuminations do not run side by side: the second takes over what XLA compiled for the first.
     second = spans and recipe.setting.illumination == "diffuse"
-    return stage, 0 if spans else 2, second, not recipe.cosines, -recipe.random_starts
+    stage = {"albedo": MAPS, "evidence": COMPARISONS}.get(recipe.pipeline, LAWS)
+    order = stage, 0 if spans else 2, second, not recipe.cosines, -recipe.random_starts
+    return Work(
+        recipe.name, (partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light),), finish, order=order
+    )
 
 
 def _run(pipeline: Pipeline, recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple[RecordContent, list[str]]:
@@ -85,10 +81,7 @@ def _run(pipeline: Pipeline, recipe: Recipe, run: RecipeRun, light: Orders | Non
 
 
 def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, Any]:
-    spans = {
-        **({"indices": recipe.indices} if recipe.indices else {}),
-        **({"cosines": recipe.cosines} if recipe.cosines else {}),
-    }
+    spans = {key: values for key in ("indices", "cosines") if (values := getattr(recipe, key))}
     header: dict[str, Any] = {
         **{key: getattr(recipe, key) for key in ("title", "law", "equations", "pipeline", "note", "setting")},
         **({"indices": recipe.span} if recipe.indices else {}),
@@ -158,18 +151,11 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
 def described_fit(
     recipe: Recipe, run: RecipeRun, light: Orders | None
 ) -> tuple[Fit, Profiles, dict[str, Any], dict[str, Any]]:
-    """Fit a recipe's law: the fit, what it was fitted to, and what every record of a fit says, with its arrays."""
-    profiles = truth_of(recipe, light)
-    result, checks = _checked_fit(recipe, run, profiles, light)
-    content, arrays = description(recipe, run, profiles, result)
-    return result, profiles, content | checks, arrays
+    """Fit a recipe's law: the fit, what it was fitted to, and what every record of a fit says, with its arrays.
 
-
-def _checked_fit(
-    recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | None
-) -> tuple[Fit, dict[str, Any]]:
-    """Return the fit of a recipe, and what random starts and the other truth say of it."""
-    start, checks = starts.starting_law(recipe, run.out), dict[str, Any]()
+    That includes what random starts and the other truth say of the fit.
+    """
+    profiles, start, checks = truth_of(recipe, light), starts.starting_law(recipe, run.out), dict[str, Any]()
     result = fit_from(recipe, profiles, start)
     if recipe.random_starts:
         tried = starts.random_starts(result, start, recipe.random_starts, run.seed)
@@ -185,7 +171,8 @@ def _checked_fit(
             seen = truth_of(at_one, None)
             own = fit_from(at_one, seen, result.law)
         checks["crosscheck"] = crosscheck(own, seen, light).content()
-    return result, checks
+    content, arrays = description(recipe, run, profiles, result)
+    return result, profiles, content | checks, arrays
 
 
 def fit_from(recipe: Recipe, profiles: Profiles, start: Constants, used: NDArray[np.bool_] | None = None) -> Fit:

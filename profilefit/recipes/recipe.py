@@ -1,4 +1,4 @@
-"""Recipes: fits/*.toml says what is fitted to what, how it is weighted and over which range."""
+"""Recipes: fits/*.toml states what is fitted to what, how it is weighted and over which range."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MAX_LIMIT = 1e6  # a weight beyond this makes the rings round off beside it
 
 @dataclass(frozen=True)
 class Albedos:
-    """Which albedos are fitted: `count` of them, even in `spacing`, from `low` to `high` in alpha [-]."""
+    """Albedos that are fitted: `count` of them, even in `spacing`, from `low` to `high` in alpha [-]."""
 
     low: float
     high: float
@@ -54,7 +54,7 @@ class Albedos:
 
 @dataclass(frozen=True)
 class RingLayout:
-    """On which rings: even ones of width `dr`, or log-spaced from `first` to `last` [mfp]; `trim` is (6)."""
+    """Rings that are fitted: even ones of width `dr`, or log-spaced from `first` to `last` [mfp]; `trim` is (6)."""
 
     last: float
     dr: float = 0.0
@@ -81,7 +81,7 @@ class RingLayout:
         return None
 
     def problems_at(self, mfp: float) -> str | None:
-        """What is impossible about even rings in a medium of this mean free path, or None."""
+        """Return what is impossible about even rings in a medium of this mean free path, or None."""
         # Rounded: 0.15 / 0.05 is 3 rings, and 2.9999999999999996 in binary.
         if self.dr > 0 and not FEWEST_RINGS <= round(self.last * mfp / self.dr, 6) <= MOST_RINGS:
             accepted = f"between {FEWEST_RINGS} and {MOST_RINGS} rings"
@@ -92,7 +92,7 @@ class RingLayout:
 
 @dataclass(frozen=True)
 class Weighting:
-    """What is made small: an objective by name, the weights of its limits, and shares of energy for quantiles."""
+    """Objective of a fit: its name, the weights of its limits, and shares of energy for quantiles."""
 
     objective: str
     energy_limit: float = 0.0
@@ -147,7 +147,7 @@ class Recipe:
 
     @property
     def span(self) -> tuple[float, float]:
-        """The indices that its constants hold for: above the first, up to the last; and from 1 if the first is near."""
+        """Indices that its constants hold for: above the first, up to the last; and from 1 if the first is near."""
         if self.cosines:
             return FORWARD_SPAN
         first, last = self.indices[0], self.indices[-1]
@@ -155,12 +155,12 @@ class Recipe:
 
     @property
     def settings(self) -> tuple[Setting, ...]:
-        """All that it is fitted to: its own, or each of its indices and mean cosines."""
+        """Settings that it is fitted to: its own, or each of its indices and mean cosines."""
         each = product(self.indices or (self.setting.n,), self.cosines or (self.setting.g,))
         return tuple(replace(self.setting, n=n, g=g) for n, g in each)
 
     def problems(self) -> str | None:
-        """What is impossible about it, in one line, or None."""
+        """Return what is impossible about it, in one line, or None."""
         if self.pipeline not in PIPELINES:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {self.pipeline!r}"
         if self.truth not in TRUTHS:
@@ -266,7 +266,7 @@ def read(path: Path) -> Recipe:
 
 
 def available(folder: Path) -> dict[str, Path]:
-    """The recipes of a folder by name, in order."""
+    """Return the recipes of a folder by name, in order."""
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
@@ -322,13 +322,9 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
         return tuple(float(v) for v in value)
     if annotation == "tuple[str, ...]" and isinstance(value, list) and all(map(is_line, value)):
         return tuple(value)
-    words = _spoken(annotation)
+    words = {"float": "finite number", "int": "whole number", "str": "text"}.get(annotation)
+    words = words or ("list of finite numbers" if "float" in annotation else "list of texts")
     texts = [value] if annotation == "str" else value
     if "str" in annotation and isinstance(texts, list) and all(isinstance(text, str) for text in texts):
         words += f" of one printable line and {LONGEST_TEXT} characters at most"  # it becomes comments in code
     raise RecipeError(f"{where}: {key} must be a {words}, got {shown(value)}")
-
-
-def _spoken(annotation: str) -> str:
-    names = {"float": "finite number", "int": "whole number", "str": "text"}
-    return names.get(annotation, "list of finite numbers" if "float" in annotation else "list of texts")

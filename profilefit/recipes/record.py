@@ -1,4 +1,4 @@
-"""Records: fits/*.json is what came out of a recipe, and everything needed to judge it or to make it again.
+"""Records: fits/*.json holds what came out of a recipe, and all that is needed to judge it or to make it again.
 
 The same recipe, seed and versions on one CPU class write the same bytes: no dates, no times, sorted keys. Samples and
 curves that figures need lie beside it in an .npz of the same name.
@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,9 @@ from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.text_file import plain as to_plain
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
 from mcml_sim.media.setting import Setting
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.recipes import schema
-from profilefit.recipes.folder import available, is_file
+from profilefit.recipes.folder import available, fits_folder, is_file
 
 FORMAT = 2
 # What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.
@@ -33,6 +34,7 @@ ARRAYS_OF_FORMAT_1 = {f"{kind}_{MISFIT_BEFORE}": f"{kind}_{MISFIT}" for kind in 
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
 CONVERGED = "converged"
+SEARCHLIGHT = Setting()
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
@@ -78,7 +80,7 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
 
 
 def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
-    """The same in the words of today, whatever is wrong with it."""
+    """Return a record of format 1 in the words of today, whatever is wrong with it."""
 
     def renamed(table: Any, ending: str = "") -> Any:
         if not isinstance(table, dict):
@@ -116,13 +118,13 @@ def named(name: str, folder: Path, pipeline: str) -> Path | None:
 
 
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
-    """RecordError where a record lacks what `read` promises, or holds what is of another kind."""
+    """Raise RecordError where a record lacks what `read` promises, or holds what is of another type."""
     if text := schema.problem(content, whole) or _outside(content):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
 
 
 def _outside(content: Mapping[str, Any]) -> str | None:
-    """An index or a mean cosine of its own that is none of those which its constants are for."""
+    """Return, in one line, an index or mean cosine of its own that its constants are not for; else None."""
     for name, span in SPANS.items():
         own = content["setting"].get(name)
         if span in content and schema.is_number(own) and not _within(content, span, own):
@@ -137,7 +139,7 @@ def _within(content: Mapping[str, Any], span: str, value: float) -> bool:
 
 
 def record_setting(content: Mapping[str, Any]) -> Setting:
-    """The setting that a record belongs to."""
+    """Return the setting that a record belongs to."""
     try:
         return Setting.of(content["setting"])
     except (KeyError, TypeError, InputError):
@@ -150,14 +152,14 @@ SPANS = {"n": "indices", "g": "cosines"}  # a setting's numbers, and the ranges 
 
 
 def covers(content: Mapping[str, Any], setting: Setting) -> bool:
-    """Whether a record's constants hold for a setting: its own or, if they span indices and g, one of these."""
+    """Return whether a record's constants hold for a setting: its own or, if they span indices and g, one of these."""
     own = record_setting(content)
     there = {name: getattr(own, name) for name, span in SPANS.items() if _within(content, span, getattr(setting, name))}
     return own == replace(setting, **there)
 
 
 def record_name(base: str, setting: Setting) -> str:
-    """The record of another setting than Setting(): albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
+    """Return the name of the record of a setting: albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
     usual, parts = Setting(), [base]
     if setting.illumination != usual.illumination:
         parts.append(setting.illumination)
@@ -169,19 +171,18 @@ def record_name(base: str, setting: Setting) -> str:
 
 
 def spanning_name(base: str, setting: Setting) -> str:
-    """The record for every index of a range, under the light of a setting: hazard-refracting, -diffuse-refracting; or,
+    """Return the name of the record for every index of a range, such as hazard-refracting, -diffuse-refracting; or,
     where scattering has a direction, for every g, too: hazard-forward, -diffuse-forward."""
     spanning = REFRACTING if setting.g == 0.0 else FORWARD
     return f"{record_name(base, replace(setting, n=1.0, g=0.0))}-{spanning}"
 
 
 def _shortest(value: float) -> str:
-    """The fewest digits that are this number: 1.4, 2."""
     return np.format_float_positional(value, trim="-")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """The arrays beside a record (`path` is the .json)."""
+    """Return the arrays beside a record (`path` is the .json)."""
     file = path.with_suffix(".npz")
     try:
         with file.open("rb") as opened:
@@ -212,5 +213,98 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """`text_file.plain` with the digits of a record: numbers, text, lists and dicts; None for what is not finite."""
+    """Return `text_file.plain` with the digits of a record; None for what is not finite."""
     return to_plain(value, DIGITS)
+
+
+@dataclass(frozen=True)
+class Records:
+    """Records in a folder, or those of them that are named: each is read once, for as long as this lives.
+
+    What is read is shared by all callers: nobody changes it.
+    """
+
+    folder: Path
+    names: tuple[str, ...] | None = None
+    _contents: dict[Path, dict[str, Any]] = field(default_factory=dict, compare=False, repr=False)
+
+    @classmethod
+    def of(cls, folder: Folder) -> Records:
+        """Open the records of a folder; those that are open already stay so."""
+        return folder if isinstance(folder, Records) else Records(folder)
+
+    def named(self, names: Sequence[str] | None) -> Records:
+        """Return only those of these names; all that there are, if None."""
+        return Records(self.folder, None if names is None else tuple(names), self._contents)
+
+    @cached_property
+    def paths(self) -> dict[str, Path]:
+        """Record name -> file, in order."""
+        found = available(self.folder)
+        return found if self.names is None else {name: path for name, path in found.items() if name in self.names}
+
+    def read(self, path: Path, whole: bool = False) -> dict[str, Any]:
+        """Read any record once."""
+        if path not in self._contents:
+            self._contents[path] = read(path, whole)
+        elif whole:
+            require_sound(self._contents[path], path, whole)
+        return self._contents[path]
+
+    def content(self, name: str, whole: bool = False) -> dict[str, Any]:
+        """Return what the record of this name says; RecordError as of `read`."""
+        return self.read(self.folder / f"{name}.json", whole)
+
+    def contents(self, whole: bool = False) -> dict[str, dict[str, Any]]:
+        """Return what all records say, by name."""
+        return {name: self.read(path, whole) for name, path in self.paths.items()}
+
+    def settings(self, base: str) -> tuple[Setting, ...]:
+        """Return the settings that a record is there for, by its name for Setting()."""
+        near = {name: self.read(path) for name, path in self.paths.items() if name.startswith(base)}
+        found = {name: record_setting(content) for name, content in near.items()}
+        return tuple(
+            setting
+            for name, setting in found.items()
+            if name in (record_name(base, setting), spanning_name(base, setting))
+        )
+
+    def name(self, base: str, setting: Setting) -> str:
+        """Return the name of a setting's record: its own, that of a range of indices and g where there is such and none
+        of its own, and its own where there is neither."""
+        own, spanning = record_name(base, setting), self.folder / f"{spanning_name(base, setting)}.json"
+        if (self.folder / f"{own}.json").exists() or not spanning.exists():
+            return own
+        return spanning.stem if covers(self.read(spanning), setting) else own
+
+    def path(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
+        """Return the record of a setting, by its name for Setting().
+
+        SettingError that lists the settings there are; RecordError where there is none at all.
+        """
+        if (path := self.folder / f"{self.name(base, setting)}.json").exists():
+            return path
+        if known := self.settings(base):
+            there = "; ".join(self._described(base, one) for one in known)
+            raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
+        raise RecordError(
+            f"{path}: there is no such record; `profilefit regenerate {base} --out {self.folder}` makes it"
+        )
+
+    def path_or_shipped(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
+        """Return the record of a setting, or the one that is shipped, where this folder has none of that setting."""
+        path = self.folder / f"{self.name(base, setting)}.json"
+        return path if path.exists() else Records(fits_folder()).path(base, setting)
+
+    def _described(self, base: str, setting: Setting) -> str:
+        """Return a setting that there is a record for, in words."""
+        content, words = self.content(self.name(base, setting)), str(setting)
+        for name, span in SPANS.items():
+            if span in content:
+                low, high = content[span]
+                words = words.replace(f"{name} = {getattr(setting, name):g}", f"{name} in ({low:g}, {high:g}]")
+        return words
+
+
+Folder = Path | Records
+"""A folder of records, by its path or open."""

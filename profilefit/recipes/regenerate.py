@@ -79,7 +79,7 @@ def regenerate(requests: Sequence[Request], run: RecipeRun, processes: int = 1) 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A record beside the shipped one of its name.
+    """Moves of a record from the shipped one of its name.
 
     name       of the record; constants  how many it has
     moved      largest move of a constant, in units of its stated error [-]; relative  the largest relative move [-]
@@ -144,7 +144,7 @@ def compared(
 
 
 def stated_error(constant: Mapping[str, Any]) -> float:
-    """Error that a record states of a constant: that of the model where there is one, else the largest of the others.
+    """Return a constant's error by its record: that of the model where there is one, else the largest of the others.
 
     0 of one that was not fitted.
     """
@@ -177,7 +177,6 @@ def _photons(content: Mapping[str, Any]) -> Any:
 
 
 def _chains(path: Path, content: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Draws (k, p) of each kind of posterior."""
     if not content.get("posterior"):
         return {}
     arrays = record.read_arrays(path)
@@ -187,7 +186,7 @@ def _chains(path: Path, content: Mapping[str, Any]) -> dict[str, np.ndarray]:
 def _moves(
     shipped: Mapping[str, Any], made: Mapping[str, Any], chains: Mapping[str, Any], again: Mapping[str, Any]
 ) -> Iterator[tuple[float, str]]:
-    """Move of each end of each interval over what is allowed, and whose it is."""
+    """Return the move of each end of each interval over what is allowed, and whose it is."""
     ends = 4 * sum(draws.shape[1] for draws in chains.values())
     most = float(norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(ends, 1)))))  # Sidak, over all ends of the record
     for kind in chains.keys() & again.keys():
@@ -203,7 +202,7 @@ def _moves(
 
 
 def _quantile_error(draws: np.ndarray, share: float) -> float:
-    """Standard error of a quantile of draws (k,) that are taken for independent, from the order statistics about it.
+    """Return the standard error of a quantile of independent draws (k,), from the order statistics about it.
 
     The binomial spread of a share of k draws is sqrt(share (1 - share) / k), and half the distance of the quantiles so
     far to either side is the error of the quantile.

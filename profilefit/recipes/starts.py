@@ -39,7 +39,7 @@ NONE_CONVERGED = "no start converged"
 
 
 def law_class(recipe: Recipe) -> type[Constants]:
-    """The class that a recipe's law names; RecipeError if there is none."""
+    """Return the class that a recipe's law names; RecipeError if there is none."""
     known = _laws(recipe)
     if recipe.law not in known:
         raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
@@ -48,7 +48,7 @@ def law_class(recipe: Recipe) -> type[Constants]:
 
 
 def require_known(recipe: Recipe) -> None:
-    """RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
+    """Raise RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
     kind, objective = law_class(recipe), recipe.weighting.objective
     if objective and not kind.seen_by(objective):
         seeing = [name for name, one in _laws(recipe).items() if one.seen_by(objective) and ":" not in name]
@@ -76,14 +76,14 @@ def require_known(recipe: Recipe) -> None:
 
 
 def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
-    """The constants that a recipe moves; of a law that spans indices, at one index those that it tells apart."""
+    """Return the constants that a recipe moves; of a law that spans indices, at one index those that it tells apart."""
     seen = kind.seen_by(recipe.weighting.objective)
     told = seen if recipe.indices else kind.at_one_index()
     return tuple(name for name in seen if name in told and name not in recipe.held)
 
 
 def starting_law(recipe: Recipe, folder: Path) -> Any:
-    """The law that a fit starts from, in the recipe's setting; constants named in `held` keep their values of here.
+    """Return the law that a fit starts from, in the recipe's setting; constants named in `held` keep their values.
 
     Constants of another setting are numbers to start from like any others. `folder` holds the records of A.
     """
@@ -110,7 +110,7 @@ def _start_constants(recipe: Recipe) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where some of the starts ended: how many, the cost over the best one's [-], constants, and what the solver said.
+    """End of some of the starts: how many, the cost over the best one's [-], constants, and what the solver said.
 
     Of those that failed in the same way only the one of lowest cost is told.
     """
@@ -123,7 +123,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class RandomStarts:
-    """What fits from random constants found.
+    """Fits from random constants.
 
     count       of random starts; seed and rule say which
     share_best  of them that reach the best optimum [-]: its cost within 1e-6, and its constants as near as `_same` says
@@ -146,7 +146,7 @@ class RandomStarts:
         return self.result == OWN_IS_BEATEN
 
     def content(self) -> dict[str, Any]:
-        """What a record says of it."""
+        """Return what a record says of it."""
         return {name: value for name, value in vars(self).items() if name != "best"}
 
 
@@ -163,7 +163,7 @@ def random_starts(own: Fit, start: Constants, count: int, seed: int) -> RandomSt
 
 
 def spread_out(constants: Floats, count: int, seed: int) -> Floats:
-    """Random constants (count, p) around `constants` (p,)."""
+    """Return random constants (count, p) around `constants` (p,)."""
     normal = SPREAD * np.random.default_rng(seed).standard_normal((count, constants.size))
     return np.where(constants == 0, normal, constants * np.exp(normal))
 
@@ -179,7 +179,10 @@ def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...],
         best = own if result == OWN_IS_BEST else best
     groups = _groups(found)
     unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *found)), ROUNDING)
-    outcomes = [Outcome(len(g), _cost(g[0]) / unit, g[0].result, _named(names, g[0])) for g in groups]
+    outcomes = [
+        Outcome(len(g), _cost(g[0]) / unit, g[0].result, dict(zip(names, map(float, g[0].parameters), strict=True)))
+        for g in groups
+    ]
     reached = sum(_same(one, best) for one in found) if best is not None else 0
     return RandomStarts(
         len(found),
@@ -194,7 +197,7 @@ def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...],
 
 
 def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
-    """Solutions that are one optimum, or that failed in the same way, together, each group and all by cost."""
+    """Group solutions that are one optimum, or that failed in the same way, each group and all by cost."""
     groups: list[list[Solution]] = []
     for one in sorted(found, key=lambda one: (not one.converged, _cost(one))):
         home = next((group for group in groups if _same(one, group[0])), None)
@@ -206,7 +209,7 @@ def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
 
 
 def _same(one: Solution, other: Solution) -> bool:
-    """Whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
+    """Return whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
     error = np.sqrt(np.diag(misfit_covariance(other)))
@@ -219,9 +222,4 @@ def _as_cheap(one: Solution, other: Solution) -> bool:
 
 
 def _cost(one: Solution) -> float:
-    """The cost, infinite where the residuals are not finite."""
     return one.cost if np.isfinite(one.cost) else np.inf
-
-
-def _named(names: tuple[str, ...], one: Solution) -> dict[str, float]:
-    return dict(zip(names, map(float, one.parameters), strict=True))

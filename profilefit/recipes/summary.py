@@ -1,4 +1,4 @@
-"""The content of a record of a fit: its constants with their errors, its state, its chains and the data behind it.
+"""Content of a record of a fit: its constants with their errors, its state, its chains and the data behind it.
 
 Discretisation is how far constants are from those of infinitely narrow rings. A fit is repeated with rings two to six
 times as wide, made of the same photons. What falls with the square of the width (a ring's middle in place of its
@@ -35,7 +35,7 @@ NONE = 1e-9
 
 
 def discretisation_error(fit: Fit) -> Floats:
-    """Standard-error-like distance (p,) of the constants from those at no width; 0 for a fit that sees one ring.
+    """Return the distance (p,) of the constants from those at no width; 0 for a fit that sees one ring.
 
     The larger of what rings twice and three times as wide extrapolate to. NaN where a fit fails.
     """
@@ -49,7 +49,7 @@ def discretisation_error(fit: Fit) -> Floats:
 
 
 def by_width(fit: Fit, factors: Sequence[int] = FACTORS) -> dict[int, Floats]:
-    """Constants (p,) by how many rings are taken together; NaN where a fit fails."""
+    """Return constants (p,) by how many rings are taken together; NaN where a fit fails."""
     problem = ResidualFunction(fit.objective, fit.free)
     wider = [widened(fit.rings, factor) for factor in factors]
     rings = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *wider)
@@ -61,7 +61,7 @@ def by_width(fit: Fit, factors: Sequence[int] = FACTORS) -> dict[int, Floats]:
 
 
 def widened(rings: Rings, factor: int) -> Rings:
-    """`factor` rings taken together, in arrays of the same shape: the rings between hold nothing and do not count.
+    """Take `factor` rings together, in arrays of the same shape: the rings between hold nothing and do not count.
 
     A wide ring counts where all its parts do. The last one is as wide as the rings left over.
     """
@@ -84,8 +84,14 @@ Arrays = dict[str, np.ndarray]
 def described(
     result: Fit, profiles: Profiles, printed: dict[str, float], seed: int, max_chain: int
 ) -> tuple[dict[str, Any], Arrays]:
-    """The part of a record that every fit has, and the samples beside it; `printed` are published constants."""
-    chains = _chains(result, seed, max_chain)
+    """Return the part of a record that every fit has, and the samples beside it; `printed` are published constants."""
+    chains = []
+    if result.solution.converged:  # elsewhere the curvature describes no optimum, and the record says why
+        chains = [
+            posterior(result, kind, seed, max_chain)
+            for kind in ("statistical", "misfit")
+            if getattr(result, kind) is not None
+        ]
     off, width = discrepancy(result, profiles), discretisation_error(result)
     errors = {"model_error": np.sqrt(np.diag(off.covariance)), "discretisation_error": width}
     covariances = {"statistical": result.statistical, "misfit": result.misfit, "model": off.covariance}
@@ -99,7 +105,13 @@ def described(
             "condition_number": result.solution.condition_number,
             "residuals": result.structure,
         },
-        "posterior": {c.kind: _chain_facts(c) for c in chains},
+        "posterior": {
+            c.kind: {
+                **{key: getattr(c, key) for key in ("tau", "acceptance", "walkers", "steps", "result")},
+                "standard_deviation": dict(zip(c.names, c.standard_deviation, strict=True)),
+            }
+            for c in chains
+        },
         "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
     }
     if result.solution.converged:
@@ -113,7 +125,7 @@ def described(
 
 
 def curves(profiles: Profiles) -> Arrays:
-    """What the figures draw: the data with its errors; of a fit to several settings, those of its own."""
+    """Return what the figures draw: the data with its errors; of a fit to several settings, those of its own."""
     own = [one == profiles.setting for one in profiles.settings] if profiles.settings else slice(None)
     return {
         "alpha": profiles.alpha[own],
@@ -125,7 +137,7 @@ def curves(profiles: Profiles) -> Arrays:
 
 
 def errors_by_name(names: tuple[str, ...], covariance: Floats | None) -> dict[str, float]:
-    """Standard errors from a covariance; none where there is none."""
+    """Return standard errors from a covariance; none where there is none."""
     return {} if covariance is None else dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
@@ -149,21 +161,9 @@ def _constants(
 
 
 def _left_out(profiles: Profiles, result: Fit) -> dict[str, int]:
-    """What rests on too few effective photons to count: rings, where the objective sees rings, and whole albedos."""
+    """Count what rests on too few effective photons: rings, where the objective sees rings, and whole albedos."""
     sees_rings = result.objective in ("energy", "radial")
     return {
         "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
         "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
     }
-
-
-def _chains(result: Fit, seed: int, max_chain: int) -> list[Posterior]:
-    if not result.solution.converged:
-        return []  # the curvature there describes no optimum, and the record says why
-    kinds = ["misfit"] if result.statistical is None else ["statistical", "misfit"]
-    return [posterior(result, kind, seed, max_chain) for kind in kinds]
-
-
-def _chain_facts(chain: Posterior) -> dict[str, Any]:
-    facts = {name: getattr(chain, name) for name in ("tau", "acceptance", "walkers", "steps", "result")}
-    return {**facts, "standard_deviation": dict(zip(chain.names, chain.standard_deviation, strict=True))}

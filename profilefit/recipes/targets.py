@@ -1,4 +1,4 @@
-"""What a recipe is fitted to: at which albedos, on which rings, from which truth."""
+"""Albedos, rings and truth that a recipe is fitted to."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RUN_EDGES = np.concatenate(
 
 
 def albedo_values(albedos: Albedos, setting: Setting = SEARCHLIGHT) -> Floats:
-    """The albedos (count,) of a recipe, rising, even in its spacing; `setting` is whose reflectance that may be."""
+    """Return the albedos (count,) of a recipe, rising, even in its spacing, maybe the reflectance of `setting`."""
     if albedos.spacing == "alpha":
         return np.linspace(albedos.low, albedos.high, albedos.count)
     if albedos.spacing == "reflectance":
@@ -31,7 +31,7 @@ def albedo_values(albedos: Albedos, setting: Setting = SEARCHLIGHT) -> Floats:
 
 
 def ring_edges(rings: RingLayout | None, mfp: float = 1.0) -> Floats:
-    """The edges [mfp] of a recipe's rings in a medium of this mean free path, each one an edge of the run."""
+    """Return the edges [mfp] of a recipe's rings in a medium of this mean free path, each one an edge of the run."""
     if rings is None:
         return np.array([0.0, RUN_EDGES[-1]])
     if rings.dr > 0:
@@ -47,7 +47,7 @@ def ring_edges(rings: RingLayout | None, mfp: float = 1.0) -> Floats:
 
 
 def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles:
-    """The profiles that a recipe fits; `light` is of its setting."""
+    """Return the profiles that a recipe fits; `light` is of its setting."""
     alpha, edges = albedo_values(recipe.albedos, recipe.setting), ring_edges(recipe.rings, mfp)
     if recipe.truth == "exact":
         each = [Profiles.from_exact(alpha, edges, where) for where in recipe.settings]

@@ -99,7 +99,7 @@ class Tables:
         return text
 
     def made(self, where: str, make: Callable[[], T]) -> T:
-        """What `make` makes; where it refuses, the message says in which file and table."""
+        """Return what `make` makes; where it refuses, the message says in which file and table."""
         try:
             return make()
         except InputError as error:

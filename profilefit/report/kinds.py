@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -26,8 +25,7 @@ Sections = dict[str, Callable[[], str]]
 Paths = Mapping[str, Path]
 
 
-@dataclass(frozen=True)
-class KindTables:
+class KindTables(NamedTuple):
     """What `report` shows of a kind.
 
     key       under which --json has its records
@@ -42,12 +40,8 @@ class KindTables:
     sections: Callable[[Paths, Path], Sections] = lambda paths, folder: {}
 
 
-def _read(paths: Paths) -> dict[str, dict[str, Any]]:
-    return {name: read(path) for name, path in paths.items()}
-
-
 def _law_sections(paths: Paths, folder: Path) -> Sections:
-    filled = sections(_read(paths)) if paths else {}
+    filled = sections({name: read(path) for name, path in paths.items()}) if paths else {}
     return {**{name: partial(str, text) for name, text in filled.items()}, **markdown_sections(folder)}
 
 
@@ -56,29 +50,25 @@ def _phase_parts(content: Content, path: Path) -> Parts:
     return [*tables, *map(Text, premise_lines(content))]
 
 
+def _of_records(content: Content, path: Path) -> Parts:
+    return record_tables(content)
+
+
 TABLES: Mapping[str, KindTables] = {
     "law": KindTables(
         "records",
-        lambda content, path: record_tables(content),
-        lambda paths, folder: summary(_read(paths)) if paths else None,
+        _of_records,
+        lambda paths, folder: summary({name: read(path) for name, path in paths.items()}) if paths else None,
         _law_sections,
     ),
     "stack": KindTables(
-        "records",
-        lambda content, path: record_tables(content),
-        lambda paths, folder: stack_table(folder),
-        lambda paths, folder: stack_sections(paths),
+        "records", _of_records, lambda _, folder: stack_table(folder), lambda paths, _: stack_sections(paths)
     ),
     "gaussians": KindTables(
-        "gaussians",
-        lambda content, path: sum_tables(gaussians.load(path)),
-        sections=lambda paths, folder: sum_sections(paths),
+        "gaussians", lambda _, path: sum_tables(gaussians.load(path)), sections=lambda paths, _: sum_sections(paths)
     ),
     "phase": KindTables(
-        "phases",
-        _phase_parts,
-        lambda paths, folder: phase_table(folder),
-        lambda paths, folder: phase_sections(folder),
+        "phases", _phase_parts, lambda _, folder: phase_table(folder), lambda _, folder: phase_sections(folder)
     ),
 }
 

@@ -18,8 +18,7 @@ from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.record import SPANS, record_setting
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
 
 Content = Mapping[str, Any]

@@ -33,16 +33,19 @@ PLACE = re.compile(r"\b0[:(](\d+)")
 
 
 def open_context() -> moderngl.Context:
-    """A context of its own that draws into textures. ShaderError, one line, where a library or a driver is missing."""
+    """Open a context that draws into textures. ShaderError, one line, where a library or a driver is missing."""
     try:
         return moderngl.create_context(standalone=True, require=OPENGL, **BACKEND)
     except Exception as error:  # glcontext and moderngl raise bare Exceptions
-        raise ShaderError(_missing(str(error))) from None
+        library = re.search(r"lib[\w-]+\.so[.\d]*", str(error))
+        what = f"{library.group()} is missing" if library else "no driver answers"
+        needed = f"no OpenGL {OPENGL // 100}.{OPENGL // 10 % 10} without a window"
+        raise ShaderError(f"{needed}: {what} ({str(error).strip()}); on Debian apt-get install {PACKAGES}") from None
 
 
 @contextmanager
 def opened() -> Iterator[moderngl.Context]:
-    """The same for the length of a `with`. OpenGL draws into the context that was opened last: one at a time."""
+    """Open a context for the length of a `with`. OpenGL draws into the context that was opened last: one at a time."""
     context = open_context()
     try:
         yield context
@@ -53,7 +56,7 @@ def opened() -> Iterator[moderngl.Context]:
 def program(
     context: moderngl.Context, name: str, fragment: str, vertex: str | None = None, **more: Any
 ) -> moderngl.Program:
-    """A compiled program; ShaderError with the shader's name, the offending line and the driver's message.
+    """Compile a program; ShaderError with the shader's name, the offending line and the driver's message.
 
     vertex  by default a triangle over the whole target, with `where` in [-1, 1]^2, in the fragment's own version
     """
@@ -67,12 +70,12 @@ def program(
 
 
 def full_screen(context: moderngl.Context, program: moderngl.Program) -> moderngl.VertexArray:
-    """One triangle over the whole target: `.render(moderngl.TRIANGLES, vertices=3)`."""
+    """Return one triangle over the whole target: `.render(moderngl.TRIANGLES, vertices=3)`."""
     return context.vertex_array(program, [])
 
 
 def check_errors(context: moderngl.Context, where: str) -> None:
-    """ShaderError if OpenGL has recorded an error; reading it clears it."""
+    """Raise ShaderError if OpenGL has recorded an error; reading it clears it."""
     error = context.error
     if error != "GL_NO_ERROR":
         raise ShaderError(f"OpenGL error {error} in {where} ({renderer(context)})")
@@ -100,15 +103,8 @@ def fragments(context: moderngl.Context, work: Callable[[], object]) -> int:
 
 
 def renderer(context: moderngl.Context) -> str:
-    """The device and its driver, in words."""
+    """Return the device and its driver, in words."""
     return f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
-
-
-def _missing(message: str) -> str:
-    library = re.search(r"lib[\w-]+\.so[.\d]*", message)
-    what = f"{library.group()} is missing" if library else "no driver answers"
-    needed = f"{OPENGL // 100}.{OPENGL // 10 % 10}"
-    return f"no OpenGL {needed} without a window: {what} ({message.strip()}); on Debian apt-get install {PACKAGES}"
 
 
 def _located(name: str, source: str, message: str) -> str:

@@ -1,4 +1,4 @@
-"""The shader source of a law: one GLSL file a law, filled with the constants of an instance.
+"""Shader source of a law: one GLSL file a law, filled with the constants of an instance.
 
 The files in `glsl/` keep to what GLSL, HLSL and numpy can all say (see `languages`): floats, structures, straight-line
 code, loops of a fixed length, a choice only as PF_SELECT. LAW_ stands for the law's prefix in each of their names, so
@@ -50,26 +50,26 @@ DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them,
 
 
 def prefix(law: Constants) -> str:
-    """What the names of a law's text begin with, less the underscore."""
+    """Return what the names of a law's source begin with, less the underscore."""
     text = _text(law)
     return f"{text.prefix or text.file}{text.count or ''}"
 
 
 def source(law: Constants) -> str:
-    """Which text it is: laws of one prefix may have several, as the hazard law has where the surface refracts."""
+    """Return the name of a law's source: of one prefix there may be several, as where the surface refracts."""
     text = _text(law)
     return f"{text.file}{text.count or ''}"
 
 
 def clamps(law: Constants) -> str:
-    """What a law's text takes for another number than was given, in words."""
+    """Return what a law's source clamps, in words."""
     return _text(law).clamps
 
 
 def law_text(
     law: ProfileLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None
 ) -> str:
-    """The law with its constants, ready to include: no version line, no precision line, no main.
+    """Return the law with its constants, ready to include: no version line, no precision line, no main.
 
     lang  "glsl" (also for GLSL ES, which differs only in what a shader says before it), "hlsl" or "python"
     name  the prefix of its names, `prefix(law)` by default
@@ -82,34 +82,34 @@ def law_text(
 
 
 def numbers(law: ProfileLaw) -> Numbers:
-    """Every number of a law's text, by its name less the prefix."""
+    """Return every number of a law's source, by its name less the prefix."""
     albedo = _normalisation(law) if NORMALISED in _text(law, ProfileLaw).parts else None
     own = {**law.text_numbers(), **law.text_constants()}
     return {HIGHEST: max_reflectance(law), **(_prefixed(albedo) if albedo else {}), **own}
 
 
 def max_reflectance(law: Constants) -> float:
-    """Largest total reflectance A [-] that a law's source gives an albedo to: it takes a larger A for this one."""
+    """Return the largest total reflectance A [-] that a law's source gives an albedo to, which clamps a larger A."""
     albedo = law if isinstance(law, AlbedoLaw) else getattr(law, "albedo", None)
     return albedo.reflectances.high if isinstance(albedo, AlbedoLaw) else float(law.total(1.0))  # type: ignore[attr-defined]
 
 
 def parts(law: ProfileLaw) -> list[str]:
-    """The files of a law's text in order, without those that complete it."""
+    """Return the files of a law's source in order, without those that complete it."""
     text = _text(law, ProfileLaw)
     own = {NORMALISED: _text(_normalisation(law)).file} if NORMALISED in text.parts else {}
     return [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
 
 
 def shapeless(law: ProfileLaw) -> list[str]:
-    """What of a law's text works on shapes that are made elsewhere."""
+    """Return the part of a law's source that works on shapes made elsewhere."""
     text = _text(law, ProfileLaw)
     needed = [part for part in text.parts if part in ON_SHAPES]
     return [SHAPE.sub("", read_text(part)) for part in ("common", *needed, text.file)]
 
 
 def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
-    """The members of a law's shape at an albedo, in float64, by their dotted names in its text."""
+    """Return the members of a law's shape at an albedo, in float64, by their dotted names in its text."""
     with jax.enable_x64(True):
         if (known := law.text_shape()) is not None:
             return known
@@ -126,7 +126,7 @@ def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
 
 
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
-    """The map between alpha and A: NAME_alpha(A) and NAME_map_reflectance(alpha); arguments as for `law_text`."""
+    """Return the map between alpha and A: NAME_alpha(A), NAME_map_reflectance(alpha); arguments as for `law_text`."""
     text = _text(law, AlbedoLaw)
     constants = {HIGHEST: max_reflectance(law), **_prefixed(law)}
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
@@ -136,12 +136,12 @@ def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: 
 
 @cache
 def text_beside(module: str, file: str) -> str:
-    """A text that lies in the folder of a module, or below it, as it is: text_beside(__name__, "glsl/x.frag")."""
+    """Return a text in the folder of a module, or below it, as it is: text_beside(__name__, "glsl/x.frag")."""
     return (resources.files(module.rpartition(".")[0]) / file).read_text(encoding="utf-8")
 
 
 def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
-    """The text of a law of this kind, a profile law or a map."""
+    """Return the source of a law of this class, a profile law or a map."""
     text = law.entry.text
     if isinstance(law, kind) and isinstance(text, Text):
         return text
@@ -153,7 +153,6 @@ def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
 
 
 def _normalisation(law: Any) -> Normalisation:
-    """The map that normalises the law."""
     albedo = getattr(law, "albedo", None)
     if not isinstance(albedo, Normalisation):
         raise InputError(f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}")
@@ -161,7 +160,7 @@ def _normalisation(law: Any) -> Normalisation:
 
 
 def _prefixed(albedo: AlbedoLaw) -> Numbers:
-    """The numbers of a map's text, but `HIGHEST`, which is the share of the light that enters."""
+    """Return the numbers of a map's source, but `HIGHEST`, which is the share of the light that enters."""
     every = {**albedo.text_numbers(), **albedo.text_constants()}
     return {f"map_{key}": value for key, value in every.items() if key != "entered"}
 
@@ -171,34 +170,26 @@ def read_text(file: str) -> str:
 
 
 def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:
-    """Texts, the first of which is `common`, with a prefix and its constants, in a language."""
+    """Fill texts, the first of which is `common`, with a prefix and its constants, in a language."""
     if not PREFIX.fullmatch(name):
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
-    lines = [_declared(name, key, value, told.get(key, "")) for key, value in constants.items()]
+    lines = []
+    for key, value in constants.items():
+        lines.append(f"const float {name}_{key} = {literal(value)};" + (f" // {told[key]}" if told.get(key) else ""))
     own = _repeated("\n".join(["\n".join(lines) + "\n", *rest]), count).replace(PLACEHOLDER, f"{name}_")
     digest = f"0x{hashlib.sha256(own.encode()).hexdigest()[:7]}"  # a positive int in every language
     guarded = own if lang == "python" else GUARD.format(name=name, digest=digest, text=own)
     return translated(f"{common}\n{guarded}", lang)
 
 
-def _declared(name: str, key: str, value: float, remark: str) -> str:
-    return f"const float {name}_{key} = {literal(value)};" + (f" // {remark}" if remark else "")
-
-
 def literal(value: float) -> str:
-    """A number as every shading language reads it: with a point, without a suffix."""
+    """Return a number as every shading language reads it: with a point, without a suffix."""
     if not math.isfinite(value):
         raise InputError(f"constants of a shader must be finite, got {value!r}")
-    return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0") if _is_extreme(value) else _plain(value)
-
-
-def _plain(value: float) -> str:
+    if value != 0 and not 1e-4 <= abs(value) < 1e7:
+        return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0")
     return np.format_float_positional(value, DIGITS, unique=True, fractional=False, trim="0")
-
-
-def _is_extreme(value: float) -> bool:
-    return value != 0 and not 1e-4 <= abs(value) < 1e7
 
 
 def _repeated(text: str, count: int) -> str:

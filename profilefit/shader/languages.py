@@ -1,4 +1,4 @@
-"""From the common text to each language: GLSL as it is, HLSL by a word, numpy line by line.
+"""Translation of the common text into each language: GLSL as it is, HLSL by a word, numpy line by line.
 
 What the text may use, besides comments: `const float NAME = ...;`, structures of floats, functions of floats and
 structures, declarations with a value, assignments, `for (int i = 0; i < N; ++i) {`, return at the end, the functions in
@@ -48,7 +48,7 @@ CALLED = re.compile(rf"({NAME})\(")
 
 
 def translated(text: str, lang: str) -> str:
-    """The common text in one of `LANGUAGES`; InputError for another one, or for a line that is not common."""
+    """Translate the common text into one of `LANGUAGES`; InputError for another one, or a line that is not common."""
     if lang not in LANGUAGES:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
     if lang == "glsl":
@@ -85,7 +85,7 @@ def _python(text: str) -> str:
 
 
 def _statements(text: str):
-    """Code and comment, a statement at a time: one that runs over several lines is joined."""
+    """Return code and comment, a statement at a time: one that runs over several lines is joined."""
     held = ""
     for line in text.splitlines():
         code, slashes, comment = line.strip().partition("//")

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import __version__
-from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
@@ -23,7 +22,7 @@ from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
 from profilefit.recipes.catalogue import LoadedLaw, not_found
 from profilefit.recipes.folder import known_folder
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
@@ -79,16 +78,10 @@ def export_subject(
 ) -> str:
     """Return the whole file of a record or law of any kind, or of what a scene exports.
 
-    Args:
-        subject: name of a record, law or map, path of a record, or what scenes export.
-        lang: one of `LANGUAGES`.
-        name: what the names in it begin with, by default its own; two media in one shader need two.
-        fits: folder of records; None stands for ./fits and those shipped.
-        scenes: what scenes export, as `profilefit.scenes.SOURCES`.
-        options: constants, n and g of a law, as for `catalogue.find`.
-
-    Raises:
-        InputError: a subject, language, name or option that there is not; RecordError on a damaged record.
+    subject  name of a record, law or map, path of a record, or what scenes export;  lang, name  as of `export`
+    fits     folder of records; None stands for ./fits and those shipped;  options  of a law, as for `catalogue.find`
+    scenes   what scenes export, as `profilefit.scenes.SOURCES`
+    InputError on what there is not; RecordError on a damaged record.
     """
     for kind in kinds.KINDS:
         module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module
@@ -212,7 +205,10 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     lines = [f"{named.name}, {named.constants or 'no constants'}: {kind}"]
     start = name or emit.prefix(named.law)
     lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
-    lines += ["", *_setting_lines(named.setting), ""]
+    setting = named.setting
+    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}"
+    surface += ", other media by reduced lengths" if setting.is_isotropic else ""
+    lines += ["", f"light: {LIGHT[setting.illumination]}", surface, *CONVENTIONS.splitlines(), ""]
     most = f"{start}_{emit.HIGHEST}"
     lines.append(DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"))
     lines.append(f"{most} = {emit.max_reflectance(named.law):.3g}: no half space of this n reflects more")
@@ -223,13 +219,6 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     for source in sources:
         lines += _provenance(source, f"{source.of}: ")
     return lines
-
-
-def _setting_lines(setting: Setting) -> list[str]:
-    light = f"light: {LIGHT[setting.illumination]}"
-    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}"
-    surface += ", other media by reduced lengths" if setting.is_isotropic else ""
-    return [light, surface, *CONVENTIONS.splitlines()]
 
 
 def _provenance(source: _Source, before: str) -> list[str]:
@@ -302,8 +291,10 @@ def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[st
 
 def _printed(named: LoadedLaw) -> Any:
     """Return the printed set that a law's constants are, or None."""
+    if named.files:
+        return None
     own = named.law.entry.printed, named.constants
-    return next((s for s in published.SETS if not named.files and (s.law, s.name) == own), None)
+    return next((s for s in published.SETS if (s.law, s.name) == own), None)
 
 
 def _plain(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The shader source of a phase function, and one file that holds it with its errors."""
+"""Shader source of a phase function, and the file that holds it with its errors."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ Numbers = dict[str, float]
 def stack_text(
     laws: Sequence[StackLaw], lang: str = "glsl", name: str = NAME, told: Mapping[str, str] | None = None
 ) -> str:
-    """The laws of a stack's three channels, ready to include, with the first layer's thickness as an argument.
+    """Return the laws of a stack's three channels, ready to include, with the first layer's thickness as an argument.
 
     NAME_profile(r, channel, thickness) and what else `glsl/README.md` lists; channel 0, 1, 2 is red, green, blue.
     lang, name, told  as for `emit.law_text`;  InputError on laws of unlike stacks
@@ -54,7 +54,7 @@ def stack_text(
 
 
 def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME}_once") -> str:
-    """Light scattered once in a stack, NAME_radiance(channel, thickness, cos_in, cos_out, turned) [1/sr].
+    """Return single scattering in a stack, NAME_radiance(channel, thickness, cos_in, cos_out, turned) [1/sr].
 
     media  of red, green, blue: two layers or more, the last infinite, of one index >= that above; InputError else
     """
@@ -73,7 +73,7 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
 
 
 def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: str = "gaussians") -> str:
-    """Sums of as many Gaussians for red, green and blue: NAME_shape(channel), and what works on shapes.
+    """Return sums of as many Gaussians for red, green and blue: NAME_shape(channel), and what works on shapes.
 
     lang, name  as for `emit.law_text`;  InputError on sums of unlike numbers
     """
@@ -96,11 +96,11 @@ def export_stack(record: StackRecord, lang: str = "glsl", name: str | None = Non
         return json_file(_plain(record))
     start = name or record.name.replace("-", "_")
     common = TRANSLATED.get(lang, lang)
-    texts = [
-        stack_text(record.laws, common, start, _remarks(record)),
-        single_text(record.stack.media, common, f"{start}_once"),
-    ]
-    return text_file(_head(record, start), lang, "\n".join(texts))
+    # Errors of the first interface's constants: deeper ones stand in the text at their thickness.
+    names = [(channel, name) for channel in CHANNELS for name in record.laws[0].constant_names()]
+    errors = {f"{c}_{name}": error_remark(record.content["constants"][f"{c}.1.{name}"]) for c, name in names}
+    once = single_text(record.stack.media, common, f"{start}_once")
+    return text_file(_head(record, start), lang, f"{stack_text(record.laws, common, start, errors)}\n{once}")
 
 
 def _head(record: StackRecord, start: str) -> list[str]:
@@ -126,13 +126,6 @@ def _head(record: StackRecord, start: str) -> list[str]:
     return [*lines, f"sha256 of the data {content['data_digest']}", f"sha256 of the record {record.digest}"]
 
 
-def _remarks(record: StackRecord) -> dict[str, str]:
-    """Return the errors of the first interface's constants; deeper ones stand in the text at their thickness."""
-    names = [(channel, name) for channel in CHANNELS for name in record.laws[0].constant_names()]
-    constants = record.content["constants"]
-    return {f"{channel}_{name}": error_remark(constants[f"{channel}.1.{name}"]) for channel, name in names}
-
-
 def _plain(record: StackRecord) -> dict[str, Any]:
     """Return the file as data: the numbers of its text by colour, and the record's constants with their errors."""
     kept = {key: record.content.get(key) for key in ("title", "equations", "note", "data_digest", "truth", "quality")}
@@ -155,7 +148,7 @@ source = export_stack
 
 
 def channel_numbers(law: StackLaw) -> Numbers:
-    """The numbers of one channel's text, lengths in mean free paths of its first layer; mfp itself as it is."""
+    """Return the numbers of one channel's source, lengths in mean free paths of its first layer but mfp itself."""
     unit = law.top.mfp
     with jax.enable_x64(True):
         found: Numbers = {
@@ -179,7 +172,7 @@ def channel_numbers(law: StackLaw) -> Numbers:
 
 
 def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:
-    """The functions that give the shapes of the layers' half spaces, numbers since no albedo changes, and choose."""
+    """Return functions that give the shapes of the layers' half spaces, numbers since no albedo changes, and choose."""
     each = [[_rounded(emit.shape_numbers(one.law, one.alpha)) for one in law.layers] for law in laws]
     prefix = f"{emit.PLACEHOLDER}{LAYER}"
     keys = list(each[0][0])
@@ -190,7 +183,6 @@ def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:
 
 
 def _of_channel(prefix: str, name: str, shapes: Sequence[Mapping[str, str]]) -> str:
-    """The function that gives one of three shapes."""
 
     def chosen(values: Sequence[str]) -> str:
         return values[0] if len(set(values)) == 1 else f"{emit.PLACEHOLDER}of(channel, {', '.join(values)})"
@@ -199,7 +191,7 @@ def _of_channel(prefix: str, name: str, shapes: Sequence[Mapping[str, str]]) -> 
 
 
 def _function(prefix: str, head: str, values: Mapping[str, str]) -> str:
-    """A function that fills a shape, whose curves are structures in it."""
+    """Return a function that fills a shape, whose curves are structures in it."""
     curves = list(dict.fromkeys(key.partition(".")[0] for key in values if "." in key))
     lines = [f"{prefix}_Shape {prefix}{head} {{", f"    {prefix}_Shape s;"]
     lines += [f"    PfCurve {curve};" for curve in curves]
@@ -213,7 +205,6 @@ def _rounded(numbers: Numbers) -> dict[str, str]:
 
 
 def _edge(law: StackLaw, unit: float) -> Numbers:
-    """What depends on the thickness, at its own."""
     of = law.terms()
     first, second, _ = law.shares(of)
     passed = law.top.cdf(float(of.gone))
@@ -226,7 +217,7 @@ def _edge(law: StackLaw, unit: float) -> Numbers:
 
 
 def _one_count(laws: Sequence[StackLaw]) -> int:
-    """The number of layers of all channels; InputError unless they are alike in what a text has but once."""
+    """Return the number of layers of all channels; InputError unless they are alike in what a text has but once."""
     if len(laws) != len(CHANNELS) or not all(isinstance(law, StackLaw) for law in laws):
         raise InputError(f"laws must be three laws of a stack, of red, green and blue, got {_kinds(laws)}")
     settings = {replace(layer.setting, g=0.0) for law in laws for layer in law.layers}
@@ -241,7 +232,7 @@ def _one_count(laws: Sequence[StackLaw]) -> int:
 
 
 def _one_index(media: Sequence[Medium]) -> tuple[float, int]:
-    """Index over that above, and number of layers, of all channels; InputError unless they are alike in both."""
+    """Return the index over that above, and the number of layers; InputError unless all channels agree in both."""
     if len(media) != len(CHANNELS) or not all(isinstance(one, Medium) for one in media):
         raise InputError(f"media must be three media, of red, green and blue, got {_kinds(media)}")
     for one in media:

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 class KindModule(Protocol):
-    """Functions of a kind's module; where no other room writes its source, `source(found, lang, name)`, too."""
+    """Functions of a kind's module; where no other room writes its source or tables, `source` and `tables`, too."""
 
     def find(self, name: str, folder: Path, **options: Any) -> Any | None:
-        """Return what a record is made into, such as a law, by its name or path; None if it is of another kind."""
+        """Return what a record of a name or path is made into, such as a law; None if it is of another kind."""
 
     def request(self, name: str) -> Any | None:
         """Return what a name or file requests of `fit`, checked; None if it is of another kind."""
@@ -37,12 +37,6 @@ class KindModule(Protocol):
 
     def read(self, path: Path) -> dict[str, Any]:
         """Return all that a record says; RecordError in one line on one that is damaged."""
-
-
-def require_none(options: Iterable[str], words: str, name: str) -> None:
-    """Raise InputError on an option of `export` that says nothing of a subject, `words` what it is."""
-    for option in options:
-        raise InputError(f"{option} must be left out where NAME is {words}, got {name!r}")
 
 
 @dataclass(frozen=True)
@@ -70,21 +64,18 @@ class Kind:
     def module(self) -> KindModule:
         return cast(KindModule, import_module(f"{__name__}.{self.key}"))
 
-    def paths(self, fits: Path | None = None) -> dict[str, Path]:
-        """Return its records by name: of the folder requested, else of ./fits beside those shipped.
-
-        Those of "./fits" come before those of the same name that ship.
-        """
-        found: dict[str, Path] = {}
-        for place in reversed(self.places(fits)):
-            found |= available(place / self.folder)
-        return dict(sorted(found.items(), key=lambda item: item[1].name))
-
     def places(self, fits: Path | None = None) -> tuple[Path, ...]:
         """Return the folders that a name is looked up in: of laws and maps, which refer to one another, one."""
         if not self.folder:
             return (known_folder(fits),)
         return (fits,) if fits else (LOCAL, fits_folder())
+
+    def paths(self, fits: Path | None = None) -> dict[str, Path]:
+        """Return its records by name, from a folder of records, or from `places`."""
+        found: dict[str, Path] = {}
+        for place in reversed(self.places(fits)):
+            found |= available(place / self.folder)
+        return dict(sorted(found.items(), key=lambda item: item[1].name))
 
     def root(self, path: Path) -> Path:
         """Return the folder of records that a record of this kind lies in."""
@@ -95,13 +86,7 @@ class Kind:
         return sorted(path.stem for path in (fits_folder() / self.folder).glob(f"*.{self.ending}"))
 
     def find(self, name: str, fits: Path | None = None, **options: Any) -> Any | None:
-        """Return what a record of a name is made into, or None; InputError on an option that says nothing of its kind.
-
-        Args:
-            name: of a record, or what else the kind has: the path of a record (.json), the name of a law.
-            fits: folder of records; None stands for those of `paths`.
-            options: of `export`, those that were given.
-        """
+        """Return what a name is made into, None if it is of another kind; InputError on an option that says nothing."""
         own = {key: value for key, value in options.items() if key in self.options}
         for folder in self.places(fits):
             if (found := self.module.find(name, folder, **own)) is not None:
@@ -111,24 +96,27 @@ class Kind:
 
 
 NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
-LAW_OPTIONS = ("constants", "n", "g")
+OF_LAWS = ("constants", "n", "g")
+NOT_OF_STACKS = ("quality", "html", "figures")
 KINDS: tuple[Kind, ...] = (
-    Kind("law", "a law", plural="recipes", forms=tuple(PROFILES), options=LAW_OPTIONS),
-    Kind("albedo_map", "a map", plural="recipes", forms=tuple(MAPS), options=LAW_OPTIONS),
-    Kind("stack", "a stack", STACKS, plural="stacks", apart=("quality", "html", "figures"), is_listed=True),
-    Kind("gaussians", "a sum of Gaussians", SUMS, plural="stacks", apart=("quality", "html", "figures")),
-    Kind(
-        "phase", "a phase function", PHASES, "csv", "tables", apart=("quality", "claims", "markdown", "html", "figures")
-    ),
+    Kind("law", "a law", plural="recipes", forms=tuple(PROFILES), options=OF_LAWS),
+    Kind("albedo_map", "a map", plural="recipes", forms=tuple(MAPS), options=OF_LAWS),
+    Kind("stack", "a stack", STACKS, plural="stacks", apart=NOT_OF_STACKS, is_listed=True),
+    Kind("gaussians", "a sum of Gaussians", SUMS, plural="stacks", apart=NOT_OF_STACKS),
+    Kind("phase", "a phase function", PHASES, "csv", "tables", apart=("claims", "markdown", *NOT_OF_STACKS)),
 )
+Chosen = tuple[Kind, str, Path]
+
+
+def require_none(options: Iterable[str], words: str, name: str) -> None:
+    """Raise InputError on an option of `export` that says nothing of a subject, `words` what it is."""
+    for option in options:
+        raise InputError(f"{option} must be left out where NAME is {words}, got {name!r}")
 
 
 def names(kinds: Iterable[Kind], fits: Path | None = None, forms: bool = True) -> Iterator[str]:
     """Return the names by which kinds are found, each once: of records and, with `forms`, of what needs none."""
     yield from dict.fromkeys(name for kind in kinds for name in (*(kind.forms if forms else ()), *kind.paths(fits)))
-
-
-Chosen = tuple[Kind, str, Path]
 
 
 def records_of(names: Sequence[str], fits: Path | None = None) -> list[Chosen]:
@@ -146,17 +134,7 @@ def records_of(names: Sequence[str], fits: Path | None = None) -> list[Chosen]:
         if not own:
             raise _no_record(name, known, known_folder(fits))
         root = own[0][0].root(own[0][2])
-        found += [(kind, name, path) for kind, _, path in own if kind.root(path) == root]
-    return found
-
-
-def by_kind(chosen: Iterable[Chosen] | None, folder: Path) -> dict[Kind, dict[str, Path]]:
-    """Return the files of records by their name for every kind: of those chosen, or of all in a folder of records."""
-    if chosen is None:
-        return {kind: kind.paths(folder) for kind in KINDS}
-    found: dict[Kind, dict[str, Path]] = {kind: {} for kind in KINDS}
-    for kind, name, path in chosen:
-        found[kind][name] = path
+        found += [one for one in own if one[0].root(one[2]) == root]
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from mcml_sim import Orders
@@ -10,20 +11,10 @@ from profilefit.recipes import pipelines
 from profilefit.recipes.catalogue import find_map as find
 from profilefit.recipes.pipelines import Pipeline, described_fit, judged, places, printed_laws, read
 from profilefit.recipes.recipe import Recipe
-from profilefit.recipes.run import RecipeRun, RecordContent, Work
+from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.summary import curves
 
 __all__ = ["find", "fit", "quality", "read", "request"]
-
-
-def request(name: str) -> Recipe | None:
-    """Return the recipe of a name or file, None if it is of something else."""
-    return pipelines.request(name, PIPELINES)
-
-
-def fit(recipe: Recipe, run: RecipeRun) -> Work:
-    """Return the record to be made of a recipe."""
-    return pipelines.work(recipe, run, PIPELINES)
 
 
 def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
@@ -45,3 +36,5 @@ def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordConte
 
 
 PIPELINES: dict[str, Pipeline] = {"albedo": _albedo}
+request = partial(pipelines.request, pipelines=PIPELINES)
+fit = partial(pipelines.work, pipelines=PIPELINES)

@@ -27,9 +27,8 @@ from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TAB
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
-from profilefit.recipes.stack.gaussians import SumLight
+from profilefit.recipes.stack.gaussians import SumLight, constant_names, errors, quality
 from profilefit.recipes.stack.photons import Tracing
-from profilefit.recipes.stack.sum_errors import constant_names, errors, quality
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 PIPELINE = "gaussians"
@@ -197,13 +196,9 @@ def _of_light(media: tuple[Medium, ...], illumination: str, tracing: Tracing) ->
         "arrays": {
             f"{channel}_{key}": array
             for channel, light in zip(CHANNELS, lights, strict=True)
-            for key, array in zip(ARRAYS, _arrays(light), strict=True)
+            for key, array in zip(ARRAYS, (*light[:3], light.noise, np.array([light.whole, light.inside])), strict=True)
         },
     }
-
-
-def _arrays(light: SumLight) -> tuple[np.ndarray, ...]:
-    return light.edges, light.energy, light.weight, light.noise, np.array([light.whole, light.inside])
 
 
 def _content(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue, pipelines, starts
 from profilefit.recipes.catalogue import find_law as find
+from profilefit.recipes.paper.protocol import ExactTruth, TallyTruth, Truth
 from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
-from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
 from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
     Pipeline,
@@ -30,23 +31,13 @@ from profilefit.recipes.pipelines import (
     read,
 )
 from profilefit.recipes.recipe import Recipe, RingLayout
-from profilefit.recipes.record_folder import Records
-from profilefit.recipes.run import RecipeRun, RecordContent, Work
+from profilefit.recipes.record import Records
+from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.summary import curves, errors_by_name
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
-
-
-def request(name: str) -> Recipe | None:
-    """Return the recipe of a name or file, None if it is of something else."""
-    return pipelines.request(name, PIPELINES)
-
-
-def fit(recipe: Recipe, run: RecipeRun) -> Work:
-    """Return the record to be made of a recipe."""
-    return pipelines.work(recipe, run, PIPELINES)
 
 
 def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
@@ -144,3 +135,5 @@ PIPELINES: dict[str, Pipeline] = {
     "inverse": _inverse,
     "evidence": _evidence,
 }
+request = partial(pipelines.request, pipelines=PIPELINES)
+fit = partial(pipelines.work, pipelines=PIPELINES)

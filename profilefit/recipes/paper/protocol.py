@@ -1,4 +1,4 @@
-"""The paper's fit of (7) at one albedo, with each choice that it leaves unsaid as a field.
+"""The paper's fit of (7) at one albedo, each choice that it leaves unsaid as a field, and the truths it is made to.
 
 Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
 Software); equation numbers are that paper's.
@@ -7,20 +7,28 @@ Software); equation numbers are that paper's.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
+from mcml_sim import exact
+from mcml_sim.media.setting import Setting
+from mcml_sim.results.orders import Orders
 from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.fitting.solver import solve_batch
 
 Floats = NDArray[np.float64]
 EPSILON = 0.005  # of the trimming (6)
+SEARCHLIGHT = Setting()
+# MCML's usual hundredth of a mean free path; beyond 25 mfp (6) never walks for alpha <= .9986 [mfp].
+RING_WIDTH, LAST_RADIUS = 0.01, 30.0
 
 
 @dataclass(frozen=True)
 class Protocol7:
-    """What (6)-(7) leave unsaid: how wide rings are, where their centre is, what is trimmed where, what R' carries.
+    """Choices that (6)-(7) leave open: width of rings, place of their centre, what is trimmed where, what R' carries.
 
     rings    of the truth merged into one [-]
     centre   "middle", or "corrected": MCML's (i + 1/2 + 1 / (12 (i + 1/2))) dr
@@ -56,7 +64,7 @@ class Coefficients:
 
 
 def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
-    """The same rings for some of the albedos only; `alpha` must be among them."""
+    """Return the same rings for some of the albedos only; `alpha` must be among them."""
     rows = np.searchsorted(profiles.alpha, alpha)
     return Profiles(
         profiles.alpha[rows],
@@ -72,8 +80,10 @@ def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
 
 def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
     """(7) at each albedo by unweighted least squares over the rings that (6) keeps; `mfp` in units of (6)'s strides."""
-    edges, energy = _merged(profiles, protocol.rings)
-    r = _centres(edges, protocol.centre)
+    rings, whole = protocol.rings, profiles.energy.shape[1] // protocol.rings  # what is left over at the end is dropped
+    energy = profiles.energy[:, : whole * rings].reshape(profiles.alpha.size, whole, rings).sum(axis=2)
+    edges, index = profiles.r_edges[: whole * rings + 1 : rings], np.arange(whole) + 0.5
+    r = (index + (1 / (12 * index) if protocol.centre == "corrected" else 0.0)) * edges[1]
     value = energy / (np.pi * np.diff(edges**2))
     quantities = {"R_d": value, "r R_d": r * value, "2 pi r R_d": 2 * np.pi * r * value}
     data = quantities[protocol.fitted]
@@ -83,19 +93,6 @@ def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) 
     starts = np.stack([_linear_start(r, row, keep > 0) for row, keep in zip(data / scale, used, strict=True)])
     solutions = solve_batch(_rational_misfit, starts, (np.broadcast_to(r, data.shape), data / scale, used))
     return Coefficients(profiles.alpha, np.stack([s.parameters for s in solutions]) * scale ** [1, 1, 0], cut)
-
-
-def _merged(profiles: Profiles, rings: int) -> tuple[Floats, Floats]:
-    """Edges [mfp] and energies [-] with every `rings` rings in one; what is left over at the end is dropped."""
-    whole = profiles.energy.shape[1] // rings
-    energy = profiles.energy[:, : whole * rings].reshape(profiles.alpha.size, whole, rings).sum(axis=2)
-    return profiles.r_edges[: whole * rings + 1 : rings], energy
-
-
-def _centres(edges: Floats, centre: str) -> Floats:
-    """Where a ring's mean stands [mfp]."""
-    index = np.arange(edges.size - 1) + 0.5
-    return (index + (1 / (12 * index) if centre == "corrected" else 0.0)) * edges[1]
 
 
 def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:
@@ -118,3 +115,63 @@ def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
 def _rational_misfit(p, item):
     r, data, used = item
     return used * ((p[0] * r + p[1]) / (r + p[2]) - data)
+
+
+class Truth(Protocol):
+    """Source of reflectances and fine even rings."""
+
+    def reflectance(self, alpha: Floats) -> Floats:
+        """A (m,) [-]."""
+
+    def profiles(self, alpha: Floats) -> Profiles:
+        """On even rings from 0."""
+
+
+@dataclass(frozen=True)
+class ExactTruth:
+    """The half space without noise, on rings of `ring_width` up to `last_radius` [mfp]."""
+
+    ring_width: float = RING_WIDTH
+    last_radius: float = LAST_RADIUS
+    setting: Setting = SEARCHLIGHT
+
+    def reflectance(self, alpha: Floats) -> Floats:
+        return np.asarray(exact.reflectance(alpha, setting=self.setting))
+
+    def profiles(self, alpha: Floats) -> Profiles:
+        """Ring energies by Simpson's rule on a spline of ln(2 pi r R_d): within 1e-5 of the exact integrals."""
+        half = np.arange(2 * round(self.last_radius / self.ring_width) + 1) * self.ring_width / 2
+        nodes = np.geomspace(half[1] / 2, half[-1], 120)
+        values = 2 * np.pi * nodes * np.asarray(exact.profile(nodes, alpha[:, None], setting=self.setting))
+        density = np.exp(CubicSpline(np.log(nodes), np.log(values), axis=1)(np.log(np.maximum(half, nodes[0]))))
+        energy = self.ring_width / 6 * (density[:, :-2:2] + 4 * density[:, 1::2] + density[:, 2::2])
+        inside = np.asarray(exact.cdf(half[2], alpha, setting=self.setting))  # r ln r at the source defeats Simpson
+        energy[:, 0] = self.reflectance(alpha) * inside
+        beyond = self.reflectance(alpha) - energy.sum(axis=1)
+        none = np.zeros_like(energy)
+        return Profiles(alpha, half[::2], energy, none, none + np.inf, beyond, "exact", self.setting)
+
+
+@dataclass(frozen=True)
+class TallyTruth:
+    """Reflectances and rings of photons: an order-resolved run on fine even rings up to 25 mfp or more."""
+
+    orders: Orders
+
+    def reflectance(self, alpha: Floats) -> Floats:
+        return np.asarray(self.orders.reflectance(alpha).value)
+
+    def profiles(self, alpha: Floats) -> Profiles:
+        # Without the covariance between albedos, which no reading uses and sixty albedos would wait minutes for.
+        energy = self.orders.energy(alpha)
+        return Profiles(
+            alpha,
+            self.orders.grid.r_edges,
+            np.asarray(energy.value),
+            np.asarray(energy.standard_error),
+            np.asarray(energy.effective_samples),
+            np.asarray(self.orders.overflow(alpha).value),
+            "orders",
+            self.orders.setting,
+            self.orders.photons,
+        )

@@ -1,4 +1,4 @@
-"""Which of the paper's constants come out of its own protocol, under which reading of what it leaves unsaid.
+"""Readings of what the paper leaves unsaid, and the constants that its own protocol gives under each.
 
 Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
 Software); equation numbers are that paper's. It does not state ring width, ring centre, the quantity that (6) trims,
@@ -20,8 +20,7 @@ from mcml_sim import exact
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Solution, least_squares
 from profilefit.laws import published
-from profilefit.recipes.paper.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
-from profilefit.recipes.paper.truth import ExactTruth, Truth
+from profilefit.recipes.paper.protocol import Coefficients, ExactTruth, Protocol7, Truth, fit_coefficients, profiles_at
 
 Floats = NDArray[np.float64]
 # A law is reproduced when its curve is within 5 % rms of the printed one over the albedos, and each constant too.
@@ -122,7 +121,7 @@ def k2_law(alpha, p):
 
 
 def samplings() -> dict[str, Floats]:
-    """Where albedos may stand: evenly in alpha, in A, in sqrt(1 - alpha). A choice, and no data."""
+    """Return grids of albedos: even in alpha, in A, in sqrt(1 - alpha). A choice, and no data."""
     table = np.concatenate([np.linspace(0.01, 0.99, 197), 1.0 - np.geomspace(9e-3, 1e-5, 60)])
     of_reflectance = np.interp(np.linspace(0.05, 0.9, 20), np.asarray(exact.reflectance(table)), table)
     return {
@@ -176,12 +175,11 @@ def _reading(
     return Reading(equation, choices, constants, dict(printed), *distances, verdict, evidence, result)
 
 
-def _misfit_of(law: Callable) -> Callable:
-    return lambda p, item: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
-
-
 # One function object a law, so that each compiles once.
-_MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)}
+_MISFITS = {
+    law: lambda p, item, law=law: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
+    for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)
+}
 
 
 def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from profilefit.fitting.profiles import Profiles
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, Material
-from profilefit.recipes.paper.protocol import cut_radius
+from profilefit.recipes.paper.protocol import ExactTruth, Truth, cut_radius
 from profilefit.recipes.paper.reproduction import CORRECTED_B0, PUBLISHED, law_energy, printed_coefficients
-from profilefit.recipes.paper.truth import ExactTruth, Truth
 
 Floats = NDArray[np.float64]
 PRINTED_B0 = PUBLISHED["(13)"]["b0"]
@@ -79,7 +78,7 @@ class Table1Row:
 
 @dataclass(frozen=True)
 class HalvesCheck:
-    """Whether two printed halves average to the printed whole: a test of print alone.
+    """Return whether two printed halves average to the printed whole: a test of print alone.
 
     off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
     """
@@ -113,7 +112,7 @@ def printed_halves() -> tuple[HalvesCheck, ...]:
 
 
 def mean_squared_errors(law: Floats, data: Floats) -> Triple:
-    """Of the first half of the samples, the second half and all."""
+    """Return values of the first half of the samples, the second half and all."""
     first, second, whole = (float(np.mean((law[s] - data[s]) ** 2)) for s in _halves(data.size))
     return first, second, whole
 

@@ -97,7 +97,7 @@ class PhaseData:
         return replace(self, angles=self.angles[seen], values=self.values[seen], sigma=sigma)
 
     def within(self, low: float, high: float) -> NDArray[np.bool_]:
-        """Which rows lie at angles low ... high [degrees]."""
+        """Return a mask (n,) of the rows at angles low ... high [degrees]."""
         degrees = np.degrees(self.angles)
         return (degrees >= low - 1e-9) & (degrees <= high + 1e-9)
 
@@ -119,8 +119,13 @@ def read_phase(path: Path) -> PhaseData:
     units = _header(path, *kept[0])
     if not FEWEST_ROWS <= len(kept) - 1 <= MOST_ROWS:
         raise InputError(f"{path}: expected {FEWEST_ROWS} to {MOST_ROWS} rows under the header, got {len(kept) - 1}")
-    rows = np.array([_row(path, at, line, tuple(units)) for at, line in kept[1:]])
-    column = dict(zip(units, rows.T, strict=True))
+    rows = []
+    for at, line in kept[1:]:
+        cells = [cell.strip() for cell in line.split(",")]
+        if len(cells) != len(units):
+            raise InputError(f"{path}:{at}: expected {len(units)} cells, as the header has, got {len(cells)}")
+        rows.append([_number(path, at, name, cell) for name, cell in zip(units, cells, strict=True)])
+    column = dict(zip(units, np.array(rows).T, strict=True))
     degrees, values = column["angle"], column["value"]
     for (at, _), before, angle, value in zip(kept[1:], [-1.0, *degrees[:-1]], degrees, values, strict=True):
         if not 0 <= angle <= 180 or angle <= before:
@@ -203,13 +208,6 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
         unit = f"[{units['value']}]" if units["value"] else "none"
         raise InputError(f"{path}:{at}: expected sigma in the unit of value, {unit}, got [{units['sigma']}]")
     return units
-
-
-def _row(path: Path, at: int, line: str, names: tuple[str, ...]) -> list[float]:
-    cells = [cell.strip() for cell in line.split(",")]
-    if len(cells) != len(names):
-        raise InputError(f"{path}:{at}: expected {len(names)} cells, as the header has, got {len(cells)}")
-    return [_number(path, at, name, cell) for name, cell in zip(names, cells, strict=True)]
 
 
 def _number(path: Path, at: int, name: str, cell: str) -> float:

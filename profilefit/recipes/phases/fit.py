@@ -59,7 +59,7 @@ class PhaseFit:
 
     @property
     def result(self) -> str:
-        """How the fit ended; a form whose few numbers cannot keep the moments says so."""
+        """Result of the fit in words; a form whose few numbers cannot keep the moments says so."""
         own = self.mean_cosine, self.backscattered
         off = {name: abs(own[at] - self.moments[at]) for at, name in enumerate(MOMENTS) if name in self.held}
         missed = [name.replace("_", " ") for name, one in off.items() if one > MET * self.moments[MOMENTS.index(name)]]
@@ -132,7 +132,7 @@ def _rms(off: Floats) -> float:
 
 
 def _arrays(data: PhaseData, used: NDArray[np.bool_], moments: tuple[float, float]) -> tuple[Floats, ...]:
-    """Cosines, ln values, weights whose squares have the mean 1, and moments."""
+    """Return cosines, ln values, weights whose squares have the mean 1, and moments."""
     weight = np.where(used, 1.0 if data.sigma is None else 1.0 / data.sigma, 0.0)
     weight = weight / np.sqrt(np.sum(weight**2) / np.count_nonzero(used))
     return np.cos(data.angles), np.log(data.values), weight, np.array(moments)
@@ -163,7 +163,7 @@ def _errors(
     data: PhaseData,
     used: NDArray[np.bool_],
 ) -> dict[str, Floats | None]:
-    """Of the constants (c,); NaN in each where the fit failed.
+    """Return the errors of the constants (c,), by their names in records; NaN in each where the fit failed.
 
     statistical  of the table's own sigma, None where it has none;  discretisation  None: rows are no integrals
     model        the misfit as a random function of ln angle (`fitting.discrepancy`);  misfit  as if rows were

@@ -89,7 +89,7 @@ class ThicknessMap:
 
 @dataclass(frozen=True)
 class LayerStack:
-    """What a file says of its layers.
+    """Layers of a file.
 
     unit     of lengths; coefficients are in 1/unit
     media    of red, green and blue light, equal where every coefficient is one number; air above and below
@@ -106,7 +106,7 @@ class LayerStack:
 
     @property
     def is_grey(self) -> bool:
-        """Whether the three colours are one."""
+        """Return whether the three colours are one."""
         return self.media[0] == self.media[1] == self.media[2]
 
     @property
@@ -230,7 +230,7 @@ def _of_material(tables: Tables, where: str, table: Table, unit: str) -> tuple[s
 
 
 def _line(tables: Tables, where: str, key: str, value: object) -> str:
-    """The same, if it is a text of one printable line."""
+    """Return the value if it is a text of one printable line."""
     if not isinstance(value, str) or not value.isprintable() or len(value) > LONGEST_LINE:
         raise tables.bad(where, key, f"a text of {LONGEST_LINE} characters at most", value)
     return value
@@ -281,7 +281,7 @@ def _values(tables: Tables, where: str, name: str) -> Floats:
 
 
 def _bytes(tables: Tables, where: str, path: Path, refused: Refusal) -> bytes:
-    """All of a regular file: a pipe would be waited for, and a device has no end."""
+    """Read all of a regular file: a pipe would be waited for, and a device has no end."""
     try:
         status = path.stat()
     except (OSError, ValueError) as error:

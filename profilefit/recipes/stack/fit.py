@@ -71,12 +71,12 @@ class Interface(NamedTuple):
 
     @property
     def is_traced(self) -> bool:
-        """Whether its light has photons."""
+        """Return whether its light has photons."""
         return isinstance(self.lights[0], TracedRings)
 
 
 def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | LayerLaw:
-    """The law of a stack of layers of one index, fitted to its light.
+    """Fit the law of a stack of layers of one index to its light.
 
     medium        layers from the surface down, the last one infinite; one n in [1, 1.6] over that above, g in [0, 0.95]
     illumination  "searchlight" or "diffuse"
@@ -148,7 +148,7 @@ def rings_of(medium: Medium, d: float, illumination: str, number: int, tracing: 
 
 
 def errors(one: Interface) -> dict[str, dict[str, float | None]]:
-    """Errors of an interface's constants, by the names that records have for them; None where there can be none.
+    """Return the errors of an interface's constants, by their names in records; None where there can be none.
 
     statistical     that of the photons, by the sandwich formula; none where light is exact
     discretisation  what a refit to light of fewer nodes changes; none of rings, which are integrals
@@ -208,7 +208,7 @@ def _noise(one: Interface) -> Floats:
 
 
 def radii(medium: Medium) -> Floats:
-    """As far as light of its slowest layer goes [length]."""
+    """Return radii as far as light of its slowest layer goes [length]."""
     slowest = max(
         min(layer.mfp / max(float(half_space.decay_rate(layer.alpha)), 1e-12), LONGEST_DECAY * layer.mfp)
         for layer in medium.layers
@@ -221,7 +221,7 @@ def _vector(law: StackLaw):
 
 
 def require_exact(tables: Tables, stack: LayerStack, what: str) -> None:
-    """InputError, in the words of a scene's file, on a stack of which no exact light is known, or not in millimetres.
+    """Raise InputError, in words of a scene's file, on a stack whose exact light is unknown, or not in millimetres.
 
     what  is in that unit, too
     """
@@ -259,12 +259,12 @@ def require(medium: Medium) -> None:
 
 
 def setting_of(medium: Medium, illumination: str) -> Setting:
-    """Of a stack's light: of its half spaces, where all scatter isotropically."""
+    """Return the setting of a stack's light, and of its half spaces where all scatter isotropically."""
     return Setting(illumination, n=medium.layers[0].n / medium.n_above)
 
 
 def _thicknesses(layer: Layer, is_below: bool) -> Floats:
-    """Those to fit at, the layer's own among them [length]."""
+    """Return thicknesses to fit at, the layer's own among them [length]."""
     if is_below:
         return layer.thickness * np.array(INSIDE)
     rate = float(half_space.decay_rate(layer.alpha))
@@ -273,7 +273,7 @@ def _thicknesses(layer: Layer, is_below: bool) -> Floats:
 
 
 def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = NODES) -> tuple[Floats, ...]:
-    """Under a first layer of thickness d: radii [length], R_d there, weights of the radii, and A."""
+    """Return light under a first layer of thickness d: radii [length], R_d there, weights of the radii, and A."""
     light, r = exact.solve(medium.with_first(d), illumination, nodes), radii(medium)
     seen = np.asarray(light.cdf(r)) <= LAST_SHARE
     value = np.where(seen, np.asarray(light.profile(r)), 1.0)
@@ -288,7 +288,7 @@ def _searched(
     seed: int,
     given: ArrayLike | None = None,
 ) -> tuple[Solution, tuple[Solution, ...]]:
-    """The best optimum of several starts, or that of constants which are given; and all."""
+    """Return the best optimum of several starts, or that of constants which are given; and all."""
     random = np.random.default_rng(seed)
     spread = START + SPREAD * random.standard_normal((STARTS - 2, len(START)))
     starts = [np.array(START), _as_slabs_add(top, below), *spread]
@@ -300,7 +300,7 @@ def _searched(
 
 
 def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
-    """A start whose A(d) is that of slabs of isotropic light that add up, T^2 A_2 / (1 - A_1 A_2) beside A_1: u = 0, w
+    """Return a start whose A(d) is that of added slabs of isotropic light, T^2 A_2 / (1 - A_1 A_2) beside A_1: u = 0, w
     = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over dark a white layer's A falls as h / (d + h), which no other start finds."""
     first, second, rate = float(top.whole()), float(below.whole()), _fading(top, below)
     w = np.clip(first * (first - second) / (1.0 - first * second + 1e-12), 1e-4, 1.0 - min(rate, 0.5))
@@ -308,7 +308,7 @@ def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
 
 
 def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[RingData]) -> Solution:
-    """The optimum from a start; fits to traced light stay near it where nothing speaks against that."""
+    """Return the optimum from a start; fits to traced light stay near it where nothing speaks against that."""
     if isinstance(lights[0], TracedRings):
         rings = [light for light in lights if isinstance(light, TracedRings)]
         arrays = tuple(np.stack([np.asarray(part) for part in column]) for column in zip(*rings, strict=True))
@@ -342,24 +342,21 @@ def _ring_residual(parameters, data):
 
 
 def _counts(weight):
-    """1 of each light (m,) that has weights, else 0."""
     return jnp.any(weight > 0, axis=1).astype(float)
 
 
 def _unbounded(constants: Floats, top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
-    """The parameters (9,) of `_made` that make constants, u moved to where the law is defined."""
+    """Return the parameters (9,) of `_made` that make constants, u moved to where the law is defined."""
     w, u, *others = constants
     least = LOWEST * _fading(top, below)
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(max(u + least, 0.01 * least))), *np.log(others)])
 
 
 def _fading(top: LayerLaw, below: LayerLaw | StackLaw) -> float:
-    """2 kappa l: u is above -`LOWEST` of it."""
     return 2.0 * float(_made(jnp.array(START), top, below, 0.0).fading()) * top.mfp
 
 
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:
-    """A law of unbounded parameters."""
     w, u, *others = at
     constants: list[Any] = [jax.nn.sigmoid(w), jnp.logaddexp(0.0, u), *map(jnp.exp, others)]
     law = StackLaw(top.setting, top, below, thickness, *constants)

@@ -1,4 +1,4 @@
-"""Sums of Gaussians fitted to the light of a stack under its own thicknesses: what blurs that are separable need."""
+"""Sums of Gaussians fitted to the light of a stack, for blurs that are separable: constants, errors and quality."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from scipy.special import expit, log_softmax
 from mcml_sim import Medium, exact
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import judged
+from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance, scaled_inverse
 from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
+from profilefit.materials import CHANNELS
+from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack import fit, photons
 from profilefit.recipes.stack.photons import USUAL, Tracing
 
@@ -30,6 +33,10 @@ OFFSET = 299  # of the seed of traced light
 TO_ONE = 1e3
 SEARCH_WORTH = 1e-8  # as `worth` in `solve`, for the starts. `joint` goes on from the best of them
 TURNS = 10  # of weights that are held at 0 and variances that move, and of fits that go on; three do
+# Neighbouring rings that a refit of the jackknife leaves out together, of some ten to each Gaussian: their residuals
+# are alike, and all of a Gaussian's rings would take the Gaussian along.
+TOGETHER = 3
+NOT_OF = ("statistical_error", "discretisation_error")  # what exact light has none of, and what traced light
 
 
 class SumLight(NamedTuple):
@@ -98,7 +105,7 @@ def lights_of(
 
 
 def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
-    """The sum of 1 to 8 Gaussians nearest to the light of a stack of one index, relatively, over rings even in ln r.
+    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack, over rings even in ln r.
 
     A is the stack's own. InputError as of `stack_law`, and on another count.
     """
@@ -131,7 +138,7 @@ def shared_gaussians(
 
 
 def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
-    """Exact light, so to speak: variances (N,) [length^2], even in their logarithm, and weights (lights, N) >= 0.
+    """Return many Gaussians in place of exact light: variances (N,) [length^2], even in ln, weights (lights, N) >= 0.
 
     Of exact lights with edges in one unit. Rings are right to 1e-3 (root mean square, relative) by some twenty-five
     Gaussians: too many to draw with, but they sum over any surface. Weights sum to 1.
@@ -150,7 +157,7 @@ def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
 
 
 def joint(lights: Sequence[SumLight], count: int) -> JointSum:
-    """The sum nearest to all lights, whose edges are in one unit; weights that would be negative are held at 0.
+    """Fit the sum nearest to all lights, whose edges are in one unit; weights that would be negative are held at 0.
 
     Given the variances, the weights are a problem of least squares with one optimum, which says which of them are 0.
     """
@@ -170,7 +177,7 @@ def joint(lights: Sequence[SumLight], count: int) -> JointSum:
 
 
 def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
+    """Refit: ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
 
     NaN where that fit does not converge.
     """
@@ -180,7 +187,7 @@ def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: Floats) -> Solution:
-    """The optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
+    """Return the optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         values, jacobian = _off(*_parted(offset + slopes @ parameters, len(lights)), lights)
@@ -195,7 +202,7 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
 
 
 def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
+    """Return the Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     variances, count = found.variances, found.variances.size
     values, jacobian = _off(variances, found.weights, lights)
     whole, end = jacobian.T @ jacobian, 0
@@ -214,7 +221,6 @@ def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
-    """The best non-negative weights (m, N) of these variances."""
     found = []
     for light in lights:
         rings = ring_shares(light.edges, variances) * (light.weight * light.whole / light.energy)[:, None]
@@ -245,7 +251,7 @@ def _places(weights: Floats) -> tuple[Floats, Floats]:
 
 
 def ring_shares(edges: Floats, variances: Floats) -> Floats:
-    """What each Gaussian of variances (N,) [length^2] has in rings between edges (n + 1,) [length]: (n, N) [-]."""
+    """Return shares (n, N) [-] of Gaussians of variances (N,) [length^2] in rings between edges (n + 1,) [length]."""
     return _shares(edges, variances)[0]
 
 
@@ -261,7 +267,7 @@ def _shares(edges: Floats, variances: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Solution:
-    """The best of several starts, nearly at its optimum: ln v_1, how ln v rises, ln w_i / w_1 of each, unbounded."""
+    """Return the best of several starts, nearly at its optimum: ln v_1, its rises, ln w_i / w_1 of each, unbounded."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         level, weights, slopes = _of(parameters, len(lights))
@@ -282,7 +288,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
 
 
 def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
-    """Variances (N,) and weights (lights, N) of unbounded parameters."""
+    """Return variances (N,) and weights (lights, N) of unbounded parameters."""
     level, weights, _ = _of(parameters, lights)
     return np.exp(level), weights
 
@@ -303,7 +309,6 @@ def _of(parameters: Floats, lights: int) -> tuple[Floats, Floats, Floats]:
 
 
 def _parted(constants: Floats, lights: int) -> tuple[Floats, Floats]:
-    """Variances (N,) and weights (lights, N) of ln variances and weights in one row."""
     count = constants.size // (lights + 1)
     return np.exp(constants[:count]), constants[count:].reshape(lights, count)
 
@@ -320,3 +325,125 @@ def _off(variances: Floats, weights: Floats, lights: Sequence[SumLight]) -> tupl
         values.append(unit[:, 0] * (shares @ own) - light.weight)
         slopes.append(rows)
     return np.concatenate(values), np.concatenate(slopes)
+
+
+def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
+    """Return the names of a sum's constants in their order: v1 ... vN, red.w1 ... red.wN, ..."""
+    places = range(1, count + 1)
+    return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in channels for i in places)]
+
+
+def errors(
+    found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], fewer: Sequence[SumLight] | None
+) -> dict[str, Floats | None]:
+    """Return the errors (N + m N,) of variances [length^2] and weights [-], by the names that records have for them.
+
+    fewer  the same lights of fewer nodes, None where they are traced
+
+    statistical     that of the photons: their variances carried through the derivative of the optimum, the curvature
+                    of the residuals included; None where light is exact
+    discretisation  what a refit to light of fewer nodes changes; None of traced light, whose rings are integrals
+    model           the misfit as a random function of ln r and sqrt(1 - alpha) of the first layer, by which colours
+                    are alike (`fitting.discrepancy`), carried through the same derivative; NaN where no process fits
+    misfit          s^2 (J^T J)^-1, as if residuals were independent
+    jackknife       refits without a sixth of the rings, of every colour at once; NaN where one does not converge
+    What was not fitted has NaN in each, and so has all where the fit failed.
+    """
+    is_traced = fewer is None
+    if not found.best.converged:
+        none = np.full(len(found.slopes), np.nan)
+        return {name: None if name == NOT_OF[is_traced] else none for name in ERRORS}
+    own = np.concatenate([np.log(found.variances), found.weights.ravel()])
+    gain = _gain(found, lights)
+    noise = np.concatenate([light.noise for light in lights])
+
+    def spread(covariance: Floats) -> Floats:
+        return np.sqrt(np.diag(found.slopes @ covariance @ found.slopes.T))
+
+    by_name: dict[str, Floats | None] = {
+        "statistical_error": spread((gain * noise**2) @ gain.T) if is_traced else None,
+        "discretisation_error": None if fewer is None else np.abs(refitted(found, fewer) - own),
+        "model_error": spread(_model(found, lights, media, gain)),
+        "misfit_error": spread(misfit_covariance(found.best)),
+        "jackknife_error": _jackknife(found, lights),
+    }
+    # From those of ln v to those of v.
+    unit = np.where(found.free, np.append(found.variances, np.ones(found.weights.size)), np.nan)
+    return {name: None if one is None else one * unit for name, one in by_name.items()}
+
+
+def quality(light: SumLight, variances: Floats, weights: Floats) -> dict[str, float]:
+    """Measure a sum of variances (N,) [length^2] and weights (N,) [-] against light whose edges are in that length.
+
+    rel  mean relative error of the rings [-];  rms  its root mean square;  ks  largest error of the cdf at their edges
+    """
+    counts, own = light.weight > 0, ring_shares(light.edges, variances) @ weights
+    data = np.where(counts, light.energy / light.whole, own)
+    off = own[counts] / data[counts] - 1.0
+    first = float(weights @ -np.expm1(-0.5 * light.edges[0] ** 2 / variances))
+    inside = light.inside if np.isfinite(light.inside) else first
+    apart = np.cumsum(np.append(first - inside, own - data))
+    return {
+        "rel": float(np.mean(np.abs(off))),
+        "rms": float(np.sqrt(np.mean(off**2))),
+        "ks": float(np.max(np.abs(apart))),
+    }
+
+
+def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+    """d parameters / d ln energy (p, n) of the rings, A the sum of its rings and of what lies beyond them."""
+    weight = np.concatenate([light.weight for light in lights])
+    # With r = w (m / e - 1): the slope J^T r moves by -J^T (w + 2 r) d ln e.
+    slope = found.best.jacobian * (weight + 2.0 * found.best.residuals)[:, None]
+    raw = scaled_inverse(curvature(found, lights)) @ slope.T
+    parts, end = [], 0
+    for light in lights:
+        begin, end = end, end + len(light.energy)
+        block = raw[:, begin:end]  # of what a sum is fitted to, e / A, not of e
+        parts.append(block - np.outer(block.sum(axis=1), light.energy / light.whole))
+    return np.concatenate(parts, axis=1)
+
+
+def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], gain: Floats) -> Floats:
+    """Covariance (p, p) of the parameters by the process that the residuals are a draw of; NaN where none fits."""
+    weight, noise, middle = (
+        np.concatenate(column)
+        for column in zip(
+            *((one.weight, one.noise, 0.5 * np.log(one.edges[1:] * one.edges[:-1])) for one in lights), strict=True
+        )
+    )
+    counts = weight > 0
+    of = np.repeat(np.arange(len(lights)), [len(light.energy) for light in lights])[counts]
+    live = of == np.arange(len(lights))[:, None]  # (m, k): no ring of one light is one of another
+
+    def placed(values: Floats) -> Floats:
+        """(m, k, ...) of rings (k, ...)."""
+        return live.reshape(*live.shape, *(1,) * (values.ndim - 1)) * values
+
+    off = placed(found.best.residuals[counts] / weight[counts])
+    slope = placed(found.best.jacobian[counts] / weight[counts, None])
+    process = of_residuals(
+        Residuals(
+            table=off,
+            live=live,
+            u=middle[counts],
+            s=np.sqrt([1.0 - medium.layers[0].similar.alpha for medium in media]),
+            slope=slope,
+            noise=placed(noise[counts]).T[:, :, None],
+            influence=np.moveaxis(placed(gain[:, counts].T), -1, 0),
+        )
+    )
+    return process.covariance if process.result != FAILED else np.full_like(process.covariance, np.nan)
+
+
+def _jackknife(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+    """Standard errors of a grouped jackknife over rings (Efron, The Jackknife, 1982, ch. 2)."""
+    moved = []
+    for group in range(JACKKNIFE_GROUPS):
+        fewer = []
+        for light in lights:
+            kept = np.arange(len(light.energy)) // TOGETHER % JACKKNIFE_GROUPS != group
+            fewer.append(light._replace(weight=light.weight * kept))
+        moved.append(refitted(found, fewer))
+    apart = np.array(moved) - np.mean(moved, axis=0)
+    return np.sqrt((JACKKNIFE_GROUPS - 1) / JACKKNIFE_GROUPS * np.sum(apart**2, axis=0))

@@ -96,7 +96,7 @@ def traced(
 
 
 def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
-    """From the source as far as light of the slowest layer goes [length]."""
+    """Return edges from the source as far as light of the slowest layer goes [length]."""
     near = NEAREST * first.similar.mfp
     rates = [max(float(exact.decay_rate(one.similar.alpha)), SLOWEST) / one.similar.mfp for one in layers]
     return np.append(0.0, np.geomspace(near, FARTHEST / min(rates), RINGS))

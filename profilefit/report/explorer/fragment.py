@@ -9,7 +9,7 @@ from string import Template
 
 from mcml_sim import Setting
 from profilefit.materials import MATERIALS
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.report.explorer.exact_tables import COARSE, GRID, KNOTS, LIGHTS, baked
 from profilefit.report.explorer.offered import INDICES, STEP, Offered, first, offered
 from profilefit.report.explorer.still import still

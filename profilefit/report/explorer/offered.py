@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named, profile_laws
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.law_file import export
 
 PREFIX = "law"  # of the names in each text: one law runs at a time

@@ -19,8 +19,7 @@ from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Text
 from profilefit.recipes.catalogue import Named, albedo_laws, all_profiles
-from profilefit.recipes.record import SPANS, record_name, record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import SPANS, Folder, Records, record_name, record_setting
 from profilefit.report.records import (
     SETS,
     TOTAL,

@@ -25,7 +25,7 @@ from profilefit.laws.base import Sampler
 from profilefit.recipes.catalogue import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.targets import albedo_values
 from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check

@@ -12,7 +12,7 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
 from profilefit.recipes.kinds.gaussians import COUNTS, SumRecord, load
-from profilefit.recipes.stack.sum_errors import constant_names, quality
+from profilefit.recipes.stack.gaussians import constant_names, quality
 from profilefit.report.records import largest_error, numbered_errors
 from profilefit.report.tables.cells import column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table

@@ -1,4 +1,4 @@
-"""What a law in float32 may cost: a tenth of the model's own error, which its record states."""
+"""Bounds of the error of float32: a tenth of the model's own error, which its record states."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.recipes.catalogue import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
-from profilefit.recipes.record import record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records, record_setting
 from profilefit.recipes.targets import albedo_values
 
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted
@@ -91,7 +90,7 @@ def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
 
 
 def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting) -> dict[str, float]:
-    """What records state at a setting: of another index or g than their own what they measured around it."""
+    """Return what records state at a setting: of another index or g than their own what they measured around it."""
     found: dict[str, float] = {}
     for name in names:
         content = records.content(name)
@@ -108,7 +107,7 @@ def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, s
 
 
 def _around(setting: Setting, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:
-    """Of an index that was measured its own, else the worse of both neighbours; nothing below the least. The worst of
+    """Return the value at a measured index, else the worse of both neighbours; nothing below the least. The worst of
     all where a law has g."""
     if setting.g:
         return {one: float(np.max(by_index[one])) for one in measures if one in by_index}

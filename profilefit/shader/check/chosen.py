@@ -1,20 +1,18 @@
-"""Which laws and maps a check is of (by name, record or constants, or all that were regenerated), and what it finds."""
+"""Laws and maps that are checked, by name, record or constants, or all that were regenerated; and what checks find."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
-
-import moderngl
 
 from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.half import HalfCheck, check_half
 from profilefit.shader.check.law_check import LawCheck, check_laws
 from profilefit.shader.check.law_cost import Cost, law_costs
@@ -30,7 +28,7 @@ Chosen = tuple[list[Named], list[Named]]
 
 
 def chosen(names: Sequence[str], constants: str | None, folder: Folder) -> Chosen:
-    """Profile laws and maps under these names, or all of them; a name may be a law's, a map's or a record's.
+    """List profile laws and maps under these names, or all of them; a name may be a law's, a map's or a record's.
 
     A law's name means all its settings.
 
@@ -47,21 +45,23 @@ def chosen(names: Sequence[str], constants: str | None, folder: Folder) -> Chose
         return known
     found: Chosen = ([], [])
     for name in names:
-        laws, maps = (_under(name, group) for group in known)
-        if not laws and not maps:
-            laws, maps = _loaded(name, constants, folder)
+        full = catalogue.key_of(name)
+        laws, maps = ([one for one in group if full == one.name or name in one.records] for group in known)
+        if not laws and not maps:  # it is in no list: without constants, or not regenerated; or a mistake
+            one = catalogue.find(name, folder, constants)
+            (maps if isinstance(one.law, AlbedoLaw) else laws).append(one)
         found[0].extend(laws)
         found[1].extend(maps)
     return found
 
 
 def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str:
-    """What a check of these is of: names or "all", so that a part does not pass for the whole."""
+    """Return names or "all" as the scope of a check, so that a part does not pass for the whole."""
     return list(names or ()) or ("all" if constants in (None, REGENERATED) else f"all {constants}")
 
 
 def regenerated(folder: Folder) -> Chosen:
-    """All laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
+    """List all laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
     profiles, maps = catalogue.all_profiles(records), catalogue.albedo_laws(records, matched=False)
     of_laws, of_maps = (
@@ -79,7 +79,7 @@ def _spread(one: Named, records: Records) -> list[Named]:
 
 
 def printed(constants: str, folder: Folder) -> Chosen:
-    """All laws and maps of one printed set that have a text."""
+    """List all laws and maps of one printed set that have a source."""
     wanted = constants.removeprefix("published:")
     laws, maps = (
         [one for one in group if not one.records and one.constants == wanted]
@@ -88,20 +88,9 @@ def printed(constants: str, folder: Folder) -> Chosen:
     return [one for one in laws if one.law.entry.has_text], maps
 
 
-def _under(name: str, group: Sequence[Named]) -> list[Named]:
-    full = catalogue.key_of(name)
-    return [one for one in group if full == one.name or name in one.records]
-
-
-def _loaded(name: str, constants: str | None, folder: Folder) -> Chosen:
-    """A law or map that is in no list: one without constants, one that was not regenerated, or a mistake."""
-    one = catalogue.find(name, folder, constants)
-    return ([], [one]) if isinstance(one.law, AlbedoLaw) else ([one], [])
-
-
 @dataclass(frozen=True)
 class Checked:
-    """All that was measured on one device; `lacking` says why nothing was in half precision."""
+    """Measurements on one device; `lacking` says why nothing was in half precision."""
 
     laws: list[LawCheck]
     maps: list[MapCheck]
@@ -117,7 +106,7 @@ class Checked:
 
     @property
     def is_broken(self) -> bool:
-        """Whether any bound is."""
+        """Verdict: any bound is broken."""
         return any(one.broken for one in self.checks)
 
 
@@ -125,7 +114,8 @@ def checked(those: Chosen, folder: Path, in_half: bool = False, quiet: bool = Tr
     """Check laws and maps, and time their texts; `in_half` in half precision as well. ShaderError without OpenGL."""
     laws, maps = those
     with opened() as context:
-        found = list(tracked(_checks(context, those, folder), "checking", "laws", len(laws) + len(maps), quiet))
+        checks = chain(check_laws(context, laws, folder), (check_map(context, one, folder) for one in maps))
+        found = list(tracked(checks, "checking", "laws", len(laws) + len(maps), quiet))
         with working("timing the sources", quiet):
             costs = law_costs(context, laws, folder)
         halves = (check_half(context, one) for one in laws if in_half)
@@ -137,9 +127,3 @@ def checked(those: Chosen, folder: Path, in_half: bool = False, quiet: bool = Tr
             device=renderer(context),
             lacking="" if half_extension(context) else no_half(context),
         )
-
-
-def _checks(context: moderngl.Context, those: Chosen, folder: Path) -> Iterator[LawCheck | MapCheck]:
-    yield from check_laws(context, those[0], folder)
-    for one in those[1]:
-        yield check_map(context, one, folder)

@@ -60,7 +60,7 @@ class Arguments:
         return np.broadcast_shapes(self.alpha.shape, self.r.shape, self.xi.shape, self.mfp.shape)
 
     def place(self, index: int, of_share: bool = False) -> str:
-        """Where a flat index lies, in words."""
+        """Return the place of a flat index in words."""
         at = np.unravel_index(index, self.shape)
         alpha, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.mfp))
         xi = float(np.broadcast_to(self.xi, self.shape)[at])
@@ -109,7 +109,7 @@ class Spread:
 
 
 def spread(error: Floats, used: Mask, at: Arguments, of_share: bool = False) -> Spread | None:
-    """Of the errors that are used; one that is not a number counts as infinite. None if none is used."""
+    """Return the spread of the errors that are used; one that is no number counts as infinite. None if none is used."""
     if not np.any(used):
         return None
     judged = np.where(used, np.nan_to_num(error, nan=np.inf), -1.0)
@@ -120,7 +120,7 @@ def spread(error: Floats, used: Mask, at: Arguments, of_share: bool = False) -> 
 
 @dataclass(frozen=True)
 class Count:
-    """How many results are no number, infinite, negative, or go the wrong way from the one before; where the first."""
+    """Count results that are no number, infinite, negative, or go the wrong way; and name the first place."""
 
     nan: int
     infinite: int
@@ -133,24 +133,23 @@ class Count:
         return self.nan + self.infinite + self.negative + self.wrong_way
 
     def less(self, other: Count) -> Count:
-        """What is here and not there."""
+        """Return what is counted here and not in another."""
         names = ("nan", "infinite", "negative", "wrong_way")
         return Count(*(getattr(self, name) - getattr(other, name) for name in names))
 
     @property
     def kinds(self) -> str:
-        """What is there, in words."""
+        """Counts in words."""
         kinds = {"NaN": self.nan, "Inf": self.infinite, "negative": self.negative, "not monotone": self.wrong_way}
         return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
 
 
 def bad_numbers(count: Count) -> Bound:
-    """None may be there."""
     return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
 
 
 def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Floats | float = 1.0) -> Count:
-    """What must not be: R_d falls with r, the cdf rises, and so does the radius with xi.
+    """Count what must not be: R_d falls with r, the cdf rises, and so does the radius with xi.
 
     profiled  where profile and cdf count, drawn where radii and their pdf do; both as `Arguments.shape`
     jump      xi (alphas, 1, 1) at which radii begin at 0 anew, 1 where none does
@@ -171,7 +170,7 @@ def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Fl
 
 
 def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
-    """Where a value is no number, infinite, negative, or goes the wrong way."""
+    """Return a mask of values that are no number, infinite, negative, or go the wrong way."""
     wrong = np.zeros(value.shape, bool)
     with np.errstate(invalid="ignore"):
         step, before = np.diff(value, axis=1), value[:, :-1]

@@ -1,4 +1,4 @@
-"""What half precision costs: of what is stored in it, and of computing in it where the driver can.
+"""Cost of half precision: of what is stored in it, and of computing in it where the driver can.
 
 Informs, and breaks nothing: engines store albedo textures and results in float16 and compute in float32.
 """

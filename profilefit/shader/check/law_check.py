@@ -1,4 +1,4 @@
-"""Is a law's text right where it runs? Its float32 against the float64 law and against the exact half space.
+"""Check of a law's source where it runs: its float32 against the float64 law and against the exact half space.
 
 Every law is held to its own model error: rounding below a tenth of it, the errors of the record met by the GPU's own
 numbers, and nothing that is no number, infinite, negative or goes the wrong way where the law says that it holds.
@@ -25,7 +25,7 @@ from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.catalogue import Named
 from profilefit.recipes.pipelines import inversion_error
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, ShaderCheck, Spread, bad_numbers
@@ -80,7 +80,7 @@ class Twin:
         return dense_grid.spread(error, held & inner, at, of_share=True)
 
     def _slope(self, xi: Floats, alpha: Floats, low: Floats, high: Floats) -> Floats:
-        """dx/dxi, between the ends of what a part is drawn at."""
+        """Return dx/dxi, between the ends of what a part is drawn at."""
         rest = np.minimum(xi - low, high - xi)
         return (self.radius(xi + STEP * rest, alpha) - self.radius(xi - STEP * rest, alpha)) / (2.0 * STEP * rest)
 
@@ -94,7 +94,7 @@ class Twin:
 
 
 def _single(x: Floats) -> Mask:
-    """Where no other xi of the grid draws the radius."""
+    """Return a mask of xi whose radius no other xi of the grid draws."""
     found = np.zeros(x.shape, bool)
     earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
     found[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
@@ -102,12 +102,12 @@ def _single(x: Floats) -> Mask:
 
 
 def _inside(share: Floats) -> Mask:
-    """Where difference quotients of a part tell its slope."""
+    """Return a mask of shares where difference quotients of a part have its slope."""
     return np.asarray((share > NEAREST_XI) & (share < FARTHEST_XI))
 
 
 def _jump(law: ProfileLaw, alpha: Floats) -> Floats:
-    """xi at which the law's text begins at x = 0 anew, 1 where it does not."""
+    """Return xi at which the law's source begins at x = 0 anew, 1 where it does not."""
     with jax.enable_x64(True):
         return np.asarray(dense_grid.drawn_by(law).jump(jnp.asarray(alpha)), float)
 
@@ -118,7 +118,7 @@ JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 
 @dataclass(frozen=True)
 class LawCheck(ShaderCheck):
-    """What was found of one law: `rel`, `ks` and `inversion_error`, and
+    """Findings on one law: `rel`, `ks` and `inversion_error`, and
 
     spreads  float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
              cdf; sample as the share between the radii of float32 and float64; pdf of the map against the pdf's text
@@ -169,7 +169,7 @@ def _rounding(
     law: ProfileLaw, found: Values, exact: Values, at: Arguments, profiled: Mask, drawn: Mask
 ) -> tuple[dict[str, Spread], dict[str, float]]:
     """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
-    seen = _of_quality(exact, at)
+    seen = (at.x >= NEAREST) & (exact.cdf <= ENERGY_WITHIN)  # where `rel` looks
     tells = profiled & (exact.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(exact.profile)
     dense = drawn.any(axis=1, keepdims=True) & (exact.pdf * at.mfp > dense_grid.DIMMEST) & np.isfinite(exact.pdf)
     profile = np.abs(found.profile / exact.profile - 1.0)
@@ -189,13 +189,8 @@ def _rounding(
     return {name: one for name, one in spreads.items() if one is not None}, rounding
 
 
-def _of_quality(exact: Values, at: Arguments) -> Mask:
-    """Where `rel` looks: from 0.01 mfp to 99.5 % of the energy."""
-    return (at.x >= NEAREST) & (exact.cdf <= ENERGY_WITHIN)
-
-
 def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> Floats:
-    """Share of the energy between the radius of float32 and that of float64 [-], of the part that both are of."""
+    """Return the share of the energy between the radii of float32 and float64 [-], of the part that both are of."""
     sampler = dense_grid.drawn_by(law)
     there, drawn = exact.sample, np.where(found.sample >= 0, found.sample, np.inf)
     mine, right = (np.asarray(sampler.undone(x, at.xi, at.alpha, at.mfp)) for x in (drawn, there))

@@ -1,4 +1,4 @@
-"""What a law costs on the device at hand: ns per evaluation, and its ratio to normalized diffusion in the same turns.
+"""Cost of a law on the device at hand: ns per evaluation, and its ratio to normalized diffusion in the same turns.
 
 A pixel loops over many evaluations, so that the loop and not the drawing takes the time; what depends on alpha only is
 computed once before the loop, as a renderer does per pixel, but in `material`. The laws take turns, and ratios are
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import check_errors, full_screen, program, seconds
@@ -70,14 +70,14 @@ class TimedText(NamedTuple):
 
 @dataclass(frozen=True)
 class Cost:
-    """By the names of `WORKS`: ns of one evaluation in the fastest turn, and the median ratio to the yardstick."""
+    """Cost by the names of `WORKS`: ns of one evaluation in the fastest turn, and the median ratio to the yardstick."""
 
     ns: dict[str, float]
     ratio: dict[str, float]
 
 
 def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> dict[str, Cost]:
-    """What the laws' texts cost beside printed normalized diffusion; nothing if there is no law."""
+    """Measure the cost of the laws' sources beside printed normalized diffusion; nothing if there is no law."""
     yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
     return costs(context, [one.law for one in laws], yardstick) if laws else {}
 
@@ -92,7 +92,7 @@ def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: Prof
 
 
 def timed_text(law: ProfileLaw) -> TimedText:
-    """That of a law, at an albedo for each pixel."""
+    """Return the source of a law, at an albedo for each pixel."""
     prefix = emit.prefix(law)
     return TimedText(emit.law_text(law), prefix, f"{prefix}_shape(0.05 + 0.9 * start)")
 

@@ -1,4 +1,4 @@
-"""Is the text of a map between A and alpha right where it runs? Judged like a profile law, by its own model error."""
+"""Check of a map's source where it runs, judged like a profile law, by its own model error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.dense_grid import ULP, Count, ShaderCheck, bad_numbers
@@ -27,7 +27,7 @@ STEPS = 4  # of ULP that a falling alpha or A may be rounding
 
 @dataclass(frozen=True)
 class MapCheck(ShaderCheck):
-    """What was found of one map: `delta_A` and `delta_alpha`, and where their rounding is largest, in words."""
+    """Findings on one map: `delta_A` and `delta_alpha`, and where their rounding is largest, in words."""
 
     places: dict[str, str]
 
@@ -73,7 +73,7 @@ def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
 
 
 def _counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_alpha: Range) -> Count:
-    """What must not be: both directions rise."""
+    """Count what must not be: both directions rise."""
     numbers, first = np.zeros(4, int), ""
     for given, value, span, sign in (
         (REFLECTANCE, alpha, of_reflectance, "A"),

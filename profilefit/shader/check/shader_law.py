@@ -53,7 +53,7 @@ void main() {{
 
 @dataclass(frozen=True)
 class Values:
-    """What a law gives at broadcast arguments: profile [1/length^2], cdf [-], sample [length], pdf [1/length]."""
+    """Values of a law at broadcast arguments: profile [1/length^2], cdf [-], sample [length], pdf [1/length]."""
 
     profile: Floats
     cdf: Floats
@@ -86,7 +86,7 @@ class ShaderLaw:
         return self
 
     def values(self, r: ArrayLike, xi: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Values:
-        """All four functions at arguments that broadcast, reduced ones, each rounded to float32 first."""
+        """Evaluate all four functions at arguments that broadcast, reduced ones, each rounded to float32 first."""
         return Values(*self._pass(r, xi, alpha, mfp))
 
     def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:

@@ -1,4 +1,4 @@
-"""What is said of a law: where it holds, and what its paper promises of its printed constants.
+"""Validity of a law: where it holds, and what its paper promises of its printed constants.
 
 What lies outside of where it holds is counted apart and breaks nothing. Promises are measured in float64, where
 rounding is no excuse; equation numbers are those of `laws.liang` and `laws.liang_albedo`.
@@ -18,7 +18,7 @@ from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.recipes.catalogue import Named, profile_laws
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.dense_grid import ULP
 
@@ -29,7 +29,7 @@ SHARES = np.linspace(0.0, 1.0, 2**12, endpoint=False)
 
 @dataclass(frozen=True)
 class Validity:
-    """Where a profile law holds: `alpha` of its profile and cdf, `drawn` and `xi` of its sampler; None nowhere."""
+    """Range of a profile law: `alpha` of its profile and cdf, `drawn` and `xi` of its sampler; None nowhere."""
 
     alpha: Range | None
     drawn: Range | None
@@ -37,7 +37,7 @@ class Validity:
 
 
 def of_profile(one: Named, folder: Folder) -> Validity:
-    """Of a law's own statement; a fitted inverse may hold for the albedos of its record only, and for some of xi.
+    """Return a law's own range; a fitted inverse may hold for the albedos of its record only, and for some of xi.
 
     A record that is of the profile alone, or of the inverse alone, states nothing of the other.
     """
@@ -51,13 +51,13 @@ def of_profile(one: Named, folder: Folder) -> Validity:
 
 
 def _fitted(content: dict[str, Any]) -> Range:
-    """The albedos of a record's protocol."""
+    """Return the albedos of a record's protocol."""
     albedos = content["protocol"]["albedos"]
     return Range(albedos["low"], albedos["high"])
 
 
 def masks(valid: Validity, alpha: Floats, xi: Floats) -> tuple[Mask, Mask]:
-    """Which albedos (m, 1, 1) the profile holds for, and which albedos and shares (m, n, 1) the sampler."""
+    """Return masks of the albedos (m, 1, 1) of the profile, and of albedos and shares (m, n, 1) of the sampler."""
     profiled, drawn = (
         np.zeros(alpha.shape, bool) if span is None else span.holds(alpha) for span in (valid.alpha, valid.drawn)
     )
@@ -75,7 +75,7 @@ def of_map(one: Named, folder: Folder) -> tuple[Range, Range]:
 
 
 def promised_by_profile(one: Named, folder: Folder) -> list[Bound]:
-    """What Liang et al. say of (17), (21) and of alpha = 0; none of other laws, nor of regenerated constants."""
+    """Return what Liang et al. say of (17), (21) and of alpha = 0; none of other laws, nor of regenerated constants."""
     if not isinstance(one.law, Liang) or one.records:
         return []
     regenerated = [law.law for law in profile_laws(folder) if law.records and isinstance(law.law, Liang)]
@@ -102,7 +102,7 @@ def promised_by_profile(one: Named, folder: Folder) -> list[Bound]:
 
 
 def promised_by_map(one: Named) -> list[Bound]:
-    """What they say of (8): one alpha for each A, and alpha(1) = 1."""
+    """Return what they say of (8): one alpha for each A, and alpha(1) = 1."""
     if not isinstance(one.law, LiangAlbedo) or one.records:
         return []
     fold, white = one.law.fold, float(one.law.alpha(1.0))

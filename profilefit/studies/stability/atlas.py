@@ -13,7 +13,7 @@ from profilefit.laws import MAPS
 from profilefit.laws.entry import EVERYWHERE
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check import validity
 from profilefit.studies.stability import (
     exact_cells,

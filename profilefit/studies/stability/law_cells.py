@@ -23,7 +23,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability.cells import (

@@ -17,7 +17,7 @@ from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes.catalogue import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.check.validity import Range

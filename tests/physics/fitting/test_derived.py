@@ -12,8 +12,7 @@ from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import plain
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import Records, plain
 
 pytestmark = pytest.mark.slow
 

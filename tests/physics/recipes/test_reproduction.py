@@ -8,7 +8,7 @@ import pytest
 
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.paper.protocol import Protocol7, cut_radius, fit_coefficients
+from profilefit.recipes.paper.protocol import ExactTruth, Protocol7, cut_radius, fit_coefficients
 from profilefit.recipes.paper.reproduction import (
     CORRECTED_B0,
     PUBLISHED,
@@ -17,7 +17,6 @@ from profilefit.recipes.paper.reproduction import (
     printed_coefficients,
     readings,
 )
-from profilefit.recipes.paper.truth import ExactTruth
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium
-from profilefit.recipes.stack import gaussians, sum_errors
+from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.gaussians import SumLight, joint, refitted, ring_shares
 
 MEDIA = tuple(Medium((Layer(1.4, mu_a, 1.0, 0.0, 0.5), Layer(1.4, 0.3, 1.0, 0.0))) for mu_a in (0.02, 0.1))
@@ -78,7 +78,7 @@ def test_the_statistical_error_is_that_of_repeated_runs(count):
     found = joint(lights, count)
     runs = np.array([refitted(found, lights_of(noise=noise, random=random)) for _ in range(400)])
     runs[:, :count] = np.exp(runs[:, :count])
-    known = sum_errors.errors(found, lights, MEDIA, None)["statistical_error"]
+    known = gaussians.errors(found, lights, MEDIA, None)["statistical_error"]
     np.testing.assert_allclose(known, runs.std(axis=0), rtol=0.14)
     # Negative control: the same without the curvature of the residuals, which only a misfit has.
     inverse = np.linalg.inv(found.best.jacobian.T @ found.best.jacobian)
@@ -93,25 +93,25 @@ def test_a_sum_that_is_the_light_has_no_errors():
     lights = lights_of()
     found = joint(lights, 3)
     np.testing.assert_allclose(constants(found), np.append(VARIANCES, WEIGHTS), rtol=1e-6)
-    known = sum_errors.errors(found, lights, MEDIA, lights)
+    known = gaussians.errors(found, lights, MEDIA, lights)
     assert known["statistical_error"] is None
     assert all(np.max(known[f"{name}_error"]) < 1e-6 for name in ("discretisation", "misfit", "jackknife"))
     for light, own in zip(lights, found.weights, strict=True):
-        assert max(sum_errors.quality(light, found.variances, own).values()) < 1e-6
+        assert max(gaussians.quality(light, found.variances, own).values()) < 1e-6
     worse = joint(lights, 2)
-    known = sum_errors.errors(worse, lights, MEDIA, lights)
+    known = gaussians.errors(worse, lights, MEDIA, lights)
     for name in ("model", "misfit", "jackknife"):
         assert np.all(known[f"{name}_error"] > 3e-3 * constants(worse)), name
     assert np.max(known["discretisation_error"]) < 1e-6
     failed = worse._replace(best=replace(worse.best, result="no convergence"))
-    known = sum_errors.errors(failed, lights, MEDIA, lights)
+    known = gaussians.errors(failed, lights, MEDIA, lights)
     assert [name for name, one in known.items() if one is None] == ["statistical_error"]
     assert all(np.all(np.isnan(one)) for one in known.values() if one is not None)
 
 
 def test_the_discretisation_error_is_what_other_light_changes():
     lights, other = lights_of(), lights_of(VARIANCES * 1.01)
-    known = sum_errors.errors(joint(lights, 3), lights, MEDIA, other)["discretisation_error"]
+    known = gaussians.errors(joint(lights, 3), lights, MEDIA, other)["discretisation_error"]
     np.testing.assert_allclose(known[:3], 0.01 * VARIANCES, rtol=0.01)  # of ln v, to first order
     assert np.max(known[3:]) < 1e-6
 
@@ -127,13 +127,13 @@ def test_a_weight_that_would_be_negative_is_held_at_zero():
     assert not found.free[8]
     assert np.all(found.free[:8])
     assert np.all(np.isclose(found.weights.sum(axis=1), 1.0, atol=1e-12))
-    known = sum_errors.errors(found, lights, MEDIA, lights)
+    known = gaussians.errors(found, lights, MEDIA, lights)
     assert all(np.isnan(one[8]) and np.all(np.isfinite(one[:8])) for one in known.values() if one is not None)
     for share in (1e-4, 1e-3, 1e-2):
         moved = found.weights[1] * (1.0 - share) + share * np.array([0.0, 0.0, 1.0])
         worse = 0.0
         for own, light in zip((found.weights[0], moved), lights, strict=True):
-            worse += sum_errors.quality(light, found.variances, own)["rms"] ** 2
+            worse += gaussians.quality(light, found.variances, own)["rms"] ** 2
         assert worse > found.best.cost
     assert joint(lights_of(), 3).free.all()  # negative control
 
@@ -141,14 +141,14 @@ def test_a_weight_that_would_be_negative_is_held_at_zero():
 def test_quality_is_that_of_the_rings_and_of_what_is_inside():
     """Of one Gaussian for another, by hand."""
     (light,) = lights_of(np.array([1.0]), np.array([[1.0]]))
-    found = sum_errors.quality(light, np.array([1.21]), np.array([1.0]))
+    found = gaussians.quality(light, np.array([1.21]), np.array([1.0]))
     x, y = np.exp(-0.5 * EDGES**2), np.exp(-0.5 * EDGES**2 / 1.21)
     off = np.diff(y) / np.diff(x) - 1.0
     assert found["rel"] == pytest.approx(np.mean(np.abs(off)))
     assert found["rms"] == pytest.approx(np.sqrt(np.mean(off**2)))
     assert found["ks"] == pytest.approx(np.max(np.abs(x - y)))
     unknown = light._replace(inside=np.nan)  # as of photons: the sum's own stands for it
-    ks = sum_errors.quality(unknown, np.array([1.21]), np.array([1.0]))["ks"]
+    ks = gaussians.quality(unknown, np.array([1.21]), np.array([1.0]))["ks"]
     assert ks == pytest.approx(np.max(np.abs(x - y - x[0] + y[0])))
 
 
@@ -157,7 +157,7 @@ def test_traced_light_has_a_statistical_error_and_none_of_nodes():
     forward = Medium((Layer(1.38, 0.2, 22.0, 0.9, 0.3), Layer(1.38, 0.8, 12.0, 0.9)))
     lights = gaussians.lights_of((forward,), "diffuse")
     found = joint(lights, 4)
-    known = sum_errors.errors(found, lights, (forward,), None)
+    known = gaussians.errors(found, lights, (forward,), None)
     assert known["discretisation_error"] is None
     for name in ("statistical", "model", "misfit", "jackknife"):
         assert np.all(known[f"{name}_error"] > 0), name

@@ -7,7 +7,7 @@ import pytest
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import Records
 
 
 def test_the_worst_is_the_largest_but_where_large_is_good():

@@ -19,7 +19,7 @@ from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record, starts
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import Records
 from profilefit.shader import emit
 
 CLASSES = {**{f"map {name}": kind for name, kind in laws.map_classes().items()}, **laws.profile_classes()}

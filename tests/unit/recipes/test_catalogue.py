@@ -12,8 +12,7 @@ from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
 from profilefit.laws.published import SETS
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import record_name
-from profilefit.recipes.record_folder import Records
+from profilefit.recipes.record import Records, record_name
 
 
 def constants_of(law, name):

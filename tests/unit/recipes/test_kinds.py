@@ -3,16 +3,25 @@
 import inspect
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mcml_sim import Layer, Medium
+from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, RecordError
 from profilefit.recipes import kinds
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.kinds import KINDS, Kind, KindModule, by_kind, records_of
+from profilefit.recipes.kinds import KINDS, Kind, KindModule, gaussians, phase, records_of, stack
 from profilefit.recipes.regenerate import requests_of
+from profilefit.recipes.run import RecipeRun
+from profilefit.recipes.stack import photons
+from profilefit.recipes.stack.photons import Tracing
 from tests.unit.cli.conftest import command
+from tests.unit.recipes.stack.test_record import RUN, made
+from tests.unit.recipes.stack.test_sum_record import made_sums
 
 __all__ = ["command"]
 BY_KEY = {kind.key: kind for kind in KINDS}
@@ -71,8 +80,8 @@ def test_every_kind_has_the_functions_of_the_shelf(kind):
     functions = {name for name, one in inspect.getmembers(KindModule, inspect.isfunction) if name[0] != "_"}
     assert functions == {"find", "fit", "quality", "read", "request"}
     assert all(callable(getattr(kind.module, name)) for name in functions)
-    assert list(inspect.signature(kind.module.fit).parameters)[1:] == ["run"]
-    assert len(inspect.signature(kind.module.request).parameters) == 1
+    assert list(inspect.signature(kind.module.fit).parameters)[1] == "run"
+    assert next(iter(inspect.signature(kind.module.request).parameters)) == "name"
     assert list(inspect.signature(kind.module.find).parameters)[:2] == ["name", "folder"]
 
 
@@ -126,15 +135,72 @@ def test_records_of_names_are_those_beside_the_first(tmp_path):
     assert [(kind.key, name) for kind, name, _ in found] == list(
         zip(keys, ["skin", "skin", "hazard", "petzold"], strict=True)
     )
-    groups = by_kind(found, fits_folder())
-    assert {kind.key: list(paths) for kind, paths in groups.items() if paths} == {
-        "law": ["hazard"], "stack": ["skin"], "gaussians": ["skin"], "phase": ["petzold"],
-    }  # fmt: skip
-    assert "heart" in by_kind(None, fits_folder())[BY_KEY["stack"]]
     with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
         records_of(["petzhold"])
     with pytest.raises(RecordError, match="has no records"):
         records_of(["skin"], tmp_path)
+
+
+GIVEN = RecipeRun("full", 7, Path("out"), Path("photons"), 1000)
+
+
+def test_seed_preset_and_store_are_of_every_kind(monkeypatch):
+    """A record says which; where nothing is traced, its note says that they are of no effect."""
+    calls = []
+    monkeypatch.setattr(stack, "_channel", lambda *given: calls.append(given) or made(*given))
+    monkeypatch.setattr(phase, "fit_phase", lambda *given: calls.append(given))
+    for name, module, seed in (("heart", stack, 7), ("heart", gaussians, 306), ("petzold", phase, 7)):
+        request = module.request(name)
+        for run, notes in ((GIVEN, " The preset and number of photons that were given"), (RUN, None)):
+            work = module.fit(request, run)
+            content, _ = work.finish(results_of(module, work))
+            assert (content["preset"], content["seed"]) == (run.preset, seed + run.seed - 7)
+            assert (notes or module.NOTE) in content["note"]
+    tracing = [given[-1] for given in calls if isinstance(given[-1], Tracing)]
+    assert {one.seed for one in tracing} == {1, 7}
+    assert {str(one.store) for one in tracing} == {"None", *(f"photons/stacks/heart-{i}" for i in range(3))}
+    assert {given[-1] for given in calls if not isinstance(given[-1], Tracing)} == {1, 7}
+
+
+def results_of(module, work):
+    """What the parts give, but sums, whose fits take a minute."""
+    if module is phase:
+        work.parts[0]()
+        return [[]]
+    return (
+        [part() for part in work.parts]
+        if module is stack
+        else [{light: made_sums(gaussians.request("heart").stack.media, light) for light in ILLUMINATIONS}]
+    )
+
+
+def test_traced_light_is_that_of_its_run(monkeypatch):
+    """Number of photons, seed and store; a store for each medium, light and seed."""
+    calls = []
+    monkeypatch.setattr(photons, "traced", lambda *given: calls.append(given))
+    edges = np.array([0.0, 1.0])
+    for medium, light, offset in ((1, "diffuse", 0), (2, "diffuse", 0), (1, "searchlight", 0), (1, "diffuse", 3)):
+        Tracing.of(GIVEN, "skin-0").rings(medium, light, edges, 2**20, offset)
+    assert [given[3:5] for given in calls] == [(1000, 7)] * 3 + [(1000, 10)]
+    stores = [given[5] for given in calls]
+    assert len(set(stores)) == 4
+    assert {store.parent for store in stores} == {Path("photons/stacks/skin-0")}
+    Tracing.of(replace(GIVEN, photons=None), "skin-0").rings(1, "diffuse", edges, 2**20, 0)
+    Tracing().rings(1, "diffuse", edges, 2**20, 0)
+    assert [given[3:] for given in calls[-2:]] == [(20 * 2**20, 7, stores[0]), (2**20, 1, None)]
+
+
+@pytest.mark.slow
+def test_traced_light_resumes(tmp_path):
+    medium = Medium((Layer(1.4, 0.1, 10.0, 0.8, 0.5), Layer(1.4, 0.5, 5.0, 0.5, np.inf)))
+    tracing, edges = Tracing(3, 2000, store=tmp_path / "new"), np.append(0.0, np.geomspace(0.01, 10.0, 20))
+    first = tracing.rings(medium, "diffuse", edges, 1, 5)
+    (batch,) = tmp_path.rglob("batch-*")
+    before = batch.stat().st_mtime_ns
+    again, plain = (one.rings(medium, "diffuse", edges, 1, 5) for one in (tracing, tracing._replace(store=None)))
+    assert batch.stat().st_mtime_ns == before
+    for one in (again, plain):
+        np.testing.assert_array_equal(one.energy, first.energy)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
-from profilefit.recipes.stack.sum_errors import constant_names
+from profilefit.recipes.stack.gaussians import constant_names
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source, largest_error

@@ -15,7 +15,7 @@ from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
 from profilefit.recipes.run import alone
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.stack.sum_errors import constant_names
+from profilefit.recipes.stack.gaussians import constant_names
 from tests.unit.recipes.stack.test_record import RUN, STACK, changed
 
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
