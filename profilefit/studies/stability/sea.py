@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from profilefit.scenes.sea import law
 from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
-from profilefit.scenes.sea.request import PHASE, lobes_of
+from profilefit.scenes.sea.scene import PHASE, lobes_of
 from profilefit.scenes.sea.waves import Waves, random_floor
 from profilefit.shader.emit import text_beside
 from profilefit.shader.sea_file import segment_text
