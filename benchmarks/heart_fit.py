@@ -85,7 +85,7 @@ class SplitLight:
 
 
 class Balance(NamedTuple):
-    """constant  of `crossover_of`;  threshold  of the share, above 1 if all that is far comes from the atlas [-]"""
+    """Constant of `crossover_of`, and threshold of the share, above 1 if all that is far comes from the atlas [-]."""
 
     constant: float
     threshold: float
@@ -125,7 +125,7 @@ def errors(scenes: Sequence[SplitLight]) -> Errors:
 
 
 def fitted(found: Errors, draws: int = 200, seed: int = 1) -> tuple[Balance, NDArray[np.float64]]:
-    """The balance of `GRID` with the least mean of ln(error / that of the better space), and (draws, 2) refits.
+    """Return the balance of `GRID` with the least mean of ln(error / that of the better space), and (draws, 2) refits.
 
     Refits are to scenes drawn again with replacement: their spread is the error of both constants.
     """

@@ -70,7 +70,7 @@ class RandomScene:
         return Camera((x, y, z), height=2.1 * half, kind="orthographic")
 
     def striped(self, light: NDArray[np.floating], points: Floats) -> NDArray[np.floating]:
-        """What the lamp's stripes leave of irradiance (..., 3) at points (..., 3)."""
+        """Return irradiance (..., 3) at points (..., 3) under the stripes of the lamp."""
         if self.stripes == 0:
             return light
         across = unit(np.cross(self.lamp, (0.3, 1.0, 0.2)))
@@ -114,7 +114,7 @@ def drawn(kernels: Sequence[Kernel], count: int, seed: int) -> list[RandomScene]
 
 
 def mean_sigma(kernel: Kernel) -> float:
-    """The mean of sigma over the light of all channels [mm]."""
+    """Return the mean of sigma over the light of all channels [mm]."""
     weight = np.atleast_2d(kernel.weights.T).mean(axis=0)
     return float(weight @ np.sqrt(kernel.variances) / weight.sum())
 
@@ -168,21 +168,21 @@ def measured(context: moderngl.Context, trial: RandomScene, most: int = LARGEST)
 
 
 def _aside(eye: Floats, angle: float, turn: float) -> Floats:
-    """A direction at an angle from another one."""
+    """Return a direction at an angle from another one."""
     across = unit(np.cross(eye, (0.31, 0.87, 0.39)))
     up = np.cross(eye, across)
     return np.cos(angle) * eye + np.sin(angle) * (np.cos(turn) * across + np.sin(turn) * up)
 
 
 def _lit(atlas: Atlas, trial: RandomScene) -> None:
-    """The lamp's pattern over the irradiance of an atlas."""
+    """Multiply by the pattern of the lamp the irradiance of an atlas."""
     light, place = atlas.read("irradiance_map"), atlas.read("position_map")
     light[..., :3] = trial.striped(light[..., :3], place[..., :3].astype(float))
     atlas.renderer.write("irradiance_map", light)
 
 
 def _chosen(trial: RandomScene, inside: NDArray[np.bool_], places: Floats) -> tuple[NDArray[np.intp], ...]:
-    """Some of the pixels that see the surface, away from where it ends."""
+    """Return some of the pixels that see the surface, away from where it ends."""
     sigma = float(np.sqrt(trial.kernel.variances[-1]))
     return evenly(inside & meshes.off_edges(trial.kind, trial.size, places, sigma), CHOSEN)
 

@@ -25,12 +25,10 @@ from profilefit.scenes.sea import chart, hits
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.reference import caustic_photons
-from profilefit.scenes.sea.request import lobes_of
-from profilefit.scenes.sea.scene import reference_render
-from profilefit.scenes.sea.truth import caustic_boxes
+from profilefit.scenes.sea.scene import lobes_of, reference_render
+from profilefit.scenes.sea.truth import caustic_boxes, caustic_photons
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves
-from profilefit.scenes.sea.world import World
 from profilefit.shader import opened, renderer
 from profilefit.studies.tradeoff import sea as tradeoff
 

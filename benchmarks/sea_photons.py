@@ -126,8 +126,9 @@ def trace_view(
     seed: int = 0,
     highest: float = HIGHEST,
 ) -> ByOrder:
-    """Radiance that comes to an eye (depths,) in a sea whose whole surface is sunlit [1/sr], per irradiance of the sun
-    across its beam below the surface.
+    """Return the radiance that comes to an eye (depths,) in a sea whose whole surface is sunlit [1/sr].
+
+    It is per irradiance of the sun across its beam below the surface.
 
     depths   (n,) of eyes c t > 0 [-];  cosine  of the view to the downward vertical, 0 horizontal, 1 straight down
     sun      angle of the refracted sun to that vertical [rad], 0 ... pi/2; the view is toward its azimuth

@@ -131,7 +131,7 @@ def _fur(file: str, content: Table, quiet: bool) -> SceneNeed:
     with interruptible(__name__):
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables.choose_table import fur_content, fur_lines
-        from profilefit.scenes.fur.request import read
+        from profilefit.scenes.fur.scene import read
         from profilefit.studies.choose.fur import ANGLES, fur_need
 
     need = fur_need(read(file, content), tracked(ANGLES, "casting rays", "angles", quiet=quiet))

@@ -406,9 +406,9 @@ def renders(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*(f"profilefit/scenes/{one}" for one in SCENES), "tests/unit/scenes/toy"])
 def test_a_scene_has_its_five_names_and_no_renderer(name):
-    folder = ROOT / "profilefit" / "scenes" / name
+    folder = ROOT / name
     assert missing_names(folder) == set()
     assert {path.name: own for path in folder.rglob("*.py") if (own := renders(path))} == {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -12,7 +13,6 @@ from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
 from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
-from profilefit.scenes.fur.request import Shading
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import LayerTechnique
 from profilefit.scenes.stage.buffers import Singles
@@ -27,6 +27,7 @@ FINE = 8.0  # texels of a strand's radius in the maps of nearest feet
 MOST_TEXELS = 2048
 HEIGHTS, LEANS = 64, 12  # of the table of occlusion
 BACKGROUND = (0.02, 0.02, 0.02)
+EXPONENTS, SHIFTS, STRENGTHS, RIM = (60.0, 12.0), (-0.1, 0.2), (0.1, 0.15), (0.0, 0.5, 4.0)
 
 
 class FurSurface(NamedTuple):
@@ -69,6 +70,22 @@ class FurSurface(NamedTuple):
         }
         source = self.text + text_beside(__name__, "glsl/fur.frag")
         return Pass("fur", {"nearest_map": nearest, "next_map": following}, HITS, source, given)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Reflection of strands after Fang et al.: two lobes of Kajiya and Kay, and a rim.
+
+    exponents, shifts, strengths  of the two lobes [-]: shift is the tangent of the angle by which one is turned
+    normalised  whether a lobe's mean over all half vectors is its strength; else that is its peak, as published
+    rim         bias, scale and power
+    """
+
+    exponents: tuple[float, float] = EXPONENTS
+    shifts: tuple[float, float] = SHIFTS
+    strengths: tuple[float, float] = STRENGTHS
+    normalised: bool = True
+    rim: Rgb = RIM
 
 
 class Coat(NamedTuple):

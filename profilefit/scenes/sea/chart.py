@@ -11,8 +11,7 @@ import moderngl
 from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.passes import SeaPasses
-from profilefit.scenes.sea.request import SeaRequest
-from profilefit.scenes.sea.scene import SeaRender, reference_render
+from profilefit.scenes.sea.scene import SeaRender, SeaRequest, reference_render
 from profilefit.scenes.stage.renderer import Renderer
 
 TURNS = 3

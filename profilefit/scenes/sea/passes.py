@@ -14,7 +14,7 @@ from profilefit.scenes.sea.caustics import Caustics, Splat
 from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways
 from profilefit.scenes.sea.haze import table as fade_table
 from profilefit.scenes.sea.law import water_gaussians
-from profilefit.scenes.sea.world import World
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass, Read, Renderer
 from profilefit.scenes.stage.world import Camera, unit

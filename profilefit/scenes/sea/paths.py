@@ -16,9 +16,9 @@ from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
 from profilefit.scenes.sea.hits import first_hit
-from profilefit.scenes.sea.reference import Photons, boxes
+from profilefit.scenes.sea.truth import Photons, boxes
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, refracted
-from profilefit.scenes.sea.world import World
 
 Floats = NDArray[np.float64]
 LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile

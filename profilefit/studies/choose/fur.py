@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from profilefit.errors import InputError
-from profilefit.scenes.fur.request import FurRequest
+from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, LayerTechnique, least_layers, trial
 

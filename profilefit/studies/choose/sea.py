@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from profilefit.scenes.sea.caustics import focus, splat_for
 from profilefit.scenes.sea.haze import BROADENED, SCALED, SINGLE, sunlit_haze
 from profilefit.scenes.sea.passes import axes, reach_of
-from profilefit.scenes.sea.request import SPLATS, SeaRequest
+from profilefit.scenes.sea.scene import SPLATS, SeaRequest
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import FINE, refracted
-from profilefit.scenes.sea.world import World
 from profilefit.studies.stability.sea import LIMITS
 
 Floats = NDArray[np.float64]

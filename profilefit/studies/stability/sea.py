@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
-from profilefit.scenes.sea.request import PHASE, lobes_of
+from profilefit.scenes.sea.scene import PHASE, lobes_of
 from profilefit.scenes.sea.source import segment_text
 from profilefit.scenes.sea.waves import Waves, random_floor
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative

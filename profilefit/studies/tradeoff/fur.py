@@ -14,8 +14,7 @@ import numpy as np
 from mcml_sim.files.text_file import read_toml
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.fur.chart import over_layers, wide_patch
-from profilefit.scenes.fur.request import FurRequest, read
-from profilefit.scenes.fur.scene import reference_render
+from profilefit.scenes.fur.scene import FurRequest, read, reference_render
 from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.shader.context import opened, renderer

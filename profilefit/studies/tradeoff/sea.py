@@ -17,10 +17,9 @@ from mcml_sim.media.phase import HenyeyGreenstein
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.haze import KINDS
-from profilefit.scenes.sea.reference import caustic_photons, misfit
-from profilefit.scenes.sea.request import SeaRequest, read
-from profilefit.scenes.sea.scene import SeaRender, reference_render
+from profilefit.scenes.sea.scene import SeaRender, SeaRequest, read, reference_render
 from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
+from profilefit.scenes.sea.truth import caustic_photons, misfit
 from profilefit.scenes.sea.waves import Waves, random_sea
 from profilefit.shader.context import opened, renderer
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread

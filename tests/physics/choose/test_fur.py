@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.scenes.fur.request import read
+from profilefit.scenes.fur.scene import read
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, error_of, trial
 from profilefit.studies.choose import fur

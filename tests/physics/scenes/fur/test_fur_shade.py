@@ -5,8 +5,7 @@ import pytest
 
 from profilefit.scenes.fur.ball import NOTHING, SKIN, FurView, random_ball
 from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow, shared_shadow
-from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat
-from profilefit.scenes.fur.request import Shading
+from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat, Shading
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera, Light
 from tests.fixtures import slow

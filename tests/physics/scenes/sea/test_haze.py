@@ -10,9 +10,9 @@ from profilefit.errors import InputError
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze, table, ways
 from profilefit.scenes.sea.law import beam_share, water_mtf
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.request import lobes_of
+from profilefit.scenes.sea.scene import lobes_of
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves
-from profilefit.scenes.sea.world import World
 
 LOBES = lobes_of("petzold")
 OMEGAS, DEPTHS = np.array([0.2, 0.5, 0.8]), np.array([0.3, 1.0, 2.0, 4.0])

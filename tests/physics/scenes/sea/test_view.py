@@ -15,10 +15,9 @@ from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze
 from profilefit.scenes.sea.passes import SeaPasses, axes, glow, mirrored
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.request import lobes_of, read
-from profilefit.scenes.sea.scene import WHITE, halves_of, reference_render
+from profilefit.scenes.sea.scene import WHITE, halves_of, lobes_of, read, reference_render
+from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea
-from profilefit.scenes.sea.world import World
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera

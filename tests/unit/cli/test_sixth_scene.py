@@ -1,4 +1,4 @@
-"""A sixth scene is its folder, `toy`, and one line of a table: the command reads, draws and judges it."""
+"""A sixth scene is its folder, tests/unit/scenes/toy, and one line: the command reads, draws and judges it."""
 
 import json
 from pathlib import Path
