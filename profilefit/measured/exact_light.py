@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import exact
-from mcml_sim.exact.anisotropic import table
+from mcml_sim.exact.anisotropic import forward_table
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
 from mcml_sim.files.kept import kept
@@ -40,7 +40,7 @@ def exact_light(setting: Setting) -> ExactLight:
     """Of a half space that `mcml_sim.exact` solves; SettingError of another. Seconds where g = 0, the first time."""
     require_solved(setting)
     if not setting.is_isotropic:
-        return _filled(table.light(setting))
+        return _filled(forward_table.light(setting))
     parts = ("rest", "kappa", "share")
     name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
     found = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
@@ -50,7 +50,7 @@ def exact_light(setting: Setting) -> ExactLight:
 def light_at_hand(setting: Setting) -> ExactLight:
     """The same of one of many settings that a search tries: that of the table, to 3e-4, where it has these n."""
     if setting.is_isotropic and FORWARD_N[0] <= setting.n <= FORWARD_N[1]:
-        return _filled(table.light(setting))
+        return _filled(forward_table.light(setting))
     return exact_light(setting)
 
 

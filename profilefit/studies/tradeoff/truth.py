@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, exact, simulate, simulate_orders
-from mcml_sim.exact import table
+from mcml_sim.exact import refracting
 from mcml_sim.exact.stack import solution
 from mcml_sim.exact.transform import STANDARD, Rule
 from profilefit.studies.tradeoff import annuli, scalar, stopwatch
@@ -193,7 +193,7 @@ def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
 
     def run(_: int) -> RingEnergies:
         if anew:
-            table.new_table(float(case.setting.n), rule)
+            refracting.new_table(float(case.setting.n), rule)
         return RingEnergies(np.diff(annuli.half_spaces(case.setting, rule), axis=1), None)
 
     return run
