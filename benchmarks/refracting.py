@@ -24,7 +24,7 @@ from scipy.stats import chi2
 
 from benchmarks.table import show
 from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
-from mcml_sim.exact import cone, table
+from mcml_sim.exact import cone, refracting
 from mcml_sim.exact.transform import STANDARD
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,7 @@ def new_index() -> Floats:
     seconds = []
     for n in np.linspace(1.31, 1.49, TURNS + 1):
         begin = time.perf_counter()
-        table.made(float(n), STANDARD)
+        refracting.new_table(float(n), STANDARD)
         made = time.perf_counter() - begin
         exact.reflectance(0.5, Setting(n=float(n)))  # keeps its table, made again
         begin = time.perf_counter()

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from mcml_sim.results.orders import Orders
     from mcml_sim.results.tally import Precision, Tally
     from mcml_sim.results.tally_file import read_results, write_results
-    from mcml_sim.runs.order_runs import simulate_orders, trace_share
-    from mcml_sim.runs.simulation import simulate
+    from mcml_sim.runs.simulation import simulate, simulate_orders, trace_share
     from mcml_sim.runs.store import DamagedBatch
 else:
     __getattr__ = attributes(
@@ -31,11 +30,10 @@ else:
             **dict.fromkeys(("read_mco", "write_mco"), "results.mco"),
             **dict.fromkeys(("Layer", "Medium", "half_space"), "media.medium"),
             "Orders": "results.orders",
-            **dict.fromkeys(("simulate_orders", "trace_share"), "runs.order_runs"),
             **dict.fromkeys(("Precision", "Tally"), "results.tally"),
             **dict.fromkeys(("read_results", "write_results"), "results.tally_file"),
             "Setting": "media.setting",
-            "simulate": "runs.simulation",
+            **dict.fromkeys(("simulate", "simulate_orders", "trace_share"), "runs.simulation"),
             "DamagedBatch": "runs.store",
             "Estimate": "results.estimate",
             "__version__": "files.version",

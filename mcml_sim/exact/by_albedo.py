@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact import table, transform
+from mcml_sim.exact import refracting, transform
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from mcml_sim.media.arrays import Floats
@@ -29,7 +29,7 @@ Each = Callable[[jax.Array, "Surface"], jax.Array]
 BLOCK = 64
 
 
-Surface = table.Table | None
+Surface = refracting.Table | None
 """The table of a surface that refracts; None of one that does not."""
 
 
@@ -68,22 +68,22 @@ def forget() -> None:
 def surface(setting: Setting, rule: Rule = STANDARD) -> Surface:
     """Return the surface for `solve`; makes a table where there is none."""
     if is_traced(setting.n):
-        return table.traced_table(jnp.asarray(setting.n), rule)
-    return None if setting.n == 1.0 else table.kept_table(float(setting.n), rule)
+        return refracting.traced_table(jnp.asarray(setting.n), rule)
+    return None if setting.n == 1.0 else refracting.kept_table(float(setting.n), rule)
 
 
 def solve(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> Transform:
     """Return the transform of one albedo, a float64 scalar in [0, 1]."""
     if of is None:
         return transform.solve(alpha, illumination, rule)
-    return table.transform(of, alpha, ILLUMINATIONS.index(illumination), rule)
+    return refracting.transform(of, alpha, ILLUMINATIONS.index(illumination), rule)
 
 
 def total(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> jax.Array:
     """Return A / alpha of one albedo."""
     if of is None:
         return transform.reflectance_over_alpha(alpha, illumination, rule)
-    return table.total(of, alpha, ILLUMINATIONS.index(illumination))
+    return refracting.total(of, alpha, ILLUMINATIONS.index(illumination))
 
 
 @lru_cache(maxsize=512)

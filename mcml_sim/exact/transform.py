@@ -53,7 +53,7 @@ X_SCALE, X_LAST = 0.33, 1e4  # of sqrt(k^2 + 1): the x from which nodes grow apa
 
 @dataclass(frozen=True)
 class Rule:
-    """Number of nodes of each quadrature: k, m and x here, the others of `table`, where the surface refracts."""
+    """Number of nodes of each quadrature: k, m and x here, the others of `refracting`, where the surface refracts."""
 
     k: int
     m: int

@@ -1,4 +1,4 @@
-"""Photons through a layered medium, of a normal pencil beam or of diffuse light."""
+"""Runs: photons through layers, or through a half space, resolved by scattering order; whole, or in shares."""
 
 from __future__ import annotations
 
@@ -10,14 +10,17 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
-from mcml_sim.media.setting import require_illumination
+from mcml_sim.media.setting import Setting, require_illumination
+from mcml_sim.results.orders import Orders
 from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store, manifest, require_ours
-from mcml_sim.tracing import deposits, layered_batch, matched_batch, pool
+from mcml_sim.tracing import deposits, layered_batch, matched_batch, order_bins, orders_batch, pool
+from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.deposits import Deposits
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
+SEARCHLIGHT = Setting()
 
 
 def simulate(
@@ -113,4 +116,108 @@ def _made_by(medium: Medium, grid: Grid, seed: int, illumination: str) -> dict[s
         "seed": seed,
         "grid": grid.digest,
         "batch_photons": BATCH_PHOTONS[_kernel(medium, illumination)],
+    }
+
+
+def simulate_orders(
+    grid: Grid,
+    photons: int,
+    seed: int = 0,
+    setting: Setting = SEARCHLIGHT,
+    store: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool | None = None,
+    scheduler: str | None = None,
+) -> Orders:
+    """Simulate a conservative half space (alpha = 1), resolved by scattering order.
+
+    Args:
+        grid: rings, edges in mean free paths [mfp].
+        photons: how many to start, 1 to 1e13.
+        seed: whole number >= 0; equal seeds start with equal photons.
+        setting: the light and the surface; Setting() and its diffuse twin are the fastest.
+        store: folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes.
+        workers: threads, by default one a core; the result does not depend on it.
+        progress: show a bar on stderr; by default only if that is a terminal.
+        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
+
+    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
+    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
+    """
+    number, key = _checked_run(grid, photons, seed, setting)
+    threads, folder = checked_workers(workers, scheduler), checked_folder(store)
+    kept = None if folder is None else _store(folder, grid, key, setting)
+    counts = run_batches(
+        partial(orders_batch.trace_batch, grid, key, setting=setting),
+        orders_batch.BATCH_PHOTONS,
+        number,
+        workers=threads,
+        store=kept,
+        progress=progress,
+        scheduler=scheduler,
+    )
+    return Orders(grid, number, key, setting, counts)
+
+
+def trace_share(
+    share: int,
+    shares: int,
+    grid: Grid,
+    photons: int,
+    seed: int = 0,
+    setting: Setting = SEARCHLIGHT,
+    *,
+    store: str | Path,
+) -> int:
+    """Trace the batches share, share + shares, share + 2 shares, ... of `simulate_orders` into its store, on one core.
+
+    For jobs that share a folder but no network: when each of them has traced its share, `simulate_orders` with the same
+    arguments and that `store` reads all batches and traces none. Returns the number of batches that had to be traced.
+
+    `share` is one of 0 ... shares - 1; the other arguments are as for `simulate_orders`. InputError and
+    StoreError as there; what is finished stays, and the same call goes on from it.
+    """
+    number, key = _checked_run(grid, photons, seed, setting)
+    parts = checked_whole("shares", shares, lowest=1)
+    first = checked_whole("share", share, lowest=0, highest=parts - 1)
+    if (folder := checked_folder(store)) is None:
+        raise InputError("store must be the path of a folder, got None")
+    kept, traced = _store(folder, grid, key, setting), 0
+    for batch in range(first, -(-number // orders_batch.BATCH_PHOTONS), parts):
+        size = min(orders_batch.BATCH_PHOTONS, number - batch * orders_batch.BATCH_PHOTONS)
+        stored = kept.load(batch)
+        if stored is None or stored.started < size:
+            kept.save(batch, orders_batch.trace_batch(grid, key, batch, size, setting=setting))
+            traced += 1
+    return traced
+
+
+def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
+    """Return the number of photons and the seed; InputError if the run cannot be done."""
+    require_own_process()
+    if not isinstance(setting, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
+    require_resolved(grid)
+    return checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS), checked_whole("seed", seed, lowest=0)
+
+
+def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
+    shape = grid.rings + 1, order_bins.bins_of(setting).last_orders.size
+    return Store(folder, _orders_made_by(grid, seed, setting), partial(Counts.from_arrays, shape=shape))
+
+
+def _orders_made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
+    """Return what decides which photons a batch holds and how they are counted."""
+    bins = order_bins.bins_of(setting)
+    return {
+        "kind": "orders",
+        "setting": str(setting),
+        "seed": seed,
+        "grid": grid.digest,
+        "r_edges": grid.r_edges.tolist(),
+        "batch_photons": orders_batch.BATCH_PHOTONS,
+        "max_order": bins.max_order,
+        "first_roulette": bins.first_roulette,
+        "last_exact_order": order_bins.LAST_EXACT,
+        "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
     }

@@ -9,7 +9,7 @@ from profilefit.convert import blender, offline, real_time
 from profilefit.convert.colour import alpha_of, reflectance_of
 from profilefit.convert.engine import Engine
 from profilefit.convert.lengths import QUANTITIES, Length
-from profilefit.convert.medium import BY_NAME, LENGTHS, Optical
+from profilefit.convert.optical import BY_NAME, LENGTHS, Optical
 
 ENGINES = (*blender.ROWS, *real_time.ROWS, *offline.ROWS)
 

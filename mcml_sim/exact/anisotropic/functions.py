@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.exact.anisotropic.table import light
+from mcml_sim.exact.anisotropic.forward_table import light
 from mcml_sim.exact.by_albedo import BLOCK, blocks
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import ExactLight, reduced
@@ -33,7 +33,7 @@ def reflectance(alpha: Any, setting: Setting) -> Any:
 
 
 def profile(x: Any, alpha: Any, setting: Setting, coarse: bool = False) -> Any:
-    """Return R_d [1/mfp^2]; `coarse` as in `table.curves`."""
+    """Return R_d [1/mfp^2]; `coarse` as in `forward_table.curves`."""
     return _called(_profile, light(setting, coarse), x, alpha)
 
 

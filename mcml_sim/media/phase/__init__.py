@@ -4,12 +4,12 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
-    from mcml_sim.media.phase.base import Phase
     from mcml_sim.media.phase.fournier_forand import FournierForand
     from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
     from mcml_sim.media.phase.isotropic import Isotropic
+    from mcml_sim.media.phase.kinds import as_table, from_table, settle
     from mcml_sim.media.phase.mixture import Mixture
-    from mcml_sim.media.phase.table import as_table, from_table, settle
+    from mcml_sim.media.phase.phase import Phase
     from mcml_sim.media.phase.tabulated import Tabulated
 
 HOMES = {
@@ -17,9 +17,9 @@ HOMES = {
     "HenyeyGreenstein": "henyey_greenstein",
     "Isotropic": "isotropic",
     "Mixture": "mixture",
-    "Phase": "base",
+    "Phase": "phase",
     "Tabulated": "tabulated",
-    **dict.fromkeys(("as_table", "from_table", "settle"), "table"),
+    **dict.fromkeys(("as_table", "from_table", "settle"), "kinds"),
 }
 
 __all__ = [

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim.media.phase.base import Phase
+from mcml_sim.media.phase.phase import Phase
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
 from mcml_sim.media.checks import is_number, shown
-from mcml_sim.media.phase.base import Phase
+from mcml_sim.media.phase.phase import Phase
 
 MOST_TERMS = 64
 ROUNDING = 1e-9  # by which weights that a reader typed may miss 1

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import Floats, namespace
 from mcml_sim.media.checks import checked_numbers, shown
-from mcml_sim.media.phase.base import Phase
+from mcml_sim.media.phase.phase import Phase
 from mcml_sim.media.phase.pieces import Pieces
 
 MOST_ROWS = 2**16

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
-from mcml_sim.exact import hankel, table
+from mcml_sim.exact import hankel, refracting
 from mcml_sim.exact.by_albedo import by_alpha, forget
 from mcml_sim.exact.stack import solution
 from mcml_sim.exact.stack.depths import Nodes
@@ -275,7 +275,7 @@ def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
 
     def run(_: int) -> RingEnergies:
         if anew:
-            table.new_table(float(case.setting.n), rule)
+            refracting.new_table(float(case.setting.n), rule)
         return RingEnergies(np.diff(half_spaces(case.setting, rule), axis=1), None)
 
     return run

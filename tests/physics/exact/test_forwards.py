@@ -10,7 +10,7 @@ from benchmarks import half_spaces
 from mcml_sim import Setting, exact
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import single_scattering
-from mcml_sim.exact.anisotropic import table
+from mcml_sim.exact.anisotropic import forward_table
 from mcml_sim.exact.light import unreduced
 
 ALPHAS = np.array([0.3, 0.9, 0.99, 0.9995])
@@ -186,15 +186,15 @@ def test_outside_the_table_the_tracer_is_named(setting):
 
 
 def test_a_damaged_table_is_named(monkeypatch, tmp_path):
-    content = table.FILE.read_bytes()
+    content = forward_table.FILE.read_bytes()
     bad = tmp_path / "half_space.npz"
-    arrays = dict(np.load(table.FILE))
+    arrays = dict(np.load(forward_table.FILE))
     np.savez(bad, **{**arrays, "share": arrays["share"] * 1.001})
-    monkeypatch.setattr(table, "FILE", bad)
-    table.light.cache_clear(), table._table.cache_clear()
+    monkeypatch.setattr(forward_table, "FILE", bad)
+    forward_table.light.cache_clear(), forward_table._table.cache_clear()
     with pytest.raises(InputError, match="is damaged: its numbers are not those that were written"):
         exact.reflectance(0.9, TISSUE)
     monkeypatch.undo()
-    table.light.cache_clear(), table._table.cache_clear()
+    forward_table.light.cache_clear(), forward_table._table.cache_clear()
     assert exact.reflectance(0.9, TISSUE) > 0
-    assert content == table.FILE.read_bytes()
+    assert content == forward_table.FILE.read_bytes()

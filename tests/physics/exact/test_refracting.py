@@ -10,7 +10,7 @@ from scipy.special import erfc, j0
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate_orders
 from mcml_sim.errors import Notice
-from mcml_sim.exact import cone, hankel, table
+from mcml_sim.exact import cone, hankel, refracting
 from mcml_sim.exact.by_albedo import by_alpha
 from mcml_sim.exact.single_scattering import entered, transform_density
 from mcml_sim.exact.transform import STANDARD
@@ -186,26 +186,26 @@ def test_a_table_is_kept_and_a_damaged_one_is_named_and_made_anew(monkeypatch, t
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     small = STANDARD.scaled(0.25)
     made = []
-    anew = lru_cache(table.new_table)
-    monkeypatch.setattr(table, "new_table", lambda *all: made.append(all) or anew(*all))
-    table.kept_table.cache_clear()
-    first = table.kept_table(1.4, small)
-    table.kept_table.cache_clear()
-    again = table.kept_table(1.4, small)
+    anew = lru_cache(refracting.new_table)
+    monkeypatch.setattr(refracting, "new_table", lambda *all: made.append(all) or anew(*all))
+    refracting.kept_table.cache_clear()
+    first = refracting.kept_table(1.4, small)
+    refracting.kept_table.cache_clear()
+    again = refracting.kept_table(1.4, small)
     assert len(made) == 1
     assert all(np.array_equal(*pair) for pair in zip(first, again, strict=True))
     (path,) = tmp_path.rglob("*.npz")
     for damaged in (path.read_bytes()[:-50], b"", changed(path)):
         path.write_bytes(damaged)
-        table.kept_table.cache_clear()
+        refracting.kept_table.cache_clear()
         with pytest.warns(Notice, match=r"half-space-n1\.4.* is damaged"):
-            assert np.array_equal(table.kept_table(1.4, small).lines, first.lines)
+            assert np.array_equal(refracting.kept_table(1.4, small).lines, first.lines)
     assert len(made) == 4
-    table.kept_table.cache_clear()
+    refracting.kept_table.cache_clear()
     path.unlink()
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
-    assert np.array_equal(table.kept_table(1.4, small).lines, first.lines)
-    table.kept_table.cache_clear()
+    assert np.array_equal(refracting.kept_table(1.4, small).lines, first.lines)
+    refracting.kept_table.cache_clear()
 
 
 def changed(path):

@@ -9,6 +9,7 @@ from mcml_sim import Grid, Setting, exact
 from mcml_sim.results.estimate import estimate
 from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
 from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
+from tests.physics.tracing.test_half_space_event import slow_twin
 
 STOPS = OrderBins().stops
 PHOTONS = 200_000
@@ -18,27 +19,6 @@ LANES = pool.LANES
 def traced(photons, lanes=LANES):
     """Ends of the first photons of batch 0, seed 0."""
     return orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), STOPS, lanes=lanes)
-
-
-def slow_twin(photons, last_order, seed):
-    """Exit radius and order in float64 (x, y, z), with directions, no roulette; order 0 beyond `last_order`."""
-    source = np.random.default_rng(seed)
-    rho, order = np.zeros(photons), np.zeros(photons, int)
-    position = np.zeros((photons, 3))
-    position[:, 2] = source.exponential(size=photons)
-    flying = np.arange(photons)
-    for n in range(1, last_order + 1):
-        direction = source.normal(size=(flying.size, 3))
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        start = position[flying]
-        end = start + source.exponential(size=(flying.size, 1)) * direction
-        out = end[:, 2] < 0
-        at_surface = start[out] - direction[out] * (start[out, 2:] / direction[out, 2:])
-        rho[flying[out]] = np.hypot(at_surface[:, 0], at_surface[:, 1])
-        order[flying[out]] = n
-        position[flying] = end
-        flying = flying[~out]
-    return rho, order
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +36,7 @@ def table(rho, order):
 
 
 def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
-    fast, slow = table(*ends), table(*slow_twin(PHOTONS, 64, seed=3))
+    fast, slow = table(*ends), table(*slow_twin(Setting(), PHOTONS, 64, seed=3))
     enough = fast + slow > 25
     # Difference of two Poisson counts.
     z = (fast - slow)[enough] / np.sqrt((fast + slow)[enough])
@@ -65,7 +45,7 @@ def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
 
 
 def test_the_comparison_sees_a_twin_that_is_off_by_5_percent(ends, sidak):
-    rho, order = slow_twin(PHOTONS, 64, seed=3)
+    rho, order = slow_twin(Setting(), PHOTONS, 64, seed=3)
     fast, slow = table(*ends), table(1.05 * rho, order)
     enough = fast + slow > 25
     assert np.abs((fast - slow)[enough] / np.sqrt((fast + slow)[enough])).max() > sidak(enough.sum())
