@@ -130,20 +130,29 @@ class Node:
 
 @dataclass(frozen=True)
 class Ridge:
-    """Nodes whose first parameter rises, two at least, and what is between them."""
+    """Nodes whose first parameter rises, two at least, and what is between them.
+
+    spread  (p - 1, p - 1) covariance of the straight coordinates but the first; None for 1
+    """
 
     nodes: tuple[Node, ...]
+    spread: Floats | None = None
 
     @classmethod
     def normal(cls, centre: Floats, covariance: Floats) -> Ridge:
-        """Return the straight ridge of a normal density of `centre` (p,) and `covariance` (p, p)."""
+        """Return the straight ridge of a normal density of `centre` (p,) and `covariance` (p, p).
+
+        Parameters keep their units: where such a density is an approximation only, as of many constants of a law, tau
+        in units of errors is half as long again.
+        """
         root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
         across = root[1:, 0] / root[0, 0]
         firsts = centre[0] + NORMAL * root[0, 0]
-        return cls(tuple(
-            Node(float(at), centre[1:] + (at - centre[0]) * across, across, root[1:, 1:], -0.5 * float(z) ** 2)
+        nodes = (
+            Node(float(at), centre[1:] + (at - centre[0]) * across, across, np.eye(across.size), -0.5 * float(z) ** 2)
             for at, z in zip(firsts, NORMAL, strict=True)
-        ))  # fmt: skip
+        )
+        return cls(tuple(nodes), root[1:, 1:] @ root[1:, 1:].T)
 
     @classmethod
     def along(cls, best: Node, moved: Callable[[Node, float], Node], ends: tuple[float, float], error: float) -> Ridge:
@@ -197,6 +206,8 @@ class Ridge:
         centre, covariance = np.zeros(size), np.eye(size)
         centre[0] = share @ self.first
         covariance[0, 0] = share @ (self.first - centre[0]) ** 2
+        if self.spread is not None:
+            covariance[1:, 1:] = self.spread
         return centre, covariance
 
 

@@ -88,7 +88,7 @@ def marginalise(problem: Problem, start: Solution, known: Mapping[str, float] | 
     if not np.any(np.isfinite(log)):
         return None
     if np.all(np.isfinite(log)):  # errors at every node
-        between = reduce(np.kron, [_polynomials(NODES[name], PLACES[name]) for name in ranges])
+        between = _product([_polynomials(NODES[name], PLACES[name]) for name in ranges])
         theta[:, U] = np.exp(theta[:, U])  # sqrt(1 - alpha), near enough: it ends at 0 where the data allow no other
         theta, log = between @ theta, between @ log
         theta[:, U] = np.log(np.maximum(theta[:, U], np.exp(WHITE)))
@@ -96,7 +96,7 @@ def marginalise(problem: Problem, start: Solution, known: Mapping[str, float] | 
         places = [_scaled(_middles(PLACES[name]), ends) for name, ends in ranges.items()]
     else:
         log += likelihood(rise, len(problem.spec.free), problem.data.pooled)
-        log += np.log(reduce(np.kron, [leggauss(NODES[name])[1] for name in ranges]))
+        log += np.log(_product([leggauss(NODES[name])[1] for name in ranges]))
         places = nodes
     share = np.exp(log - log.max())
     share /= share.sum()
@@ -215,6 +215,11 @@ def _log_inside(one: Solution, free: Sequence[int]) -> float:
 def _scaled(t: Floats, ends: tuple[float, float]) -> Floats:
     """Map from (-1, 1) to a range."""
     return np.asarray(0.5 * (ends[0] + ends[1]) + 0.5 * (ends[1] - ends[0]) * t, float)
+
+
+def _product(each: Sequence[Floats]) -> Floats:
+    """Return the Kronecker product of all."""
+    return reduce(lambda one, other: np.asarray(np.kron(one, other), float), each)
 
 
 def _middles(count: int) -> Floats:
