@@ -18,7 +18,7 @@ from profilefit.report.figures.canvas import (
     GREEN,
     PUBLISHED,
     WHOLE,
-    Curve,
+    DrawnLaw,
     canvas,
     draw_curves,
     legend_below,
@@ -55,15 +55,15 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     return save(figure, out, name)
 
 
-def _curves(source: Source, data: Fitted) -> list[Curve]:
+def _curves(source: Source, data: Fitted) -> list[DrawnLaw]:
     setting = data.law.setting
     printed = catalogue.albedo_law("liang", "published", setting, source.folder)
-    curves = [Curve("(8) as printed", printed, PUBLISHED)]
+    curves = [DrawnLaw("(8) as printed", printed, PUBLISHED)]
     if data.converged:
-        curves.append(Curve("(8) regenerated", data.law, WHOLE, data))
+        curves.append(DrawnLaw("(8) regenerated", data.law, WHOLE, data))
     rational = source.usable("albedo-rational")
     if rational is not None:
-        curves.append(Curve("rational in √(1 − α)", rational.law, {"color": GREEN, "linestyle": "-."}, rational))
+        curves.append(DrawnLaw("rational in √(1 − α)", rational.law, {"color": GREEN, "linestyle": "-."}, rational))
     return curves
 
 
@@ -74,7 +74,7 @@ def _points(data: Fitted) -> Points:
     return alpha, data.arrays["reflectance"], data.arrays["reflectance_error"]
 
 
-def _map(ax: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
+def _map(ax: Axes, points: Points, curves: list[DrawnLaw], exact_map: tuple[Floats, Floats]) -> None:
     even = np.linspace(0.0, 1.0, 1001)
     ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
     draw_curves(ax, even, curves, lambda law: law.alpha(even))
@@ -83,7 +83,7 @@ def _map(ax: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats,
     ax.set_ylabel("single-scattering albedo α [-]")
 
 
-def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
+def _errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw], exact_map: tuple[Floats, Floats]) -> None:
     reflectance, alpha = exact_map
     s = np.sqrt(1.0 - alpha)
     draw_curves(error, reflectance, curves, lambda law: law.alpha(reflectance) - alpha)
@@ -102,7 +102,7 @@ def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact
     plain_log(ratio.yaxis)
 
 
-def _folds(panels: dict[str, Axes], curves: list[Curve]) -> None:
+def _folds(panels: dict[str, Axes], curves: list[DrawnLaw]) -> None:
     """Mark where a map falls again, so that two reflectances share one albedo."""
     for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)

@@ -100,7 +100,7 @@ def band_under(ax: Axes, x: Any, band: tuple[Any, Any] | None, color: str, label
         ax.fill_between([], [], [], color=GREY, alpha=0.4, linewidth=0, label=label)
 
 
-class Curve(NamedTuple):
+class DrawnLaw(NamedTuple):
     """Law in a figure: its label and look, and the record with its posterior, if it has one."""
 
     label: str
@@ -109,7 +109,7 @@ class Curve(NamedTuple):
     fitted: Any = None
 
 
-def draw_curves(ax: Axes, x: Any, curves: Iterable[Curve], evaluate: Callable[[Any], Any]) -> None:
+def draw_curves(ax: Axes, x: Any, curves: Iterable[DrawnLaw], evaluate: Callable[[Any], Any]) -> None:
     """Draw `evaluate(law)` of each curve over x, and under it the 95 % band of its record."""
     for one in curves:
         band_under(ax, x, one.fitted.band(evaluate) if one.fitted else None, one.style["color"])

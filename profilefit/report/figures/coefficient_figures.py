@@ -24,7 +24,7 @@ from profilefit.report.figures.canvas import (
     PURPLE,
     VERMILION,
     WHOLE,
-    Curve,
+    DrawnLaw,
     canvas,
     draw_curves,
     legend_below,
@@ -77,18 +77,18 @@ b_figure = partial(coefficient_figure, "b")
 c_figure = partial(coefficient_figure, "c")
 
 
-def _lines(letter: str, source: Source, data: Fitted) -> list[Curve]:
+def _lines(letter: str, source: Source, data: Fitted) -> list[DrawnLaw]:
     setting, equation = data.law.setting, EQUATION[letter]
     printed = source.printed("liang", "published", setting)
-    lines = [Curve(f"{equation} as printed", printed, PUBLISHED)]
+    lines = [DrawnLaw(f"{equation} as printed", printed, PUBLISHED)]
     corrected = source.printed("liang", "corrected", setting)
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
         label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
-        lines.append(Curve(label, corrected, CORRECTED))
+        lines.append(DrawnLaw(label, corrected, CORRECTED))
     stage = data.content["stages"]["coefficient_laws"][letter]
     staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
     failed = "" if stage["result"] == "converged" else " (did not converge)"
-    lines.append(Curve(f"{equation} through the points{failed}", staged, STAGED))
+    lines.append(DrawnLaw(f"{equation} through the points{failed}", staged, STAGED))
     labels = {
         "liang-as-published": ("regenerated, the paper's protocol, jointly", AS_PUBLISHED),
         "liang-whole": ("regenerated, whole profile", WHOLE),
@@ -96,18 +96,18 @@ def _lines(letter: str, source: Source, data: Fitted) -> list[Curve]:
     for name, (label, style) in labels.items():
         fitted = source.usable(name)
         if fitted is not None:
-            lines.append(Curve(label, fitted.law, style, fitted))
+            lines.append(DrawnLaw(label, fitted.law, style, fitted))
     return lines
 
 
-def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Curve], data: Fitted) -> None:
+def _values(ax: Axes, letter: str, alpha: Floats, lines: list[DrawnLaw], data: Fitted) -> None:
     column = COEFFICIENTS.index(letter)
     draw_curves(ax, alpha, lines, lambda law: coefficients(law, alpha)[column])
     points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
     ax.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
 
 
-def _ratios(ax: Axes, letter: str, lines: list[Curve], data: Fitted) -> None:
+def _ratios(ax: Axes, letter: str, lines: list[DrawnLaw], data: Fitted) -> None:
     column = COEFFICIENTS.index(letter)
     alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
     for label, law, style, _ in lines:
@@ -122,7 +122,7 @@ def _ratios(ax: Axes, letter: str, lines: list[Curve], data: Fitted) -> None:
     ax.set_ylim(*RATIOS)
 
 
-def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[Curve], data: Fitted, low: float) -> None:
+def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[DrawnLaw], data: Fitted, low: float) -> None:
     """Scale the enlarged panel to what it shows."""
     column = COEFFICIENTS.index(letter)
     near = data.arrays["alpha"] >= low

@@ -24,7 +24,7 @@ from profilefit.report.figures.canvas import (
     PUBLISHED,
     PURPLE,
     WHOLE,
-    Curve,
+    DrawnLaw,
     albedo_axis,
     canvas,
     draw_curves,
@@ -70,10 +70,10 @@ def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    curves = [Curve("(19) as printed", source.printed("liang", "published", setting), PUBLISHED)]
+    curves = [DrawnLaw("(19) as printed", source.printed("liang", "published", setting), PUBLISHED)]
     for name, (label, style) in LABELS.items():
         if (fitted := source.usable(name)) is not None:
-            curves.append(Curve(label, fitted.law, style, fitted))
+            curves.append(DrawnLaw(label, fitted.law, style, fitted))
     draw_curves(ax, xi, curves, lambda law: _radius(law, xi, alpha))
     whole = source.usable("liang-whole")
     if whole is not None:

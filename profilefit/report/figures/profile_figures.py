@@ -20,7 +20,7 @@ from profilefit.report.figures.canvas import (
     PUBLISHED,
     TRUTH_BAND,
     WHOLE,
-    Curve,
+    DrawnLaw,
     band_under,
     canvas,
     draw_curves,
@@ -72,14 +72,14 @@ def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list
     return save(figure, out, name)
 
 
-def _laws(source: Source, data: Fitted) -> dict[str, Curve]:
+def _laws(source: Source, data: Fitted) -> dict[str, DrawnLaw]:
     """Return printed laws, and records with their bands, by name."""
     law, setting = data.content["law"], data.law.setting
     printed = ("published", "corrected")
-    laws = {name: Curve(LABELS[name], source.printed(law, name, setting), STYLES[name]) for name in printed}
+    laws = {name: DrawnLaw(LABELS[name], source.printed(law, name, setting), STYLES[name]) for name in printed}
     for name in ("liang-as-published", "liang-whole"):
         if (fitted := source.usable(name)) is not None:
-            laws[name] = Curve(LABELS[name], fitted.law, STYLES[name], fitted)
+            laws[name] = DrawnLaw(LABELS[name], fitted.law, STYLES[name], fitted)
     return laws
 
 
@@ -87,7 +87,7 @@ def _rows(data: Fitted) -> list[int]:
     return [round(share * (data.arrays["alpha"].size - 1)) for share in PANELS]
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Curve]) -> None:
+def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
@@ -108,7 +108,7 @@ def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Curve]) -> 
     ax.set_title(f"α = {alpha:.3f}")
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Curve]) -> None:
+def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
     r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))

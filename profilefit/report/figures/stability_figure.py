@@ -16,7 +16,7 @@ from scipy import ndimage
 from profilefit.report.figures.canvas import BLACK, ORANGE, PURPLE, VERMILION, WIDTH, YELLOW, canvas, save, styled
 from profilefit.report.tables.stability_tables import SIGNS
 from profilefit.studies.stability.cells import Cells, Verdict
-from profilefit.studies.stability.layout import ARITHMETICS, LENGTHS, QUANTITIES, ArgumentAxis
+from profilefit.studies.stability.layout import ARITHMETICS, DTYPES, LENGTHS, QUANTITIES, ArgumentAxis
 
 # Red classes differ in lightness and carry a sign, as does what is not judged; the others are pale.
 COLOURS = {
@@ -97,7 +97,7 @@ def _worst(cells: Cells) -> NDArray[np.int8]:
     """Return the worst class over usual lengths, (alphas, radii or shares)."""
     if len(cells.axes) == 2:
         return cells.codes
-    lengths, (low, high) = cells.axes[2].values, LENGTHS[cells.dtype]
+    lengths, (low, high) = cells.axes[2].values, LENGTHS[DTYPES[cells.arithmetic]]
     usual = (lengths >= max(low, USUAL[0])) & (lengths <= min(high, USUAL[1]))
     worst: NDArray[np.int8] = np.max(cells.codes[..., usual], axis=2)
     return worst

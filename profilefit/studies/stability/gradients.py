@@ -100,7 +100,8 @@ def _cells(
 ) -> Cells:
     """Return the cells of a derivative, its difference, and value over argument."""
     shape = tuple(axis.values.size for axis in axes)
-    value, difference, scale, valid, sure = (each.reshape(shape) for each in (*triple, valid, sure))
+    value, difference, scale = (each.reshape(shape) for each in triple)
+    valid, sure = valid.reshape(shape), sure.reshape(shape)
     with np.errstate(all="ignore"):
         error = np.abs(value - difference) / np.maximum(np.abs(difference), LEAST * scale)
     error = np.where(sure & (scale > 0), error, np.nan)

@@ -8,7 +8,7 @@ import pytest
 
 import profilefit
 from profilefit.laws.burley import BurleySampler
-from profilefit.studies.tradeoff.contenders import made
+from profilefit.studies.tradeoff.contenders import with_samplers
 from profilefit.studies.tradeoff.counting import count, described
 
 
@@ -35,14 +35,14 @@ def test_normalized_diffusion_takes_two_exponentials_or_one():
     law = profilefit.load("burley", "published")
     assert count(law.scaled_profile).point == Counter(exp=2)
     assert count(BurleySampler(law).scaled_sample).point == Counter(cbrt=1, log=1, sqrt=1)
-    exact, xie = made("normalized diffusion", law)
+    exact, xie = with_samplers("normalized diffusion", law)
     assert count(exact.profile).point == Counter(exp=1)
     assert count(exact.sample).point == Counter(exp=1, log=2, sqrt=1)
     assert count(xie.sample).point == Counter(log=1)
 
 
 def test_hazard_takes_what_its_docstring_says():
-    one, two = made("hazard", profilefit.load("hazard"))
+    one, two = with_samplers("hazard", profilefit.load("hazard"))
     assert count(one.profile).point == Counter(exp=1, log=1)
     assert count(one.sample).point == Counter(log=3)
     assert count(two.sample).point == Counter(log=5)

@@ -11,7 +11,7 @@ SMALL = laws.LawSizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
 
 
 def test_costly_samplers_are_not_timed():
-    (beam,) = contenders.made("beam", profilefit.load("beam_diffusion", "published"))
+    (beam,) = contenders.with_samplers("beam", profilefit.load("beam_diffusion", "published"))
     counted = laws.counts(beam)
     assert counted["profile"].transcendental > laws.MANY
     works = laws.works(beam, counted, SMALL)

@@ -7,7 +7,7 @@ import profilefit
 from mcml_sim import Setting
 from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points
 from profilefit.studies.tradeoff import samplers
-from profilefit.studies.tradeoff.contenders import YARDSTICK, made
+from profilefit.studies.tradeoff.contenders import YARDSTICK, with_samplers
 
 ALPHA, EDGE = 0.8, 1.0
 SMALL = samplers.SamplerSizes((ALPHA,), (EDGE,), 40)
@@ -64,7 +64,7 @@ def test_noise_is_over_that_of_the_exact_quantile(uniform):
 
 @pytest.mark.slow
 def test_wrong_densities_come_twice(uniform):
-    exactly, _ = made(YARDSTICK, uniform.law)
+    exactly, _ = with_samplers(YARDSTICK, uniform.law)
     (found,) = samplers.ways_of(exactly, SMALL)
     assert found.name == YARDSTICK
     noise, bias = samplers.points_of(found, samplers.WithSpread.exactly(2.0))
