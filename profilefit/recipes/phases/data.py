@@ -120,8 +120,8 @@ def read_phase(path: Path) -> PhaseData:
     if not FEWEST_ROWS <= len(kept) - 1 <= MOST_ROWS:
         raise InputError(f"{path}: expected {FEWEST_ROWS} to {MOST_ROWS} rows under the header, got {len(kept) - 1}")
     rows = []
-    for at, line in kept[1:]:
-        cells = [cell.strip() for cell in line.split(",")]
+    for at, text in kept[1:]:
+        cells = [cell.strip() for cell in text.split(",")]
         if len(cells) != len(units):
             raise InputError(f"{path}:{at}: expected {len(units)} cells, as the header has, got {len(cells)}")
         rows.append([_number(path, at, name, cell) for name, cell in zip(units, cells, strict=True)])
