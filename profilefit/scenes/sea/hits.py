@@ -280,7 +280,8 @@ def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
     length = np.linalg.norm(found[1], axis=-1)
     deviation = np.abs(length - 1.0)
     if np.any(deviation > UNIT):
-        raise InputError(f"direction must be of unit length, got |direction| = {length.flat[int(np.argmax(deviation))]:g}")
+        worst = length.flat[int(np.argmax(deviation))]
+        raise InputError(f"direction must be of unit length, got |direction| = {worst:g}")
     try:
         where, along = np.broadcast_arrays(*found)
     except ValueError:
