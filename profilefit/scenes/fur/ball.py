@@ -92,8 +92,8 @@ class Ball:
 
     def _skin(self, start: Floats, way: Floats, found: Floats, far: Floats) -> None:
         along = np.sum(start * way, axis=-1)
-        off = start - along[..., None] * way
-        half = self.ball**2 - np.sum(off**2, axis=-1)
+        aside = start - along[..., None] * way
+        half = self.ball**2 - np.sum(aside**2, axis=-1)
         seen = half > 0
         far[seen] = (-along - np.sqrt(np.maximum(half, 0.0)))[seen]
         place = (start + np.where(seen, far, 0.0)[..., None] * way) / self.ball

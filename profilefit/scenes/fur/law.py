@@ -191,16 +191,16 @@ def lobe_mean(exponent: ArrayLike) -> Any:
 
 def misfit(layers: int, exponent: float, slender: float) -> float:
     """Return the mean square of ln(shadow of shells / shadow of the cone), weighed by sin cos, over 0 to 80 degrees."""
-    return float(np.sum(_missed(layers, exponent, slender) ** 2))
+    return float(np.sum(_residual(layers, exponent, slender) ** 2))
 
 
 def best_of(layers: int, slender: float) -> float:
     """Return the exponent of the least misfit."""
-    at = differences(lambda p: _missed(layers, float(p[0]), slender), STEP, LARGEST)
+    at = differences(lambda p: _residual(layers, float(p[0]), slender), STEP, LARGEST)
     return float(solve(at, np.array([FIRST]), (1.0, LARGEST), tolerance=TOLERANCE).parameters[0])
 
 
-def _missed(layers: int, exponent: float, slender: float) -> Floats:
+def _residual(layers: int, exponent: float, slender: float) -> Floats:
     """Return ln(shadow of the shells / shadow of the cone) at each angle, times the root of its share of the weight."""
     logs = np.log([shell_shadow(layers, exponent, 1.0 / slender, 1.0, float(angle)) for angle in ANGLES])
     weight = np.sin(ANGLES) * np.cos(ANGLES)

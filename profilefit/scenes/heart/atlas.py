@@ -173,9 +173,9 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
     area = np.abs(flat[good])
     extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
-    wanted = extent / max(texel, extent.max() / most)
-    wanted = np.maximum(wanted * max(1.0, (2 * LEAST + 1) / _apart(mesh, wanted)), 8)
-    inner = step * np.ceil(np.round(wanted) / step).astype(int)
+    texels = extent / max(texel, extent.max() / most)
+    texels = np.maximum(texels * max(1.0, (2 * LEAST + 1) / _apart(mesh, texels)), 8)
+    inner = step * np.ceil(np.round(texels) / step).astype(int)
     margin = int(np.clip(min(inner.min() // 12, (_apart(mesh, inner) - 1) // 2), LEAST, 24))
     columns, rows = (inner + 2 * margin).tolist()
     return (columns, rows), margin

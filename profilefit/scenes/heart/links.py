@@ -48,11 +48,11 @@ def links(position: Floats, inside: NDArray[np.bool_], margin: int) -> Singles:
             ahead = np.where(bent, 3.0 * (point[one] - point[two]) + before, 2.0 * point[one] - point[two])
             distance, nearest = tree.query(ahead)
             texel = tuple(where[nearest].T)
-            off = ahead - position[texel]
-            side, shift = np.linalg.norm(frames[texel], axis=-1).max(axis=-1), _coordinates(frames[texel], off)
+            offset = ahead - position[texel]
+            side, shift = np.linalg.norm(frames[texel], axis=-1).max(axis=-1), _coordinates(frames[texel], offset)
             close = (distance < 2.0 * side) & np.all(np.abs(shift) < REACH, axis=1)
             to = np.where(good[:, None], to, where[nearest] + shift)
-            there = np.where(good[:, None], there, position[texel] + _along(frames[texel], off))
+            there = np.where(good[:, None], there, position[texel] + _along(frames[texel], offset))
             good |= close
             found.append((at[good], to[good], there[good]))
         fresh = np.zeros_like(known)
@@ -78,8 +78,8 @@ def _stepped(
     nearest = np.rint(to).astype(int)
     good = linked & (np.max(np.abs(one - two), axis=1) < 2.0) & _has(inside, nearest)
     texel = tuple(np.where(good[:, None], nearest, 0).T)
-    off = np.where(good[:, None], to - nearest, 0.0)
-    return to, position[texel] + np.einsum("na,nax->nx", off, frames[texel]), good
+    offset = np.where(good[:, None], to - nearest, 0.0)
+    return to, position[texel] + np.einsum("na,nax->nx", offset, frames[texel]), good
 
 
 def _has(known: NDArray[np.bool_], at: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -103,17 +103,17 @@ def _frames(position: Floats, inside: NDArray[np.bool_]) -> Floats:
     return frames
 
 
-def _coordinates(frames: Floats, off: Floats) -> Floats:
+def _coordinates(frames: Floats, offset: Floats) -> Floats:
     """Return rows and columns of an offset in the plane of a texel."""
     gram = frames @ np.swapaxes(frames, -1, -2)
     scale = np.trace(gram, axis1=-2, axis2=-1)
     safe = gram + 1e-9 * np.where(scale > 0, scale, 1.0)[:, None, None] * np.eye(2)
-    return np.asarray(np.linalg.solve(safe, frames @ off[..., None])[..., 0], float)
+    return np.asarray(np.linalg.solve(safe, frames @ offset[..., None])[..., 0], float)
 
 
-def _along(frames: Floats, off: Floats) -> Floats:
+def _along(frames: Floats, offset: Floats) -> Floats:
     """Return the part of an offset in the plane of a texel, which its coordinates may not tell at a pole."""
     normal = np.cross(frames[:, 0], frames[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1.0)
-    return off - np.sum(off * normal, axis=1, keepdims=True) * normal
+    return offset - np.sum(offset * normal, axis=1, keepdims=True) * normal

@@ -100,10 +100,10 @@ def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
 
     first = np.exp(quartile(stack) - quartile(one))
 
-    def missed(mfp: Floats) -> Floats:
+    def residual(mfp: Floats) -> Floats:
         d = places(float(mfp[0]), within)
         return stack.beyond(d) - one.beyond(d / mfp)
 
     bounds = first / SPAN, first * SPAN
-    found = solve(differences(missed, STEP * first), np.array([first]), bounds, tolerance=TOLERANCE)
+    found = solve(differences(residual, STEP * first), np.array([first]), bounds, tolerance=TOLERANCE)
     return float(found.parameters[0])

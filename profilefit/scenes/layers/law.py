@@ -140,10 +140,10 @@ def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
 
     known = np.log([solved(float(inner)) for inner in depth])
 
-    def off(at: Floats) -> Floats:
+    def residual(at: Floats) -> Floats:
         return at[0] - np.log(np.sinh(rate * depth + np.exp(at[1]))) - known
 
-    best = solve(differences(off, STEP), np.array([known[0], 0.0]))
+    best = solve(differences(residual, STEP), np.array([known[0], 0.0]))
     strength, offset = map(float, np.exp(best.parameters))
     return Plate(rate, skins, strength, offset, float(np.max(np.abs(np.expm1(best.residuals)))))
 

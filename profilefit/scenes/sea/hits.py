@@ -278,9 +278,10 @@ def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
             raise InputError(f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]:g}")
         found.append(array)
     length = np.linalg.norm(found[1], axis=-1)
-    off = np.abs(length - 1.0)
-    if np.any(off > UNIT):
-        raise InputError(f"direction must be of unit length, got |direction| = {length.flat[int(np.argmax(off))]:g}")
+    deviation = np.abs(length - 1.0)
+    if np.any(deviation > UNIT):
+        worst = length.flat[int(np.argmax(deviation))]
+        raise InputError(f"direction must be of unit length, got |direction| = {worst:g}")
     try:
         where, along = np.broadcast_arrays(*found)
     except ValueError:

@@ -168,8 +168,8 @@ def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterG
     at = differences(lambda here: weighted(here)[1], MOVED)
     logs = np.sort(solve(at, start, bounds, tolerance=TOLERANCE, gain=GAIN, longest=1.0).parameters)
     weights, _ = weighted(logs)
-    off = np.exp(-0.5 * np.square(wide)[:, None] * np.exp(logs)) @ weights - of_wide
-    error = float(np.max(np.abs(off))) * whole / (whole + straight)
+    residual = np.exp(-0.5 * np.square(wide)[:, None] * np.exp(logs)) @ weights - of_wide
+    error = float(np.max(np.abs(residual))) * whole / (whole + straight)
     return WaterGaussians(straight, np.exp(logs), whole * weights, error)
 
 
@@ -256,14 +256,14 @@ def _gain(omega: Any, depth: Any, frequency: Any, terms: Floats) -> Any:
     share, deviation = terms[:, 0] @ share, terms[:, 0] @ deviation
     excess = FITTED.size * omega * (1.0 - omega) ** FITTED.absorbed * deviation * depth**FITTED.depth
     y = frequency * depth
-    narrow, taken = 0.0, 0.0
+    narrow, removed = 0.0, 0.0
     for weight, g in terms:
         theta = (1.0 - g) / np.sqrt(g) if g > 0 else np.inf
         if theta < FITTED.width:
             strength = weight * (1.0 + g) / (2.0 * g)
-            taken += strength
+            removed += strength
             narrow = narrow + strength * _mean_decay(theta * y)
-    return omega * depth * narrow + (omega * depth * (share - taken) - excess) * _mean_decay(FITTED.width * y)
+    return omega * depth * narrow + (omega * depth * (share - removed) - excess) * _mean_decay(FITTED.width * y)
 
 
 def _mean_decay(x: Any) -> Any:

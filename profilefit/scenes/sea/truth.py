@@ -172,15 +172,15 @@ class _Rays:
         target, cell = (np.concatenate([one[part] for one in found]) for part in (0, 1))
         rises = np.repeat([one[2] for one in found], [one[0].size for one in found])
         near, far = self.nodes[cell], self.nodes[cell + 1]
-        wanted = x[target]
+        goal = x[target]
         start, end = self.landing[cell], self.landing[cell + 1]
         with np.errstate(divide="ignore", invalid="ignore"):
-            place = near + np.clip(np.nan_to_num((wanted - start) / (end - start), nan=0.5), 0.0, 1.0) * (far - near)
+            place = near + np.clip(np.nan_to_num((goal - start) / (end - start), nan=0.5), 0.0, 1.0) * (far - near)
             for _ in range(HALVINGS):
                 landing, stretch, _ = self.at(place)
-                beyond = (landing > wanted) == rises
+                beyond = (landing > goal) == rises
                 near, far = np.where(beyond, near, place), np.where(beyond, place, far)
-                step = place - (landing - wanted) / stretch
+                step = place - (landing - goal) / stretch
                 new = np.where((step >= near) & (step <= far), step, 0.5 * (near + far))
                 done = np.abs(new - place) <= 1e-15 * (1.0 + np.abs(place))
                 place = new

@@ -52,9 +52,9 @@ class Waves:
             if getattr(self, name).shape != accepted:
                 raise InputError(f"{name} must have shape {accepted}, got {getattr(self, name).shape}")
         steps = self.vectors * tile / (2.0 * np.pi)
-        off = np.abs(steps - np.round(steps))
-        if np.any(off > WHOLE):
-            worst = self.vectors.flat[int(np.argmax(off))]
+        deviation = np.abs(steps - np.round(steps))
+        if np.any(deviation > WHOLE):
+            worst = self.vectors.flat[int(np.argmax(deviation))]
             raise InputError(f"vectors must be multiples of 2 pi / tile = {2 * np.pi / tile:g} /m, got {worst:g}")
 
     @property

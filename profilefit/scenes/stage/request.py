@@ -140,20 +140,20 @@ def view(
     Raises:
         InputError: with file, table and key, what was got and what is accepted.
     """
-    named, seen, lit = (tables.table(content, name, {}) for name in TABLES)
-    direction = toward(tables, lit, defaults.light.direction)
+    named, seen, lamp = (tables.table(content, name, {}) for name in TABLES)
+    direction = toward(tables, lamp, defaults.light.direction)
     size = tables.sides("camera", "resolution", seen, defaults.size, 1024)
     if size[0] * size[1] > MOST_PIXELS:
         accepted = f"{MOST_PIXELS} pixels at most, {defaults.limit}"
         raise tables.bad("camera", "resolution", accepted, list(size))
-    irradiance = tables.three("light", "irradiance", lit, defaults.light.irradiance, 0.0, MOST_LIGHT)
+    irradiance = tables.three("light", "irradiance", lamp, defaults.light.irradiance, 0.0, MOST_LIGHT)
     return {
         "file": tables.file,
         "sampling": tables.made("technique", lambda: Sampling(named.get("samples", defaults.samples))),
         "chart": _chart(tables, named),
         "camera": camera(tables, seen),
         "light": Light(direction, irradiance),
-        "ambient": tables.three("light", "ambient", lit, defaults.ambient, 0.0, MOST_LIGHT),
+        "ambient": tables.three("light", "ambient", lamp, defaults.ambient, 0.0, MOST_LIGHT),
         "size": size,
     }
 
