@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from profilefit.scenes.fur.law import shadow, shell_shadow
 from profilefit.scenes.fur.source import strand_text
 from profilefit.scenes.fur.truth import random_patch
-from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, FurWay, trial
+from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, LayerTechnique, trial
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
 UNION, HITS, SHADOW = "shadow over the cone's", "rms of hits over L", "shadow of a cone"  # quantities
-SHELLS: tuple[FurWay, ...] = (FITTED, LINEAR, QUADRATIC)  # the first is ours; the others were published
-SLABS: tuple[FurWay, ...] = (SWEPT, SWEPT_TWO)
+SHELLS: tuple[LayerTechnique, ...] = (FITTED, LINEAR, QUADRATIC)  # the first is ours; the others were published
+SLABS: tuple[LayerTechnique, ...] = (SWEPT, SWEPT_TWO)
 SLENDER, COVER = 20.0, 0.16  # L / r0, r0^2 n of what is looked at
 # Fitted shells are promised from so many layers on, times L / r0 and times L tan(theta) / r0: fewer need an exponent
 # that is far from the cone's, or leave gaps.
@@ -56,7 +56,7 @@ def cells_of() -> Iterator[Cells]:
     yield from of_shadow()
 
 
-def filled(way: FurWay, degrees: Floats, layers: Floats) -> NDArray[np.bool_]:
+def filled(way: LayerTechnique, degrees: Floats, layers: Floats) -> NDArray[np.bool_]:
     """Return where shells are promised to hide what a cone does."""
     tangent = np.tan(np.radians(degrees))
     return np.asarray((way == FITTED) & (layers >= SLENDER * np.maximum(FULL, FILLED * tangent)))
@@ -124,7 +124,7 @@ def _shadow(name: str, own: bool, arithmetic: str, function: Callable[..., Float
     return judged_cells(name, own, SHADOW, arithmetic, axes, value, exactly, error, DIGITS, advice=OF_SHADOW)
 
 
-def _axes(ways: Sequence[FurWay], layers: tuple[int, ...]) -> tuple[ArgumentAxis, ...]:
+def _axes(ways: Sequence[LayerTechnique], layers: tuple[int, ...]) -> tuple[ArgumentAxis, ...]:
     return (
         ArgumentAxis("way", "-", np.arange(len(ways), dtype=float), tuple(way.name for way in ways)),
         ArgumentAxis("θ", "degrees", np.array(DEGREES)),
