@@ -151,7 +151,7 @@ def test_seed_preset_and_store_are_of_every_kind(monkeypatch):
     monkeypatch.setattr(phase, "fit_phase", lambda *given: calls.append(given))
     for name, module, seed in (("heart", stack, 7), ("heart", gaussians, 306), ("petzold", phase, 7)):
         request = module.request(name)
-        for run, notes in ((GIVEN, " The preset and number of photons that were given"), (RUN, None)):
+        for run, notes in ((GIVEN, " No photon is traced: the preset and number"), (RUN, None)):
             work = module.fit(request, run)
             content, _ = work.finish(results_of(module, work))
             assert (content["preset"], content["seed"]) == (run.preset, seed + run.seed - 7)
