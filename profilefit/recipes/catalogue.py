@@ -373,9 +373,10 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
 
 def _usable(records: Records, matched: bool) -> dict[str, dict[str, Any]]:
     """Return the records of fits that converged."""
-    found = records.contents(whole=True)
-    return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
-
-
-def _is_usable(content: Mapping[str, Any], matched: bool) -> bool:
-    return content["fit"]["result"] == "converged" and (record_setting(content).is_matched_isotropic or not matched)
+    return {
+        name: content
+        for name, content in records.contents(whole=True).items()
+        if "constants" in content
+        and content["fit"]["result"] == "converged"
+        and (record_setting(content).is_matched_isotropic or not matched)
+    }
