@@ -82,7 +82,10 @@ def report(
         from profilefit.report.tables.claims_table import read_claims
 
     printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
-    _require_one({"--markdown": markdown, "--html": html, **printed})
+    flags = {"--markdown": markdown, "--html": html, **printed}
+    if len(given := [option for option, value in flags.items() if value]) > 1:
+        accepted = f"one of {', '.join(flags)}, or --json with --quality or --claims"
+        raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
     folder = records_folder(fits, quiet)
     chosen = records_of(names or (), fits)
     groups = {kind: {} if names else kind.paths(folder) for kind in KINDS}
@@ -116,13 +119,6 @@ def report(
         _show(chosen if names else (), groups, folder)
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
-
-
-def _require_one(flags: dict[str, object]) -> None:
-    given = [option for option, value in flags.items() if value]
-    if len(given) > 1:
-        accepted = f"one of {', '.join(flags)}, or --json with --quality or --claims"
-        raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
 
 
 def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[str]) -> None:

@@ -46,8 +46,12 @@ def load(
     such constants exist for the setting. Where the folder lacks only the map between alpha and A that normalises laws,
     the shipped one serves, with a ShippedMap warning.
     """
-    kind, records = _profile_law(name), Records.of(folder or fits_folder())
-    values, where = _constants(kind, constants, _checked(setting), records)
+    kind, records = laws.find_class(laws.PROFILES, name), Records.of(folder or fits_folder())
+    if kind is None and name.startswith("gaussians:"):
+        raise InputError(f"law must be gaussians:N with N a whole number in 1 ... {gaussians.MOST}, got {name!r}")
+    if kind is None:
+        raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
+    values, where = _constants(kind, constants, setting, records)
     at = laws.at(kind, where)
     given = {} if kind.own_reflectance else {"albedo": normalisation(where, records)}
     return _made(at, values, constants, setting=where, **given)
@@ -60,7 +64,7 @@ def albedo_law(
     if name not in laws.MAPS:
         raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
-    values, where = _constants(kind, constants, _checked(setting), Records.of(folder or fits_folder()))
+    values, where = _constants(kind, constants, setting, Records.of(folder or fits_folder()))
     return _made(laws.at(kind, where), values, constants, setting=where)
 
 
@@ -69,38 +73,24 @@ def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisati
     records = Records.of(folder or fits_folder())
     path = records.path_or_shipped(ALBEDO_RECORD, setting)
     if path.parent != records.folder:
-        warnings.warn(
-            f"no record {path.stem!r} in {str(records.folder)!r}: the shipped map serves", ShippedMap, stacklevel=3
-        )
+        text = f"no record {path.stem!r} in {str(records.folder)!r}: the shipped map serves"
+        warnings.warn(text, ShippedMap, stacklevel=3)
     kind = laws.at(Rational, setting)
     return _made(kind, _of_record(records.read(path), setting, path.stem), path.stem, setting=setting)
 
 
 def key_of(name: str) -> str:
     """Return the name under which a profile law is listed: "gaussians:6" for "gaussians", any other name for itself."""
-    known = laws.profile_classes()
-    return str(known[name].entry.key) if name in known else name
-
-
-def _profile_law(name: str) -> type[ProfileLaw]:
-    kind: type[ProfileLaw] | None = laws.find_class(laws.PROFILES, name)
-    if kind is not None:
-        return kind
-    if name.startswith("gaussians:"):
-        raise InputError(f"law must be gaussians:N with N a whole number in 1 ... {gaussians.MOST}, got {name!r}")
-    raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
-
-
-def _checked(setting: Setting | None) -> Setting | None:
-    if setting is not None and not isinstance(setting, Setting):
-        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
-    return setting
+    kind = laws.find_class(laws.PROFILES, name)
+    return name if kind is None else str(kind.entry.key)
 
 
 def _constants(
     kind: type[Constants], which: str, requested: Setting | None, records: Records
 ) -> tuple[dict[str, float], Setting]:
     """Return the constants of a law, and the setting that they belong to."""
+    if requested is not None and not isinstance(requested, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {requested!r}")
     entry = kind.entry
     if which == "regenerated" or (which == "published" and not kind.constant_names()):
         where = requested or SEARCHLIGHT
@@ -113,7 +103,13 @@ def _constants(
             raise RecordError(f"{which}: holds constants of law {owner!r}, got a request for {entry.key!r}")
         where = requested or record_setting(content)
         return {**published.constants(entry.printed), **_of_record(content, where, which)}, where
-    return _printed(entry.printed, which, requested)
+    sets = {s.name: s for s in published.SETS if s.law == entry.printed}
+    if (chosen := sets.get(which.removeprefix("published:"))) is None:
+        raise InputError(f"constants must be one of regenerated, {_accepted(entry.printed)}, got {which!r}")
+    if requested not in (None, chosen.setting):
+        belong = f"the {which} constants of {entry.printed} belong to {chosen.setting}"
+        raise SettingError(f"{belong}, got a request for {requested}")
+    return dict(chosen.constants), chosen.setting
 
 
 def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) -> dict[str, float]:
@@ -122,26 +118,13 @@ def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) 
         return {}
     entry = kind.entry
     if not entry.records:
-        raise RecordError(
-            f"constants of {entry.key} must be one of {_accepted(entry.printed)}: none were regenerated, "
-            "got 'regenerated'"
-        )
+        accepted = f"constants of {entry.key} must be one of {_accepted(entry.printed)}"
+        raise RecordError(f"{accepted}: none were regenerated, got 'regenerated'")
     values: dict[str, float] = {}
     for base in entry.records:
         path = records.path(base, setting)
         values |= _of_record(records.read(path), setting, path.stem)
     return values
-
-
-def _printed(law: str, which: str, requested: Setting | None) -> tuple[dict[str, float], Setting]:
-    wanted = which.removeprefix("published:")
-    sets = [s for s in published.SETS if s.law == law]
-    chosen = next((s for s in sets if s.name == wanted), None)
-    if chosen is None:
-        raise InputError(f"constants must be one of regenerated, {_accepted(law)}, got {which!r}")
-    if requested not in (None, chosen.setting):
-        raise SettingError(f"the {which} constants of {law} belong to {chosen.setting}, got a request for {requested}")
-    return dict(chosen.constants), chosen.setting
 
 
 def _accepted(law: str) -> str:
@@ -337,9 +320,10 @@ def _default(entry: Entry, has_constants: bool) -> str:
     printed = [s.name for s in published.SETS if s.law == entry.printed]
     if len(printed) == 1:
         return printed[0]
-    accepted = ", ".join([*printed, "the path of a record (.json)"])
     several = "one of " if printed else ""
-    raise InputError(f"constants must be {several}{accepted}: {entry.key} was not regenerated, got none")
+    raise InputError(
+        f"constants must be {several}{_accepted(entry.printed)}: {entry.key} was not regenerated, got none"
+    )
 
 
 def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
@@ -389,9 +373,10 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
 
 def _usable(records: Records, matched: bool) -> dict[str, dict[str, Any]]:
     """Return the records of fits that converged."""
-    found = records.contents(whole=True)
-    return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
-
-
-def _is_usable(content: Mapping[str, Any], matched: bool) -> bool:
-    return content["fit"]["result"] == "converged" and (record_setting(content).is_matched_isotropic or not matched)
+    return {
+        name: content
+        for name, content in records.contents(whole=True).items()
+        if "constants" in content
+        and content["fit"]["result"] == "converged"
+        and (record_setting(content).is_matched_isotropic or not matched)
+    }

@@ -68,7 +68,7 @@ def regenerate(requests: Sequence[Request], run: RecipeRun, processes: int = 1) 
         The light that was made ready, and each record as it was written.
     """
     works = sorted((kind.module.fit(request, run) for kind, request in requests), key=lambda work: work.order)
-    steps = list(run.steps.values())
+    steps = list(run.steps)
     with Workers(min(processes, sum(len(work.parts) for work in works))) as workers:
         for _, stage in itertools.groupby(works, key=lambda work: work.order[0]):
             those = list(stage)

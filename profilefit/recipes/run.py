@@ -84,7 +84,7 @@ class RecipeRun:
     say: Say = silent
     progress: bool | None = None
     lights: dict[Setting, Orders] = field(default_factory=dict, compare=False, repr=False)
-    steps: dict[str, Step] = field(default_factory=dict, compare=False, repr=False)
+    steps: list[Step] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def max_chain(self) -> int:
@@ -94,14 +94,22 @@ class RecipeRun:
     def light(self, setting: Setting) -> Orders:
         """Trace the order-resolved light of a setting, once; what the store has of it is not traced again."""
         if setting not in self.lights:
-            self._made_ready(f"photons: {setting}", lambda: self.lights.update({setting: self._traced(setting)}))
+            grid, photons, begin = Grid.from_edges(r=RUN_EDGES), self.number(setting), time.perf_counter()
+            # A folder of each setting, inside that of Setting().
+            store = self.store and self.store / record.record_name("", setting).removeprefix("-")
+            light = simulate_orders(grid, photons, self.seed, setting, store, progress=self.progress)
+            self.say(f"{photons:.3g} photons: {setting}")  # now, since a run that fails says one line
+            self.lights[setting] = light
+            self.steps.append(Step(f"photons: {setting}", time.perf_counter() - begin))
         return self.lights[setting]
 
     def solve_surface(self, n: float) -> None:
         """Solve the exact light under a surface of index n: both illuminations use it, from the user's cache."""
-        if (name := f"exact light: n = {n:g}") not in self.steps:
+        name, begin = f"exact light: n = {n:g}", time.perf_counter()
+        if name not in (step.name for step in self.steps):
             self.say(name)
-            self._made_ready(name, lambda: exact.reflectance(1.0, Setting(n=n)))
+            exact.reflectance(1.0, Setting(n=n))
+            self.steps.append(Step(name, time.perf_counter() - begin))
 
     def number(self, setting: Setting) -> int:
         """Return the number of photons of a setting."""
@@ -110,24 +118,13 @@ class RecipeRun:
     def unused(self) -> str:
         """Return what a record of fixed data says of a preset or number of photons that was given."""
         is_usual = self.preset == "quick" and self.photons is None
-        return "" if is_usual else " The preset and number of photons that were given say nothing here: none is traced."
+        return (
+            "" if is_usual else " No photon is traced: the preset and number of photons that were given have no effect."
+        )
 
-    def part(self, say: Say = silent) -> RecipeRun:
+    def part(self) -> RecipeRun:
         """Return this run as a part in another process has it, without the light."""
-        return replace(self, say=say, lights={}, steps={})
-
-    def _made_ready(self, name: str, make: Callable[[], Any]) -> None:
-        begin = time.perf_counter()
-        make()
-        self.steps[name] = Step(name, time.perf_counter() - begin)
-
-    def _traced(self, setting: Setting) -> Orders:
-        """Trace photons into a folder of this setting, inside that of Setting()."""
-        grid, photons = Grid.from_edges(r=RUN_EDGES), self.number(setting)
-        store = self.store and self.store / record.record_name("", setting).removeprefix("-")
-        light = simulate_orders(grid, photons, self.seed, setting, store, progress=self.progress)
-        self.say(f"{photons:.3g} photons: {setting}")  # now, since a run that fails says one line
-        return light
+        return replace(self, say=silent, lights={}, steps=[])
 
 
 def preset_photons(preset: str, setting: Setting) -> int:

@@ -118,7 +118,12 @@ def described(
         content["derived"] = derived.summary(derived.LawWithErrors.of_fit(result, off), profiles)
     if profiles.covariance is not None:
         content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
-        content["left_out"] = _left_out(profiles, result)
+        # Of what rests on too few effective photons: rings, where the objective sees rings, and whole albedos.
+        sees_rings = result.objective in ("energy", "radial")
+        content["left_out"] = {
+            "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
+            "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
+        }
     samples = {f"samples_{c.kind}": c.samples.astype(np.float32) for c in chains}
     samples |= {f"log_density_{c.kind}": c.log_density.astype(np.float32) for c in chains}
     return content, samples | off.arrays()
@@ -158,12 +163,3 @@ def _constants(
             "intervals": {c.kind: {f"{level:.0%}": c.interval(level)[i] for level in LEVELS} for c in chains},
         }
     return constants
-
-
-def _left_out(profiles: Profiles, result: Fit) -> dict[str, int]:
-    """Count what rests on too few effective photons: rings, where the objective sees rings, and whole albedos."""
-    sees_rings = result.objective in ("energy", "radial")
-    return {
-        "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
-        "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
-    }

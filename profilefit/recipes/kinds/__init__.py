@@ -72,10 +72,10 @@ class Kind:
 
     def paths(self, fits: Path | None = None) -> dict[str, Path]:
         """Return its records by name, from a folder of records, or from `places`."""
-        found: dict[str, Path] = {}
+        records: dict[str, Path] = {}
         for place in reversed(self.places(fits)):
-            found |= available(place / self.folder)
-        return dict(sorted(found.items(), key=lambda item: item[1].name))
+            records |= available(place / self.folder)
+        return dict(sorted(records.items(), key=lambda item: item[1].name))
 
     def root(self, path: Path) -> Path:
         """Return the folder of records that a record of this kind lies in."""
@@ -89,9 +89,9 @@ class Kind:
         """Return what a name is made into, None if it is of another kind; InputError on an option that says nothing."""
         own = {key: value for key, value in options.items() if key in self.options}
         for folder in self.places(fits):
-            if (found := self.module.find(name, folder, **own)) is not None:
+            if (result := self.module.find(name, folder, **own)) is not None:
                 require_none((key for key in options if key not in own), self.words, name)
-                return found
+                return result
         return None
 
 
@@ -128,14 +128,14 @@ def records_of(names: Sequence[str], fits: Path | None = None) -> list[Chosen]:
     known = {kind: kind.paths(fits) for kind in reversed(first.values())}
     if not names:
         return [(kind, name, path) for kind, paths in known.items() if not kind.folder for name, path in paths.items()]
-    found: list[Chosen] = []
+    chosen: list[Chosen] = []
     for name in names:
         own = [(kind, name, paths[name]) for kind, paths in known.items() if name in paths]
         if not own:
             raise _no_record(name, known, known_folder(fits))
         root = own[0][0].root(own[0][2])
-        found += [one for one in own if one[0].root(one[2]) == root]
-    return found
+        chosen += [each for each in own if each[0].root(each[2]) == root]
+    return chosen
 
 
 def _no_record(name: str, known: Mapping[Kind, Mapping[str, Path]], folder: Path) -> RecordError:

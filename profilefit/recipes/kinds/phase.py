@@ -92,8 +92,9 @@ def named(name: str) -> PhaseRecord:
     if name.endswith(".json"):
         return load(Path(name))
     folders = LOCAL, fits_folder()
-    if (found := next(filter(None, (find(name, folder) for folder in folders)), None)) is not None:
-        return found
+    for folder in folders:
+        if (fits := find(name, folder)) is not None:
+            return fits
     known = dict.fromkeys(own for folder in reversed(folders) for own in record.available(folder / PHASES))
     raise InputError(f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}")
 
@@ -124,11 +125,11 @@ def quality(fits: Sequence[PhaseFit]) -> dict[str, Any]:
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says; RecordError in one line on one that is damaged."""
-    found = record.read_of(path, PIPELINE, "phase functions", SHOWN)
+    content = record.read_of(path, PIPELINE, "phase functions", SHOWN)
     names = (f"{form}.{how}.{name}" for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
-    if text := schema.missing_constant(found, names):
+    if text := schema.missing_constant(content, names):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return found
+    return content
 
 
 def load(path: Path) -> PhaseRecord:
@@ -187,24 +188,24 @@ def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun | None = N
     """Return what a record says."""
     constants: dict[str, Any] = {}
     phases: dict[str, Any] = {name: {} for name in FORMS}
-    for one in fits:
-        how = HELD if one.held else FREE
-        for place, name in enumerate(one.form.names):
-            constants[f"{one.form.name}.{how}.{name}"] = {
+    for each in fits:
+        how = HELD if each.held else FREE
+        for place, name in enumerate(each.form.names):
+            constants[f"{each.form.name}.{how}.{name}"] = {
                 "published": None,
-                "regenerated": one.constants[place],
-                **{key: None if own is None else own[place] for key, own in one.errors.items()},
+                "regenerated": each.constants[place],
+                **{key: None if own is None else own[place] for key, own in each.errors.items()},
             }
-        phases[one.form.name][how] = {
-            "held": list(one.held),
-            "result": one.result,
-            "steps": one.best.steps,
-            "condition_number": one.best.condition_number,
-            "rms": one.rms,
-            "bands": list(one.bands),
-            "mean_cosine": one.mean_cosine,
-            "backscattered": one.backscattered,
-            "second": float(one.phase.moment(2)),
+        phases[each.form.name][how] = {
+            "held": list(each.held),
+            "result": each.result,
+            "steps": each.best.steps,
+            "condition_number": each.best.condition_number,
+            "rms": each.rms,
+            "bands": list(each.bands),
+            "mean_cosine": each.mean_cosine,
+            "backscattered": each.backscattered,
+            "second": float(each.phase.moment(2)),
         }
     return {
         "title": TITLE,

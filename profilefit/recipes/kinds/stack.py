@@ -196,13 +196,13 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
     law, fitted = interface.law, interface.thicknesses
     d, illumination = np.sqrt(fitted[:-1] * fitted[1:]), law.setting.illumination
     if interface.is_traced:
-        found = [
+        measured = [
             of_rings(law, at, stacks.rings_of(interface.medium, at, illumination, len(d) + 1 + number, tracing))
             for number, at in enumerate(d)
         ]
     else:
-        found = [_of_exact(interface, float(at)) for at in d]
-    kept = {name: [getattr(each, name) for each in found] for name in ("rel", "ks", "delta_A")}
+        measured = [_of_exact(interface, float(at)) for at in d]
+    kept = {name: [getattr(each, name) for each in measured] for name in ("rel", "ks", "delta_A")}
     return {"thickness": d.tolist(), **kept}
 
 
@@ -284,7 +284,7 @@ def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED)
             value = value[name]
         if not kind.accepts(value):
             raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
-    layers = [_recorded_layer(one) for one in content["layers"]]
+    layers = [_recorded_layer(layer) for layer in content["layers"]]
     stack = stack_of(Tables(file, {}), layers, content["unit"])
     for medium in stack.media:
         stacks.require(medium)
@@ -431,24 +431,26 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
 
     A stack's constants belong to its half spaces'. InputError where what is recorded is of another kind.
     """
-    for one in recorded:
-        if not isinstance(one, Mapping) or not all(map(schema.is_number, one.values())):
-            raise InputError(f"half_spaces must be tables of numbers, got {schema.shown(one)}")
+    for constants in recorded:
+        if not isinstance(constants, Mapping) or not all(map(schema.is_number, constants.values())):
+            raise InputError(f"half_spaces must be tables of numbers, got {schema.shown(constants)}")
     if len(recorded) != len(medium.layers):
         raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
     if any(layer.g > 0 for layer in medium.layers):
         own = [replace(setting, g=layer.g) for layer in medium.layers]
         similar = [layer.similar for layer in medium.layers]
         laws = [
-            ForwardHalfSpace(each, **{name: float(one[name]) for name in ForwardHalfSpace.constant_names()})
-            for each, one in zip(own, recorded, strict=True)
+            ForwardHalfSpace(each, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
+            for each, values in zip(own, recorded, strict=True)
         ]
-        return [LayerLaw(each, law, one.alpha, one.mfp) for each, law, one in zip(own, laws, similar, strict=True)]
+        return [
+            LayerLaw(each, law, layer.alpha, layer.mfp) for each, law, layer in zip(own, laws, similar, strict=True)
+        ]
     hazard = catalogue.load("hazard", setting=setting)
-    constants = hazard.constants()
-    for one in recorded:
-        same = one.keys() == constants.keys()
-        if not (same and np.allclose([one[name] for name in constants], list(constants.values()), rtol=EQUAL)):
+    today = hazard.constants()
+    for constants in recorded:
+        same = constants.keys() == today.keys()
+        if not (same and np.allclose([constants[name] for name in today], list(today.values()), rtol=EQUAL)):
             raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
     return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
 

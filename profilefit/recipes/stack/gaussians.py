@@ -190,7 +190,10 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
     """Return the optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
-        values, jacobian = _off(*_parted(offset + slopes @ parameters, len(lights)), lights)
+        constants = offset + slopes @ parameters
+        count = constants.size // (len(lights) + 1)
+        weights = constants[count:].reshape(len(lights), count)
+        values, jacobian = _off(np.exp(constants[:count]), weights, lights)
         return values, jacobian @ slopes
 
     for _ in range(TURNS):
@@ -306,11 +309,6 @@ def _of(parameters: Floats, lights: int) -> tuple[Floats, Floats, Floats]:
         by_logit = np.diag(own) - np.outer(own, own)
         slopes[rows : rows + count, columns : columns + count - 1] = by_logit[:, 1:]
     return level, weights, slopes
-
-
-def _parted(constants: Floats, lights: int) -> tuple[Floats, Floats]:
-    count = constants.size // (lights + 1)
-    return np.exp(constants[:count]), constants[count:].reshape(lights, count)
 
 
 def _off(variances: Floats, weights: Floats, lights: Sequence[SumLight]) -> tuple[Floats, Floats]:

@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
-from profilefit.recipes.catalogue import Named, albedo_laws, profile_laws
+from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records, record_setting
 from profilefit.recipes.targets import albedo_values
@@ -53,7 +53,7 @@ class ModelError:
         return self.values.get(measure)
 
 
-def of_profile(one: Named, folder: Folder) -> ModelError:
+def of_profile(one: LoadedLaw, folder: Folder) -> ModelError:
     """The errors of a profile law, from its records, or those of the regenerated law of its name and setting.
 
     What no record states is measured on the float64 law, where the setting has an exact profile.
@@ -72,7 +72,7 @@ def of_profile(one: Named, folder: Folder) -> ModelError:
     return ModelError(found, source)
 
 
-def of_map(one: Named, folder: Folder) -> ModelError:
+def of_map(one: LoadedLaw, folder: Folder) -> ModelError:
     """The errors of a map, likewise."""
     records = Records.of(folder)
     owner = one if one.records else _regenerated(one, albedo_laws(records, matched=False))
@@ -84,7 +84,7 @@ def of_map(one: Named, folder: Folder) -> ModelError:
     return ModelError(found, source)
 
 
-def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
+def _regenerated(one: LoadedLaw, laws: Sequence[LoadedLaw]) -> LoadedLaw | None:
     same = (law for law in laws if law.records and (law.name, law.setting) == (one.name, one.setting))
     return next(same, None)
 

@@ -11,7 +11,7 @@ from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.half import HalfCheck, check_half
 from profilefit.shader.check.law_check import LawCheck, check_laws
@@ -23,7 +23,7 @@ from profilefit.shader.context import opened, renderer
 REGENERATED = "regenerated"
 # Indices, and mean cosines, that a law which spans them is checked at, of those: both ends and between.
 INDICES, COSINES = (1.001, 1.02, 1.2, 1.4, 1.6), (0.1, 0.5, 0.95)
-Chosen = tuple[list[Named], list[Named]]
+Chosen = tuple[list[LoadedLaw], list[LoadedLaw]]
 """Profile laws, and maps between A and alpha."""
 
 
@@ -70,7 +70,7 @@ def regenerated(folder: Folder) -> Chosen:
     return of_laws, of_maps
 
 
-def _spread(one: Named, records: Records) -> list[Named]:
+def _spread(one: LoadedLaw, records: Records) -> list[LoadedLaw]:
     content = records.content(one.label)
     low, high = content.get("indices") or (0.0, 0.0)
     cosines = COSINES if "cosines" in content else (one.setting.g,)

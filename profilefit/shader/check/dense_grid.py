@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.shader_law import Values
 
@@ -192,7 +192,7 @@ class ShaderCheck:
     inside    what must not be, where the law says that it holds; outside elsewhere
     """
 
-    of: Named
+    of: LoadedLaw
     model: ModelError
     rounding: dict[str, float]
     measured: dict[str, float]

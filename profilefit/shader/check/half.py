@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.shader.check.shader_law import ShaderLaw, Values, half_extension
 
@@ -25,12 +25,12 @@ ALPHA, REFLECTANCE, RADIUS, RESULTS, ARITHMETIC = "α stored", "A stored", "r st
 class HalfCheck:
     """`rel` and `ks` [-] of what float16 alone changes, worst over the records' albedos, for l = 1."""
 
-    of: Named
+    of: LoadedLaw
     rel: dict[str, float]
     ks: dict[str, float]
 
 
-def check_half(context: moderngl.Context, one: Named) -> HalfCheck:
+def check_half(context: moderngl.Context, one: LoadedLaw) -> HalfCheck:
     """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
     law = one.law.in_reduced()
     r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]

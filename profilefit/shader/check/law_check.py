@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
@@ -127,7 +127,7 @@ class LawCheck(ShaderCheck):
     spreads: dict[str, Spread]
 
 
-def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> Iterator[LawCheck]:
+def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         references = pool.map(lambda one: dense_grid.reference(one.law.in_reduced(), dense_grid.arguments()), laws)
@@ -136,7 +136,7 @@ def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Folder)
 
 
 def check_law(
-    context: moderngl.Context, one: Named, folder: Folder, text: str = "", exact: Values | None = None
+    context: moderngl.Context, one: LoadedLaw, folder: Folder, text: str = "", exact: Values | None = None
 ) -> LawCheck:
     """Check a profile law with its constants. ShaderError if it does not compile.
 
@@ -197,7 +197,7 @@ def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> 
     return np.abs(mine - right)
 
 
-def _measured(shader: ShaderLaw, one: Named, model: ModelError) -> dict[str, float]:
+def _measured(shader: ShaderLaw, one: LoadedLaw, model: ModelError) -> dict[str, float]:
     """The errors of the GPU's own numbers against the exact half space, of what the model error is known of."""
     found: dict[str, float] = {}
     if not one.setting.is_solved:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
@@ -76,7 +76,7 @@ class Cost:
     ratio: dict[str, float]
 
 
-def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> dict[str, Cost]:
+def law_costs(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> dict[str, Cost]:
     """Measure the cost of the laws' sources beside printed normalized diffusion; nothing if there is no law."""
     yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
     return costs(context, [one.law for one in laws], yardstick) if laws else {}

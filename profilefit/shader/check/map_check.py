@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
@@ -32,7 +32,7 @@ class MapCheck(ShaderCheck):
     places: dict[str, str]
 
 
-def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str = "") -> MapCheck:
+def check_map(context: moderngl.Context, one: LoadedLaw, folder: Folder, text: str = "") -> MapCheck:
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
     model = bounds.of_map(one, folder)
     of_reflectance, of_alpha = validity.of_map(one, folder)

@@ -17,7 +17,7 @@ from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
-from profilefit.recipes.catalogue import Named, profile_laws
+from profilefit.recipes.catalogue import LoadedLaw, profile_laws
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.dense_grid import ULP
@@ -36,7 +36,7 @@ class Validity:
     xi: Range = EVERYWHERE
 
 
-def of_profile(one: Named, folder: Folder) -> Validity:
+def of_profile(one: LoadedLaw, folder: Folder) -> Validity:
     """Return a law's own range; a fitted inverse may hold for the albedos of its record only, and for some of xi.
 
     A record that is of the profile alone, or of the inverse alone, states nothing of the other.
@@ -64,7 +64,7 @@ def masks(valid: Validity, alpha: Floats, xi: Floats) -> tuple[Mask, Mask]:
     return profiled[:, None, None], drawn[:, None, None] & valid.xi.holds(xi)[:, None]
 
 
-def of_map(one: Named, folder: Folder) -> tuple[Range, Range]:
+def of_map(one: LoadedLaw, folder: Folder) -> tuple[Range, Range]:
     """Reflectances A and albedos alpha of a map: by its own statement, and of its record where it holds no further."""
     law: AlbedoLaw = one.law
     if not (law.entry.as_fitted and one.records):
@@ -74,7 +74,7 @@ def of_map(one: Named, folder: Folder) -> tuple[Range, Range]:
     return Range(float(low), float(high)), Range(fitted.low, min(fitted.high, law.albedos.high), open_high=True)
 
 
-def promised_by_profile(one: Named, folder: Folder) -> list[Bound]:
+def promised_by_profile(one: LoadedLaw, folder: Folder) -> list[Bound]:
     """Return what Liang et al. say of (17), (21) and of alpha = 0; none of other laws, nor of regenerated constants."""
     if not isinstance(one.law, Liang) or one.records:
         return []
@@ -101,7 +101,7 @@ def promised_by_profile(one: Named, folder: Folder) -> list[Bound]:
     ]
 
 
-def promised_by_map(one: Named) -> list[Bound]:
+def promised_by_map(one: LoadedLaw) -> list[Bound]:
     """Return what they say of (8): one alpha for each A, and alpha(1) = 1."""
     if not isinstance(one.law, LiangAlbedo) or one.records:
         return []

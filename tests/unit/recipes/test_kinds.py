@@ -19,11 +19,13 @@ from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.stack import photons
 from profilefit.recipes.stack.photons import Tracing
+from profilefit.shader.law_file import export_subject
 from tests.unit.cli.conftest import command
 from tests.unit.recipes.stack.test_record import RUN, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
 
 __all__ = ["command"]
+ROOT = Path(__file__).resolve().parents[3]
 BY_KEY = {kind.key: kind for kind in KINDS}
 TOY = '''\
 """Dice: the mean of numbers, one a line."""
@@ -151,7 +153,7 @@ def test_seed_preset_and_store_are_of_every_kind(monkeypatch):
     monkeypatch.setattr(phase, "fit_phase", lambda *given: calls.append(given))
     for name, module, seed in (("heart", stack, 7), ("heart", gaussians, 306), ("petzold", phase, 7)):
         request = module.request(name)
-        for run, notes in ((GIVEN, " The preset and number of photons that were given"), (RUN, None)):
+        for run, notes in ((GIVEN, " No photon is traced: the preset and number"), (RUN, None)):
             work = module.fit(request, run)
             content, _ = work.finish(results_of(module, work))
             assert (content["preset"], content["seed"]) == (run.preset, seed + run.seed - 7)
@@ -228,3 +230,26 @@ def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(sixth, comm
     assert command(*words) == (0, "const float lucky_mean = 3.5;\n", "profilefit: records of 'mine'\n")
     assert command(*words, "--n", "2")[2].endswith("--n must be left out where NAME is a die, got 'fair'\n")
     assert "fair" in kinds.names(kinds.KINDS, Path("mine"))
+
+
+def test_an_exported_law_is_found_without_a_walk_through_other_kinds():
+    """Files of the packages whose functions run, in a process that has them imported; 22 before there was a shelf."""
+    export_subject("hazard")
+    entered = set()
+
+    def profile(frame, event, _):
+        path, name = frame.f_code.co_filename, frame.f_code.co_name
+        if (
+            event == "call"
+            and name != "<module>"
+            and path.startswith((str(ROOT / "profilefit"), str(ROOT / "mcml_sim")))
+        ):
+            entered.add(path)
+
+    sys.setprofile(profile)
+    try:
+        export_subject("hazard")
+    finally:
+        sys.setprofile(None)
+    assert len(entered) <= 17
+    assert not [path for path in entered if Path(path).stem in ("stack", "gaussians", "phase", "albedo_map")]
