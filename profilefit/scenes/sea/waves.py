@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
+from profilefit.recipes.toml_tables import LENGTHS
 
 Floats = NDArray[np.float64]
 SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]
@@ -232,6 +233,7 @@ def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: i
 
 
 def _length(name: str, value: object) -> float:
-    if not is_number(value) or not 0.0 < value < np.inf:
-        raise InputError(f"{name} must be a length > 0 [m], got {shown(value)}")
+    least, most = LENGTHS
+    if not is_number(value) or not least <= value <= most:
+        raise InputError(f"{name} must be a length in {least:g} ... {most:g} m, got {shown(value)}")
     return float(value)

@@ -27,7 +27,7 @@ AS_PROCESSES: dict[str, tuple[str, tuple[str, ...], int]] = {
     "mci": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 5),
     "mci2": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 2),
 }
-PROCESSES = 200
+PROCESSES = ALL // 50
 BESIDE = 2
 ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning", "site-packages")
 
@@ -102,5 +102,5 @@ def _ended_wrong(ended: processes.Ended, folder: Path, given: str) -> Iterator[s
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", AS_PROCESSES)
-def test_two_hundred_as_processes(kind, elsewhere):
+def test_as_processes(kind, elsewhere):
     require_none(process_faults(kind, PROCESSES, elsewhere))

@@ -96,7 +96,7 @@ def test_refraction_is_snell_and_fresnel():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Waves(0.0), "tile must be a length > 0 \\[m\\], got 0.0"),
+        (lambda: Waves(0.0), "tile must be a length in 1e-09 ... 1e\\+09 m, got 0.0"),
         (
             lambda: Waves(TILE, [0.1], [[1.0, 0.0]], [0.0]),
             "vectors must be multiples of 2 pi / tile = 0.628319 /m, got 1",
@@ -105,9 +105,11 @@ def test_refraction_is_snell_and_fresnel():
         (lambda: Waves(TILE, [np.nan], [[STEP, 0.0]], [0.0]), "amplitudes must be finite numbers, got nan"),
         (lambda: Waves(TILE, mean=np.inf), "mean must be a level \\[m\\], got inf"),
         (lambda: random_sea(-0.1, TILE), "rms_slope must be a number >= 0, got -0.1"),
+        (lambda: random_sea(0.1, 1e-300), "tile must be a length in 1e-09 ... 1e\\+09 m, got 1e-300"),
+        (lambda: random_floor(0.1, 1e-300, 5.0), "tile must be a length in 1e-09 ... 1e\\+09 m, got 1e-300"),
         (lambda: random_sea(0.1, TILE, wind=(0.0, 0.0)), "wind must be two speeds \\[m/s\\], not both 0"),
         (lambda: random_sea(0.1, TILE, count=0), "count must be a whole number >= 1, got 0"),
-        (lambda: random_floor(0.1, TILE, -1.0), "depth must be a length > 0 \\[m\\], got -1.0"),
+        (lambda: random_floor(0.1, TILE, -1.0), "depth must be a length in 1e-09 ... 1e\\+09 m, got -1.0"),
     ],
 )
 def test_refusals(make, message):
