@@ -99,7 +99,7 @@ class Errors(NamedTuple):
 
     @property
     def better(self) -> Floats:
-        """Of texture and screen (n,)."""
+        """Lower error of texture and screen (n,)."""
         return np.minimum(self.ways[TEXTURE], self.ways[SCREEN])
 
 
@@ -110,7 +110,7 @@ GRID = (
 
 
 def errors(scenes: Sequence[SplitLight]) -> Errors:
-    """Of every balance of `GRID`."""
+    """Compute errors of every balance of `GRID`."""
     balanced = np.empty((len(scenes), *(one.size for one in GRID)))
     for number, one in enumerate(scenes):
         known: dict[int, list[float]] = {}

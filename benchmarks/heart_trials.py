@@ -64,7 +64,7 @@ class RandomScene:
 
     @cached_property
     def camera(self) -> Camera:
-        """It sees all of the surface, in parallel rays."""
+        """Camera that sees all of the surface, in parallel rays."""
         half = np.max(np.linalg.norm(self.mesh.position, axis=1))
         x, y, z = (10.0 * half * unit(self.eye)).tolist()
         return Camera((x, y, z), height=2.1 * half, kind="orthographic")

@@ -36,7 +36,7 @@ BRIGHTER_ERRORS = (0.08, 0.12)
 
 @dataclass(frozen=True)
 class ByOrder:
-    """What each order of scattering adds, per photon started, in independent groups.
+    """Contribution of each order of scattering per photon started, in independent groups.
 
     groups   (groups, orders, ...), orders 0, 1, 2, ..., where every scattering keeps all of the light
     highest  albedo that the light was followed for [-]
@@ -46,7 +46,7 @@ class ByOrder:
     highest: float
 
     def at(self, omega: float) -> Estimate:
-        """Of all orders (...) under an albedo; InputError beyond the highest."""
+        """Return the sum of all orders (...) under an albedo; InputError beyond the highest."""
         if not (is_number(omega) and 0 <= omega <= self.highest):
             raise InputError(f"omega must be an albedo in [0, {self.highest:g}], got {shown(omega)}")
         weights = float(omega) ** np.arange(self.groups.shape[1])
@@ -217,7 +217,7 @@ class _Flight:
         return True
 
     def crossings(self, plane: float) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """Which light flies toward a plane z, the square of the radius where it would cross, and its chance to."""
+        """Return which photons fly toward a plane z, their squared radius there, and their chance to arrive."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             path = (plane - self.z) / self.dz
         ahead = np.flatnonzero(path > 0)
@@ -227,7 +227,7 @@ class _Flight:
 
 
 def _stacked(groups: list[Floats]) -> Floats:
-    """Of groups of one order count after another, those that ended early filled up by nothing."""
+    """Stack groups of different numbers of orders; those that ended early are filled up with zeros."""
     most = max(len(one) for one in groups)
     return np.array([np.concatenate([one, np.zeros((most - len(one), *one.shape[1:]))]) for one in groups])
 
@@ -260,7 +260,7 @@ def _rising(name: str, value: ArrayLike) -> Floats:
 
 
 def share_once(found: ByOrder, omega: float) -> Estimate:
-    """Of the radiance toward an eye, what single scattering is [-], by photons of `trace_view`; its error by groups."""
+    """Return the share of single scattering in the radiance toward an eye [-], by photons of `trace_view`."""
     whole = found.at(omega)
     once = omega * found.groups[0, 1]
     value = once / np.asarray(whole.value)

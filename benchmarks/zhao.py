@@ -1,4 +1,4 @@
-"""What Zhao et al. print for layered objects, formula by formula, as printed and with each misprint put right.
+"""Formulas that Zhao et al. print for layered objects, as printed and with each misprint corrected.
 
 Zhao et al., Real-time subsurface scattering rendering method for dynamic objects, Journal of Software (Ruan Jian Xue
 Bao), 2010: single scattering is summed along the refracted eye ray, (3) to (9), multiple scattering is the dipole of
@@ -29,7 +29,7 @@ WEIGHTS = (0.3, 0.3, 0.05, 0.05, 0.3)
 
 @dataclass(frozen=True)
 class Corrections:
-    """Which of the misprints are put right: all of them, unless it is said otherwise.
+    """Misprints to correct: all of them by default.
 
     phase_sign  (8) has 1 + g cos for the angle between two directions of propagation, which makes g > 0 scatter back
     schlick     (8) has g where Schlick's form has k = 1.55 g - 0.55 g^3
@@ -50,7 +50,7 @@ class Corrections:
 
     @classmethod
     def switches(cls) -> tuple[str, ...]:
-        """Their names."""
+        """Return the names of the corrections."""
         return tuple(field.name for field in fields(cls))
 
 

@@ -19,7 +19,7 @@ BROKEN = 1  # exit status
 
 
 class FloatFormat(enum.StrEnum):
-    """What is measured besides float32, in which every bound is judged."""
+    """Arithmetic to measure besides float32, in which every bound is judged."""
 
     SINGLE = "float32"
     HALF = "float16"

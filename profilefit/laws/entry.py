@@ -19,7 +19,7 @@ class Range:
     open_high: bool = False
 
     def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the values lie inside."""
+        """Return a mask of the values inside."""
         given = np.asarray(values)
         above = given > self.low if self.open_low else given >= self.low
         return above & (given < self.high if self.open_high else given <= self.high)
@@ -93,7 +93,7 @@ class Entry:
 
     @property
     def printed(self) -> str:
-        """Its name among the printed sets of `laws.published`."""
+        """Name among the printed sets of `laws.published`."""
         return f"{self.name}_albedo" if self.is_map else self.name
 
     @property

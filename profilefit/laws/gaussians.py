@@ -190,7 +190,7 @@ class MediumGaussians(GaussianSum):
 
     @property
     def entry(self) -> Entry:  # type: ignore[override]
-        """Its text's blocks stand once for each Gaussian."""
+        """Entry whose shader source repeats its blocks for each Gaussian."""
         return Entry("gaussians", text=Text("gaussians", count=self.count()))
 
     def count(self) -> int:

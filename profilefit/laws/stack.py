@@ -78,7 +78,7 @@ class LayerLaw(Constants):
         return _moved(self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp, depth)
 
     def drawn_density(self, r: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
-        """Its density [1/length]."""
+        """Return the density of drawn radii [1/length]."""
         _require_none(thickness)
         s, slope = _unmoved(r, depth)
         return slope * self.law.sampler.scaled_pdf(s / self.mfp, jnp.asarray(self.alpha)) / self.mfp
@@ -194,7 +194,7 @@ class StackLaw(Constants):
         return jnp.where(xi < first, own, jnp.where(xi < first + second, back, image))
 
     def drawn_density(self, r: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
-        """Its density [1/length]."""
+        """Return the density of drawn radii [1/length]."""
         of = self.terms(thickness)
         first, second, third = self.shares(of)
         s, slope = _unmoved(r, depth)
@@ -294,7 +294,7 @@ def _moved(s: Array, depth: Array | float) -> Array:
 
 
 def _unmoved(r: Array, depth: Array | float) -> tuple[Array, Array]:
-    """Its inverse, s [length], and ds/dr [-]."""
+    """Return the inverse s [length] of `_moved`, and ds/dr [-]."""
     inside = (r > 0) & (r < jnp.inf)
     bounded = jnp.where(inside, r, 1.0)
     far = jnp.hypot(bounded, depth)

@@ -26,12 +26,12 @@ Paths = Mapping[str, Path]
 
 
 class KindTables(NamedTuple):
-    """What `report` shows of a kind.
+    """Tables of a kind in `report`.
 
-    key       under which --json has its records
-    tables    of what a record of it says, and of its file
-    summary   of its records by name, in a folder of records; None where there are none
-    sections  for Markdown, of those records, by the names of their marks
+    key       name of its records in the output of --json
+    tables    tables of one record, from its content and its path
+    summary   table of all its records by name, in a folder of records; None where there are none
+    sections  Markdown sections of those records, by the names of their marks
     """
 
     key: str

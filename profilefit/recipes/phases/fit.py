@@ -55,7 +55,7 @@ class PhaseFit:
     bands: tuple[float, ...]
 
     moments: tuple[float, float]
-    """Of the table: mean cosine and backscattered share [-]."""
+    """Mean cosine and backscattered share of the table [-]."""
 
     @property
     def result(self) -> str:

@@ -53,12 +53,12 @@ class Beam(NamedTuple):
     """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-]."""
 
     sine: Floats
-    """Of its angle to the normal in the layer; above 1 where no light of that direction gets there."""
+    """Sine of its angle to the normal in the layer; above 1 where no light of that direction gets there."""
     cosine: Floats
     down: Floats
     """Share that passes the layer's top on its way down, as often as it does."""
     up: Floats
-    """The same of the layer's bottom, on its way up."""
+    """Share that passes the layer's bottom on its way up, as often as it does."""
 
 
 def single_scattering(
