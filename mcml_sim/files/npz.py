@@ -79,11 +79,11 @@ def _members(archive: zipfile.ZipFile, shapes: Shapes | None) -> dict[str, zipfi
         if name == member.filename or (shapes is not None and name not in shapes):
             continue
         if name in members:
-            raise ValueError(f"two arrays are named {_shown(name)}")
+            raise ValueError(f"two arrays are named {_quoted(name)}")
         if member.flag_bits & ENCRYPTED:
-            raise ValueError(f"{_shown(name)} is encrypted")
+            raise ValueError(f"{_quoted(name)} is encrypted")
         if member.compress_type not in METHODS:
-            raise ValueError(f"{_shown(name)} is packed in a way that numpy does not use")
+            raise ValueError(f"{_quoted(name)} is packed in a way that numpy does not use")
         members[name] = member
     return members
 
@@ -95,20 +95,20 @@ def _checked_size(
     with archive.open(member) as file:
         head = HEADER.match(file.read(LONGEST_HEADER))
     if head is None or int.from_bytes(head["length"], "little") != len(head["text"]):
-        raise ValueError(f"{_shown(name)} is no array of numbers or text as numpy writes it")
+        raise ValueError(f"{_quoted(name)} is no array of numbers or text as numpy writes it")
     lengths = [part.strip() for part in head["shape"].decode().rstrip(" ,").split(",")] if head["shape"] else []
     if len(lengths) > MOST_AXES or not all(re.fullmatch(rf"\d{{1,{LONGEST_NUMBER}}}", length) for length in lengths):
-        raise ValueError(f"{_shown(name)} has a shape that no array has")
+        raise ValueError(f"{_quoted(name)} has a shape that no array has")
     got, dtype = tuple(map(int, lengths)), np.dtype(head["dtype"].decode())
     if is_text and (dtype.kind != "U" or got != ()):
-        raise ValueError(f"{_shown(name)} must be one text, got {dtype} of shape {got}")
+        raise ValueError(f"{_quoted(name)} must be one text, got {dtype} of shape {got}")
     if not is_text and (dtype.kind == "U" or dtype.itemsize > WIDEST):
-        raise ValueError(f"{_shown(name)} must be real numbers, got {dtype}")
+        raise ValueError(f"{_quoted(name)} must be real numbers, got {dtype}")
     if shape is not None and got != shape:
-        raise ValueError(f"{_shown(name)} must have the shape {shape}, got {got}")
+        raise ValueError(f"{_quoted(name)} must have the shape {shape}, got {got}")
     claimed = math.prod(got) * dtype.itemsize
     if member.file_size != head.end() + claimed:
-        raise ValueError(f"{_shown(name)} claims {claimed} bytes, and has {member.file_size - head.end()}")
+        raise ValueError(f"{_quoted(name)} claims {claimed} bytes, and has {member.file_size - head.end()}")
     return member.file_size
 
 
@@ -117,9 +117,9 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray:
         array: NDArray = np.lib.format.read_array(file, allow_pickle=False)
     array = array.astype(array.dtype.newbyteorder("="), copy=False)
     if array.dtype.kind == "U" and np.any(array.reshape(1).view(np.uint32) > LAST_LETTER):  # Python would stop there
-        raise ValueError(f"{_shown(member.filename)} is no text")
+        raise ValueError(f"{_quoted(member.filename)} is no text")
     return array
 
 
-def _shown(name: str) -> str:
+def _quoted(name: str) -> str:
     return repr(name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}...")

@@ -143,7 +143,7 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     if version.startswith(VERSION_2):
         return tuple(_runs_of_2(lines, read_media(lines)))
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
-        raise lines.error("the file version, 1.0 or mcmli2.0", shown(version))
+        raise lines.error("the file version, 1.0 or mcmli2.0", quoted(version))
     (word,) = lines.take(1, "the number of runs")
     outputs: set[str] = set()
     return tuple(read_run(lines, outputs) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
@@ -173,7 +173,7 @@ class Lines:
             if len(words) >= count:
                 return [self._text(word) for word in words[:most]]
             if words:
-                raise self.error(f"{count} values, {expected}", f"{len(words)}: {shown(' '.join(words))}")
+                raise self.error(f"{count} values, {expected}", f"{len(words)}: {quoted(' '.join(words))}")
         raise self.error(expected, "the end of the file")
 
     def find(self, key: str) -> None:
@@ -201,13 +201,13 @@ class Lines:
             return int(float(word))
         if WHOLE.fullmatch(word) and least <= int(word) <= most:
             return int(word)
-        raise self.error(f"{name}, a whole number from {least} to {most}", shown(word))
+        raise self.error(f"{name}, a whole number from {least} to {most}", quoted(word))
 
     def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
         """Return a number within bounds, both included."""
         if DECIMAL.fullmatch(word) and bounds[0] <= float(word) <= bounds[1]:
             return float(word) + 0.0  # no -0
-        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", shown(word))
+        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", quoted(word))
 
     def coefficient(self, name: str, word: str) -> float:
         """Return a coefficient: 0, or large enough that a float32 holds the mean free path."""
@@ -259,12 +259,12 @@ def read_media(lines: Lines) -> dict[str, Optics]:
         if name == "end":
             return media
         if len(words) < 4 or len(media) == MOST_MEDIA:
-            raise lines.error(f"a medium's name, n, mu_a, mu_s and g, {MOST_MEDIA} media at most", shown(name))
+            raise lines.error(f"a medium's name, n, mu_a, mu_s and g, {MOST_MEDIA} media at most", quoted(name))
         if name in media:
-            raise lines.error("each medium once", f"{shown(name)} again")
+            raise lines.error("each medium once", f"{quoted(name)} again")
         if len(name) > MAX_NAME:
-            raise lines.error(f"a medium's name of at most {MAX_NAME} characters", shown(name))
-        of = f"of {shown(name)}"
+            raise lines.error(f"a medium's name of at most {MAX_NAME} characters", quoted(name))
+        of = f"of {quoted(name)}"
         mu_s = lines.coefficient(f"mu_s {of} in 1/cm", words[2])
         n, g = lines.decimal(f"n {of}", words[0], INDICES), require_g(lines, of, words[3], mu_s)
         media[name] = Optics(n, lines.coefficient(f"mu_a {of} in 1/cm", words[1]), mu_s, g)
@@ -291,10 +291,10 @@ def read_run_2(lines: Lines, media: dict[str, Optics], output: str, form: str, s
     medium = _medium_of_2(lines, media)
     (source,) = lines.take(1, "the source, pencil")
     if source != PENCIL:
-        raise lines.error("a pencil beam, pencil", shown(source))
+        raise lines.error("a pencil beam, pencil", quoted(source))
     depth, *_ = lines.take(1, "the depth that light starts from", optional=1)
     if lines.decimal("the depth that light starts from, 0", depth, (0.0, LARGEST)) != 0:
-        raise lines.error("light that starts at the surface, 0", shown(depth))
+        raise lines.error("light that starts at the surface, 0", quoted(depth))
     words = lines.take(3, "dz, dr and dt")
     dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words[:2], strict=True))
     lines.decimal("dt in ps", words[2], PICOSECONDS)
@@ -318,11 +318,11 @@ def _require_scored(lines: Lines, needed: tuple[str, ...]) -> None:
     names = {word.upper() for word in words}
     for name in needed:
         if name.upper() not in names:
-            raise lines.error(f"{name} among what was scored", shown(" ".join(words)))
+            raise lines.error(f"{name} among what was scored", quoted(" ".join(words)))
     known = {name.upper() for name in SCORED}
     for word in () if needed else words:
         if word.upper() not in known:
-            raise lines.error(f"quantities of {', '.join(SCORED)}, none resolved in time", shown(word))
+            raise lines.error(f"quantities of {', '.join(SCORED)}, none resolved in time", quoted(word))
 
 
 def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
@@ -332,7 +332,7 @@ def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
         if name == "end":
             break
         if name not in media or len(rows) == MAX_LAYERS + 2:
-            raise lines.error(f"one of the media {', '.join(media)[:MAX_NAME]}", shown(name))
+            raise lines.error(f"one of the media {', '.join(media)[:MAX_NAME]}", quoted(name))
         rows.append((media[name], thickness[0] if thickness else ""))
     if len(rows) < 3 or not all(word for _, word in rows[1:-1]):
         raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(rows)} lines")
@@ -349,12 +349,12 @@ def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
 def _output(lines: Lines, outputs: set[str], name: str, *form: str) -> tuple[str, str]:
     """Return name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     if len(name) > MAX_NAME or not name.isprintable():
-        raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", shown(name))
+        raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", quoted(name))
     if form and not FORMAT.fullmatch(form[0]):
-        raise lines.error("A or B after the name (a name holds no spaces)", shown(form[0]))
+        raise lines.error("A or B after the name (a name holds no spaces)", quoted(form[0]))
     same = posixpath.normpath(name)
     if same in outputs:
-        raise lines.error("an output file that no other run has", shown(name))
+        raise lines.error("an output file that no other run has", quoted(name))
     outputs.add(same)
     return name, "B" if form and form[0][0] in "bB" else "A"
 
@@ -375,7 +375,7 @@ def _layer(lines: Lines, at: int, number: int) -> Layer:
     values["g"] = require_g(lines, of, g, values["mu_s"])
     if at == number and INFINITE.fullmatch(thickness):
         if values["mu_a"] == values["mu_s"] == 0:
-            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{shown(mu_a)} and {shown(mu_s)}")
+            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{quoted(mu_a)} and {quoted(mu_s)}")
         return Layer(**values)
     return Layer(**values, thickness=lines.decimal(f"thickness {of} in cm", thickness, LENGTHS))
 
@@ -384,7 +384,7 @@ def require_g(lines: Lines, of: str, word: str, mu_s: float) -> float:
     """Return a mean cosine, 1 only where nothing scatters; InputError on others."""
     g = lines.decimal(f"g {of}", word, (-1.0, 1.0))
     if abs(g) == 1 and (mu_s > 0 or g < 0):
-        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", shown(word))
+        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", quoted(word))
     return g
 
 
@@ -402,6 +402,6 @@ def _is_number(word: str) -> bool:
     return bool(DECIMAL.fullmatch(word) or INFINITE.fullmatch(word))
 
 
-def shown(word: str) -> str:
+def quoted(word: str) -> str:
     """Return a word for a message, shortened."""
     return repr(word if len(word) <= LONGEST_SHOWN else f"{word[: LONGEST_SHOWN - 3]}...")

@@ -19,7 +19,7 @@ from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
-from mcml_sim.results.mci import DECIMAL, OUTPUT, VERSION_2, Lines, Run, read_media, read_run, read_run_2, shown
+from mcml_sim.results.mci import DECIMAL, OUTPUT, VERSION_2, Lines, Run, quoted, read_media, read_run, read_run_2
 from mcml_sim.results.tally import Tally
 
 Name = str | os.PathLike[str]
@@ -254,7 +254,7 @@ def _parse_2(lines: Lines) -> Output:
     """Read what follows the version of a file of MCML 2; InputError names the line if it has no Rd_r."""
     (word,) = lines.take(1, "the input's version, mcmli2.0")
     if not word.startswith(VERSION_2):
-        raise lines.error("the input's version, mcmli2.0", shown(word))
+        raise lines.error("the input's version, mcmli2.0", quoted(word))
     media = read_media(lines)
     output, *form = lines.take(1, OUTPUT, optional=1)
     run = read_run_2(lines, media, output, form[0] if form else "A", scored=("Rd_r",))
