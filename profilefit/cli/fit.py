@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,14 +14,15 @@ import typer
 from mcml_sim.cli.lazy import interruptible
 from mcml_sim.cli.program import one_line
 from profilefit.cli import options
-from profilefit.cli.fit_layers import fit_of_layers
 from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
-    from profilefit.measured import Known, MediumPosterior
+    from mcml_sim import Medium
+    from profilefit.measured import Known, Measured, MediumPosterior
     from profilefit.measured.oblique import Oblique
+    from profilefit.measured.premises import Premises
 
 FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
@@ -121,7 +124,6 @@ def fit(
       profilefit fit petzold --kind phase
     """
     with interruptible(__name__):
-        from mcml_sim.cli.screen import print_json
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.measured import read
@@ -132,7 +134,7 @@ def fit(
     if kind not in KINDS:
         raise InputError(f"--kind must be {PROFILE} or {PHASE}, got {kind!r}")
     if kind == PHASE:
-        _of_phase(context, data, angles, out, as_json, quiet)
+        _fit_phase(context, data, angles, out, as_json, quiet)
         return
     if angles is not None:
         raise InputError("--angles must be left out where --kind is not phase")
@@ -149,7 +151,7 @@ def fit(
     oblique_centre = None if oblique is None else _oblique(oblique, measured.unit)
     if layers is not None:
         options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
-        fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
+        _fit_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
         return
     if free is not None:
         raise InputError("--free must be left out where there are no --layers")
@@ -161,27 +163,65 @@ def fit(
             result = judged(fitted(measured, spec), seed)
     except SettingError as error:
         raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
+    model = "exact light" if law == options.EXACT else f"law {law}"
+    title = f"{one_line(data.name)}: {_rows(measured)}, {model}, {result.fit.spec.law.setting}"
     body = options.in_options(content(result))
-    if out is not None:
-        _write(result, body, out, quiet)
-    if as_json:
-        print_json(body)
-    else:
-        points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
-        model = "exact light" if law == options.EXACT else f"law {law}"
-        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.fit.spec.law.setting}")
+    _put(body, partial(_tables, result, title), out, as_json, quiet, partial(_figures, result))
     if result.identifiability is None:
         raise typer.Exit(FAILED)
 
 
-def _of_phase(
-    context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
+def _put(
+    body: dict[str, Any],
+    tables: Callable[[], tuple[list[Any], list[str]]],
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+    figures: Callable[[Path], int] | None = None,
 ) -> None:
-    """Fit every form of a phase function to a table, print and write."""
+    """Write a fit into a folder, if there is one, and print it: as JSON, or as tables and sentences."""
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes, print_json, screen, show
         from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.whole_file import require_folder, write_whole
+        from mcml_sim.files.whole_file import write_whole
+
+    if out is not None:
+        write_whole(out / "fit.json", json_text(body))
+        drawn = "" if figures is None else f" and {figures(out)} figures"
+        notes(quiet).print(f"wrote fit.json{drawn} into {out}", markup=False)
+    if as_json:
+        print_json(body)
+        return
+    parts, lines = tables()
+    show(parts, screen())
+    for line in lines:
+        screen().print(line, markup=False, emoji=False)
+
+
+def _tables(result: MediumPosterior, title: str) -> tuple[list[Any], list[str]]:
+    with interruptible(__name__):
+        from profilefit.report.tables.fit_tables import fit_lines, fit_tables
+
+    return list(fit_tables(result, title)), [options.in_options(line.plain) for line in fit_lines(result)]
+
+
+def _figures(result: MediumPosterior, out: Path) -> int:
+    with interruptible(__name__):
+        from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
+
+    return len([*residual_figure(result, out), *posterior_figure(result, out)])
+
+
+def _rows(measured: Measured) -> str:
+    return f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
+
+
+def _fit_phase(
+    context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
+) -> None:
+    """Fit every form of a phase function to a table, print and write; exit status 1 if the fit fails."""
+    with interruptible(__name__):
+        from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.recipes.kinds.phase import content, fits_of, request
         from profilefit.recipes.phases.data import read_phase
@@ -195,17 +235,59 @@ def _of_phase(
         require_folder(out, "fit.json")
     with working("fitting", quiet):
         body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
-    if out is not None:
-        write_whole(out / "fit.json", json_text(body))
-        notes(quiet).print(f"wrote fit.json into {out}", markup=False)
-    if as_json:
-        print_json(body)
-    else:
-        show(phase_tables(body), screen())
-        for line in premise_lines(body):
-            screen().print(line, markup=False)
+    _put(body, lambda: (phase_tables(body), list(premise_lines(body))), out, as_json, quiet)
     if body["fit"]["result"] != "converged":
         raise typer.Exit(FAILED)
+
+
+def _fit_layers(
+    measured: Measured,
+    file: Path,
+    free: str,
+    premises: Premises,
+    scale: float | Known | None,
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Fit layers in place of one semi-infinite medium, print and write; exit status 1 if the fit fails."""
+    with interruptible(__name__):
+        from mcml_sim.files.whole_file import require_folder
+        from mcml_sim.runs.progress import working
+        from profilefit.measured.layers import fit_layers
+        from profilefit.report.tables.layers_fit_tables import layers_content, layers_lines, layers_tables
+
+    medium = _medium(file, measured.unit)
+    if out is not None:
+        require_folder(out, "fit.json")
+    with working("fitting layers", quiet):
+        fit = fit_layers(measured, medium, [name.strip() for name in free.split(",")], premises, scale)
+    title = f"{one_line(measured.source)}: {_rows(measured)}, {len(medium.layers)} layers, exact light"
+    _put(layers_content(fit), lambda: (layers_tables(fit, title), list(layers_lines(fit))), out, as_json, quiet)
+    if fit.result != "converged":
+        raise typer.Exit(FAILED)
+
+
+def _medium(file: Path, unit: str) -> Medium:
+    """Return the stack of a file, in the data's unit of length."""
+    with interruptible(__name__):
+        from dataclasses import replace
+
+        from mcml_sim.files.text_file import read_toml
+        from profilefit.measured.data import factor
+        from profilefit.recipes.stack.file import read_layers
+
+    stack = read_layers(file, read_toml(file))
+    if not stack.is_grey or stack.map is not None:
+        raise InputError(f"{file}: expected one number each for mu_a, mu_s and thickness, got colours or an image")
+    if not unit:
+        raise InputError("--unit must be given where the data have none, since the layers have one")
+    times = factor(stack.unit, unit)
+    layers = (
+        replace(one, mu_a=one.mu_a / times, mu_s=one.mu_s / times, thickness=one.thickness * times)
+        for one in stack.media[0].layers
+    )
+    return replace(stack.media[0], layers=tuple(layers))
 
 
 def _range(text: str) -> tuple[float, float]:
@@ -217,29 +299,6 @@ def _range(text: str) -> tuple[float, float]:
     if not 0 <= low < high <= 180:
         raise InputError(f"--angles must be two rising angles in 0 ... 180 degrees, such as 1:180, got {shown(text)}")
     return low, high
-
-
-def _write(result: MediumPosterior, body: dict[str, Any], out: Path, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes
-        from mcml_sim.files.text_file import as_json
-        from mcml_sim.files.whole_file import write_whole
-        from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
-
-    write_whole(out / "fit.json", as_json(body))
-    figures = [*residual_figure(result, out), *posterior_figure(result, out)]
-    notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
-
-
-def _show(result: MediumPosterior, title: str) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import screen, show
-        from profilefit.report.tables.fit_tables import fit_lines, fit_tables
-
-    console = screen()
-    show(list(fit_tables(result, title)), console)
-    for line in fit_lines(result):
-        console.print(options.in_options(line.plain), markup=False, emoji=False)
 
 
 def _radius(option: str, text: str | None, unit: str) -> float | None:

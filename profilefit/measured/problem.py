@@ -5,7 +5,7 @@ A failure is a result: `Solution.result` is "converged" or says what happened an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -141,16 +141,8 @@ class Problem:
         """Return residuals in standard errors (m,), the n rows first, then what else is known; derivatives (m, 3)."""
         light, slope = self.model.linearised(point, self.data.inner, self.data.outer)
         rows, slopes = self.noise.whitened(light[:-1] - self.data.value), self.noise.whitened(slope[:-1])
-        if (total := self.spec.total) is not None:
-            rows = np.append(rows, (light[-1] - total.value) / total.error)
-            slopes = np.vstack([slopes, slope[-1:] / total.error])
-        if (known := self.spec.scale) is not None:
-            scale = np.exp(point[SCALE])
-            rows = np.append(rows, (scale - known.value) / known.error)
-            slopes = np.vstack([slopes, scale / known.error * np.eye(len(NAMES))[SCALE]])
-        if (oblique := self.spec.oblique) is not None:
-            residual, slope = oblique.residuals(self.spec.law.setting, point[None])
-            rows, slopes = np.append(rows, residual), np.vstack([slopes, slope])
+        for also, by_point in self._also_known(point[None], light[-1:], slope[-1:]):
+            rows, slopes = np.append(rows, also), np.vstack([slopes, by_point])
         return rows, slopes
 
     def costs(self, points: Floats) -> Floats:
@@ -158,13 +150,25 @@ class Problem:
         light = self.model.predicted(points, self.data.inner, self.data.outer)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no start
             cost = np.sum(self.noise.whitened((light[:, :-1] - self.data.value).T) ** 2, axis=0)
-        if (total := self.spec.total) is not None:
-            cost += ((light[:, -1] - total.value) / total.error) ** 2
-        if (known := self.spec.scale) is not None:
-            cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
-        if (oblique := self.spec.oblique) is not None:
-            cost += oblique.residuals(self.spec.law.setting, points)[0] ** 2
+        for also, _ in self._also_known(points, light[:, -1], np.zeros(points.shape)):
+            cost += also**2
         return cost
+
+    def _also_known(self, points: Floats, total: Floats, slope: Floats) -> Iterator[tuple[Floats, Floats]]:
+        """Yield residuals (m,) and derivatives (m, 3) of what is known beside the rows, at points (m, 3).
+
+        Args:
+            points: coordinates.
+            total: (m,) total reflectance A there; `slope` (m, 3) its derivatives.
+        """
+        spec = self.spec
+        if (known := spec.total) is not None:
+            yield (total - known.value) / known.error, slope / known.error
+        if (known := spec.scale) is not None:
+            scale = np.exp(points[:, SCALE])
+            yield (scale - known.value) / known.error, (scale / known.error)[:, None] * np.eye(len(NAMES))[SCALE]
+        if spec.oblique is not None:
+            yield spec.oblique.residuals(spec.law.setting, points)
 
     def under(self, values: Mapping[str, float]) -> Problem:
         """Return the problem where those of the spec's ranges have these values."""
