@@ -131,11 +131,11 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) ->
     ax.set(xscale="log", xlim=(NEAREST, r[-1]), ylim=(-1.05, 1.05), title=f"α = {alpha:.3f}")
 
 
-def _truth_band(one: Fitted | None, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
+def _truth_band(fitted: Fitted | None, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
     """Return the band in which a fitted law states the exact profile to lie; None for printed laws and old records."""
-    if one is None:
+    if fitted is None:
         return None
-    known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)
+    known = derived.LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays)
     return None if known.off is None else derived.profile(known, r, alpha).interval()
 
 

@@ -82,9 +82,9 @@ def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, o
     return save(figure, out, name)
 
 
-def _is_drawn(one: Cells, arithmetic: str) -> bool:
-    names = [axis.name for axis in one.axes]
-    return one.arithmetic == arithmetic and one.quantity in QUANTITIES and len(names) > 1 and names[0] == "α"
+def _is_drawn(cells: Cells, arithmetic: str) -> bool:
+    names = [axis.name for axis in cells.axes]
+    return cells.arithmetic == arithmetic and cells.quantity in QUANTITIES and len(names) > 1 and names[0] == "α"
 
 
 def _rows(subjects: Sequence[str]) -> list[str]:

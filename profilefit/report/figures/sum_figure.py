@@ -83,13 +83,13 @@ def _percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-def _draw(ax: Axes, one: SumRecord) -> None:
-    others = published(one)
+def _draw(ax: Axes, record: SumRecord) -> None:
+    others = published(record)
     for channel, (color, marker) in LOOKS.items():
         place = CHANNELS.index(channel)
         style: dict[str, Any] = {"color": color, "marker": marker, "markersize": 3.5}
         for light, line in LINES.items():
-            rel = [each["rel"][place] for each in one.content["sums"][light]["by_count"]]
+            rel = [each["rel"][place] for each in record.content["sums"][light]["by_count"]]
             ax.plot(COUNTS, rel, linestyle=line, label=channel if line == "-" else None, **style)
             if others:
                 of_six = others[light][place]["rel"]

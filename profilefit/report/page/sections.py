@@ -186,8 +186,8 @@ def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, lis
     return columns
 
 
-def _label(one: Content) -> str:
-    return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
+def _label(content: Content) -> str:
+    return f"{content['name']}, {content['constants']}" if content["constants"] else str(content["name"])
 
 
 def _costs(costs: Content) -> dict[str, list[str]]:

@@ -77,11 +77,11 @@ def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
     return parts
 
 
-def _against_exact(one: LawCheck) -> str:
+def _against_exact(check: LawCheck) -> str:
     """Return the GPU's own errors beside the record's."""
     pairs = [
-        f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})"
-        for name, value in one.measured.items()
+        f"{name} {significant(value, 3)} (model {significant(check.model.get(name), 3)})"
+        for name, value in check.measured.items()
     ]
     return f"GPU against the exact half space: {', '.join(pairs)}" if pairs else ""
 
@@ -162,53 +162,55 @@ def content(
     return dict(plain(whole))
 
 
-def _check_content(one: LawCheck | MapCheck) -> dict[str, Any]:
+def _check_content(check: LawCheck | MapCheck) -> dict[str, Any]:
     return {
-        "name": one.of.name,
-        "constants": one.of.constants,
-        "setting": one.of.setting,
-        "model": one.model,
-        "rounding": one.rounding,
-        "measured": one.measured,
-        "inside": one.inside,
-        "outside": one.outside,
-        "bounds": one.bounds,
-        "broken": [str(bound) for bound in one.broken],
+        "name": check.of.name,
+        "constants": check.of.constants,
+        "setting": check.of.setting,
+        "model": check.model,
+        "rounding": check.rounding,
+        "measured": check.measured,
+        "inside": check.inside,
+        "outside": check.outside,
+        "bounds": check.bounds,
+        "broken": [str(bound) for bound in check.broken],
     }
 
 
-def _called(one: LawCheck | MapCheck) -> str:
+def _called(check: LawCheck | MapCheck) -> str:
     """Return a label that distinguishes a map from the law of its name, and an index from others."""
-    name = _at_index(one.of)
-    return f"map {name}" if isinstance(one, MapCheck) and not one.of.records else name
+    name = _at_index(check.of)
+    return f"map {name}" if isinstance(check, MapCheck) and not check.of.records else name
 
 
-def _at_index(one: Named) -> str:
-    where = f", n = {one.setting.n:g}" if one.setting.n != 1.0 else ""
-    return one.label + where + (f", g = {one.setting.g:g}" if one.setting.g else "")
+def _at_index(named: Named) -> str:
+    where = f", n = {named.setting.n:g}" if named.setting.n != 1.0 else ""
+    return named.label + where + (f", g = {named.setting.g:g}" if named.setting.g else "")
 
 
-def _law_cells(one: LawCheck) -> tuple[str, ...]:
+def _law_cells(check: LawCheck) -> tuple[str, ...]:
     """Return model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
-    rounding = {name: value for name, value in one.rounding.items() if JUDGED[name] in one.spreads}
-    own = one.spreads.get(OWN)
-    cells = [value for name in ("rel", "ks") for value in (one.model.get(name), rounding.get(name))]
+    rounding = {name: value for name, value in check.rounding.items() if JUDGED[name] in check.spreads}
+    own = check.spreads.get(OWN)
+    cells = [value for name in ("rel", "ks") for value in (check.model.get(name), rounding.get(name))]
     return tuple(significant(value) for value in (*cells, rounding.get("inversion_error"), own.most if own else None))
 
 
-def _map_cells(one: MapCheck) -> tuple[str, ...]:
+def _map_cells(check: MapCheck) -> tuple[str, ...]:
     return tuple(
-        significant(value) for name in ("delta_A", "delta_alpha") for value in (one.model.get(name), one.rounding[name])
+        significant(value)
+        for name in ("delta_A", "delta_alpha")
+        for value in (check.model.get(name), check.rounding[name])
     )
 
 
-def _counts(one: LawCheck | MapCheck) -> tuple[str, str]:
-    return str(one.inside.total), str(one.outside.total)
+def _counts(check: LawCheck | MapCheck) -> tuple[str, str]:
+    return str(check.inside.total), str(check.outside.total)
 
 
-def _result(one: LawCheck | MapCheck) -> str:
-    return FAIL if one.broken else PASS
+def _result(check: LawCheck | MapCheck) -> str:
+    return FAIL if check.broken else PASS
 
 
-def _setting(one: Named) -> tuple[str, str, str]:
-    return one.setting.illumination, f"{one.setting.n:g}", f"{one.setting.g:g}"
+def _setting(named: Named) -> tuple[str, str, str]:
+    return named.setting.illumination, f"{named.setting.n:g}", f"{named.setting.g:g}"

@@ -201,12 +201,12 @@ def export_hint(choice: Choice) -> str:
     return "nothing to export: radiance is A E / pi"
 
 
-def _data(one: Predicted) -> dict[str, Any]:
-    error, case = one.error, one.error.case
+def _data(prediction: Predicted) -> dict[str, Any]:
+    error, case = prediction.error, prediction.error.case
     return {
-        "option": one.option.label,
-        "ms": one.ms,
-        "ms_range": [one.frame.least, one.frame.most],
+        "option": prediction.option.label,
+        "ms": prediction.ms,
+        "ms_range": [prediction.frame.least, prediction.frame.most],
         "error": error.total,
         "parts": {part: getattr(error, part) for part in PARTS},
         "worst": {
@@ -229,12 +229,12 @@ def _filters(choice: Choice) -> list[dict[str, Any]]:
     ]
 
 
-def _serves(one: Predicted, choice: Choice) -> str:
+def _serves(prediction: Predicted, choice: Choice) -> str:
     """Return which of the limits an option keeps."""
-    precise, paid = one.error.total <= choice.scene.tolerance, affordable(one, choice.scene)
+    precise, paid = prediction.error.total <= choice.scene.tolerance, affordable(prediction, choice.scene)
     if precise and paid:
         budget = choice.scene.budget.ms
-        return "yes" if budget is None or one.frame.most <= budget else "likely"
+        return "yes" if budget is None or prediction.frame.most <= budget else "likely"
     return "no: " + " and ".join(what for what, good in (("error", precise), ("ms", paid)) if not good)
 
 

@@ -124,10 +124,10 @@ def _grouped(members: Iterable[Named], key: Any) -> dict[str, list[Named]]:
     return groups
 
 
-def _spans(one: Named) -> bool:
+def _spans(named: Named) -> bool:
     """Return whether its constants hold for every index of a range."""
-    n = one.law.entry.n
-    return bool(one.records) and n.low < n.high
+    n = named.law.entry.n
+    return bool(named.records) and n.low < n.high
 
 
 def _constructor(kind: type) -> str:
@@ -136,65 +136,65 @@ def _constructor(kind: type) -> str:
     return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
 
 
-def _row(page: Page, one: Named, contents: Mapping[str, Content]) -> Sequence[str]:
-    worst = _worst(one, contents)
+def _row(page: Page, named: Named, contents: Mapping[str, Content]) -> Sequence[str]:
+    worst = _worst(named, contents)
     return (
-        f"[{one.name}]({page.name}.md)",
-        one.constants or "none",
-        one.setting.illumination,
-        _surface(one),
-        str(len(one.law.constant_names())),
+        f"[{named.name}]({page.name}.md)",
+        named.constants or "none",
+        named.setting.illumination,
+        _surface(named),
+        str(len(named.law.constant_names())),
         *(significant(worst.get(key)) for key in WORST),
     )
 
 
-def _surface(one: Named) -> str:
+def _surface(named: Named) -> str:
     """Return n, or the indices that its constants span."""
-    return str(one.law.entry.n) if _spans(one) else f"{one.setting.n:g}"
+    return str(named.law.entry.n) if _spans(named) else f"{named.setting.n:g}"
 
 
-def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
+def _worst(named: Named, contents: Mapping[str, Content]) -> dict[str, float]:
     """Return the largest error of each measure, from its own records or one that measured the printed set."""
-    if one.records:
-        every = [contents[name] for name in one.records]  # where constants span indices, of every index
+    if named.records:
+        every = [contents[name] for name in named.records]  # where constants span indices, of every index
         own: list[Content] = [{**content["quality"]["regenerated"], **by_index(content)} for content in every]
     else:
-        own = [values for _, values in _measured_sets(one, contents)]
+        own = [values for _, values in _measured_sets(named, contents)]
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
 
 
-def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
+def _measured_sets(named: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
     """Yield each record of the same law and light that measured this printed set, and the measures."""
-    pipelines = ("albedo",) if isinstance(one.law, AlbedoLaw) else ("profile", "as-published", "inverse")
-    which = one.constants if one.constants in SETS else SETS[0]  # records call the printed set of their light so
+    pipelines = ("albedo",) if isinstance(named.law, AlbedoLaw) else ("profile", "as-published", "inverse")
+    which = named.constants if named.constants in SETS else SETS[0]  # records call the printed set of their light so
     for content in contents.values():
-        is_own = content["law"] == one.name and content["pipeline"] in pipelines
-        if is_own and record_setting(content) == one.setting and which in content["quality"]:
+        is_own = content["law"] == named.name and content["pipeline"] in pipelines
+        if is_own and record_setting(content) == named.setting and which in content["quality"]:
             yield content, content["quality"][which]
 
 
-def _loading(one: Named) -> str:
+def _loading(named: Named) -> str:
     """Return the lines by which Python and the shell get this law."""
-    call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
-    lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
-    if _spans(one):
-        entry = one.law.entry
-        g = f" and g in {entry.g}" if one.setting.g else ""
+    call = "albedo_law" if isinstance(named.law, AlbedoLaw) else "load"
+    lines = [f"Light: {named.setting.illumination}, n = {named.setting.n:g}, g = {named.setting.g:g}."]
+    if _spans(named):
+        entry = named.law.entry
+        g = f" and g in {entry.g}" if named.setting.g else ""
         choose = "`--n`, `--g`" if g else "`--n`"
         lines[0] += f" The same constants hold for every n in {entry.n}{g}: {choose} and `Setting` choose."
-    lines += ["", "```python", f"profilefit.{call}({', '.join(_arguments(one))})", "```"]
-    command = _export(one)
+    lines += ["", "```python", f"profilefit.{call}({', '.join(_arguments(named))})", "```"]
+    command = _export(named)
     return "\n".join([*lines, "", "```", command, "```"] if command else lines)
 
 
-def _arguments(one: Named) -> list[str]:
+def _arguments(named: Named) -> list[str]:
     """Return the arguments of `load` or `albedo_law`: name, and constants, record's path or setting."""
-    name = f'"{one.name}"'
-    if not one.records:
-        return [name, f'constants="{one.constants}"'] if one.constants else [name]
-    if one.records != tuple(record_name(base, one.setting) for base in one.law.entry.records):
-        return [name, f'constants="fits/{one.records[0]}.json"']
-    return [name] if one.setting == Setting() else [name, f"setting={_setting(one.setting)}"]
+    name = f'"{named.name}"'
+    if not named.records:
+        return [name, f'constants="{named.constants}"'] if named.constants else [name]
+    if named.records != tuple(record_name(base, named.setting) for base in named.law.entry.records):
+        return [name, f'constants="fits/{named.records[0]}.json"']
+    return [name] if named.setting == Setting() else [name, f"setting={_setting(named.setting)}"]
 
 
 def _setting(setting: Setting) -> str:
@@ -204,14 +204,14 @@ def _setting(setting: Setting) -> str:
     return f"Setting({', '.join(parts)})"
 
 
-def _export(one: Named) -> str:
+def _export(named: Named) -> str:
     """Return the command that writes this law's shader source; none where it has none."""
-    if not one.law.entry.has_text:
+    if not named.law.entry.has_text:
         return ""
-    if one.records:
-        return f"profilefit export {one.records[0]} --lang glsl"
-    name = f'"{one.law.entry.key}"' if one.law.entry.is_map and one.name in PROFILES else one.name
-    return f"profilefit export {name}{f' --constants {one.constants}' if one.constants else ''} --lang glsl"
+    if named.records:
+        return f"profilefit export {named.records[0]} --lang glsl"
+    name = f'"{named.law.entry.key}"' if named.law.entry.is_map and named.name in PROFILES else named.name
+    return f"profilefit export {name}{f' --constants {named.constants}' if named.constants else ''} --lang glsl"
 
 
 def _ranges(entry: Entry) -> str:
@@ -230,15 +230,15 @@ def _shader(page: Page) -> str:
     return f"In a shader: {', '.join(files)}; names begin with {', '.join(prefixes)}."
 
 
-def _printed(one: Named, folder: Folder) -> str:
+def _printed(named: Named, folder: Folder) -> str:
     """Return a printed set: its source, its constants and the errors that a record found for it."""
-    own = one.law.entry.printed, one.constants
-    printed = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
+    own = named.law.entry.printed, named.constants
+    printed = next((s for s in published.SETS if not named.records and (s.law, s.name) == own), None)
     if printed is None:
-        return "" if one.records else "It has no constants: everything follows from alpha and the surface."
+        return "" if named.records else "It has no constants: everything follows from alpha and the surface."
     table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in printed.constants.items()])
     contents = _contents(folder)
-    measured = next(_measured_sets(one, contents), None)
+    measured = next(_measured_sets(named, contents), None)
     parts = [f"Source: {printed.source}.", table]
     return "\n\n".join(parts if measured is None else [*parts, _quality(measured[0], measured[1])])
 

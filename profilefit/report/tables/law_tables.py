@@ -75,23 +75,23 @@ def for_each(
         return list(track(pool.map(measure, laws), title, len(laws)))
 
 
-def measured_profile(one: Named, alpha: ArrayLike = ALBEDOS) -> Quality:
+def measured_profile(named: Named, alpha: ArrayLike = ALBEDOS) -> Quality:
     """Return the measures of a profile law at `alpha` (m,)."""
-    return profile_quality(one.law, alpha)
+    return profile_quality(named.law, alpha)
 
 
-def measured_map(one: Named) -> AlbedoQuality:
+def measured_map(named: Named) -> AlbedoQuality:
     """Return the measures of an A -> alpha map."""
-    return albedo_quality(one.law)
+    return albedo_quality(named.law)
 
 
-def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
+def measured_samplers(named: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
     """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
-    albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
+    albedos = alpha or (SAMPLED_ALBEDOS if named.law.entry.has_text else SLOW_ALBEDOS)
     samplers = []
-    for name, sampler in one.law.in_reduced().samplers.items():
-        errors = np.array([_exact_error(one.law.samplers[name], float(value)) for value in albedos])
-        samplers.append(MeasuredSampler(one, name, sampler_quality(sampler, albedos), errors))
+    for name, sampler in named.law.in_reduced().samplers.items():
+        errors = np.array([_exact_error(named.law.samplers[name], float(value)) for value in albedos])
+        samplers.append(MeasuredSampler(named, name, sampler_quality(sampler, albedos), errors))
     return samplers
 
 
@@ -219,8 +219,8 @@ def content(qualities: Qualities) -> dict[str, Any]:
     }
 
 
-def _whose(one: Named) -> dict[str, Any]:
-    return {"law": one.name, "constants": one.constants, "records": list(one.records), "setting": one.setting}
+def _whose(named: Named) -> dict[str, Any]:
+    return {"law": named.name, "constants": named.constants, "records": list(named.records), "setting": named.setting}
 
 
 def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
@@ -270,9 +270,9 @@ def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
     return markdown_table(header, rows)
 
 
-def _home(one: Named) -> tuple[str, str, str, str]:
+def _home(named: Named) -> tuple[str, str, str, str]:
     """Return law, constants, light, n."""
-    return one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"
+    return named.name, named.constants or "none", named.setting.illumination, f"{named.setting.n:g}"
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
@@ -317,13 +317,13 @@ def _sampler_headers(space: str = " ") -> list[str]:
     return ["exact", *(header.replace("\n", space) for header in COLUMNS)]
 
 
-def _sampler_cells(one: MeasuredSampler) -> list[str]:
-    measures = [one.exact_error, *(getattr(one.quality, measure) for measure in COLUMNS.values())]
+def _sampler_cells(sampler: MeasuredSampler) -> list[str]:
+    measures = [sampler.exact_error, *(getattr(sampler.quality, measure) for measure in COLUMNS.values())]
     return [sampler_number(float(values[np.argmax(np.abs(values))])) for values in measures]
 
 
-def _sampler_label(one: MeasuredSampler) -> str:
-    return f"{one.of.label}: {one.name}"
+def _sampler_label(sampler: MeasuredSampler) -> str:
+    return f"{sampler.of.label}: {sampler.name}"
 
 
 def _number(measure: str, value: float) -> str:

@@ -104,10 +104,10 @@ def _each(content: Content) -> list[tuple[str, str, Content]]:
     return [(form, how, content["phases"][form][how]) for form in FORMS for how in (FREE, HELD)]
 
 
-def _measures(form: str, how: str, one: Content) -> tuple[str, ...]:
+def _measures(form: str, how: str, content: Content) -> tuple[str, ...]:
     """Return a form, its moments, its distance from the table, its mean cosine and backscattered share."""
-    moments = (significant(one[name], MOMENT_DIGITS) for name in ("mean_cosine", "backscattered"))
-    return (FORMS[form].title, how, *map(significant, (one["rms"], *one["bands"])), *moments)
+    moments = (significant(content[name], MOMENT_DIGITS) for name in ("mean_cosine", "backscattered"))
+    return (FORMS[form].title, how, *map(significant, (content["rms"], *content["bands"])), *moments)
 
 
 def _constant_values(content: Content) -> list[Content]:

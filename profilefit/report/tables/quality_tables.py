@@ -27,12 +27,12 @@ TABLES = (
 )
 
 
-def values_of(one: Content, measure: str) -> list[float] | None:
+def values_of(content: Content, measure: str) -> list[float] | None:
     """Return a measure of one set at each albedo, halves apart; None if the record does not know it."""
     name, _, half = measure.partition(" ")
     if not half:
-        return one.get(name)
-    halves = one.get(f"{name}_halves")
+        return content.get(name)
+    halves = content.get(f"{name}_halves")
     return None if halves is None else [row[half == "far"] for row in halves]
 
 

@@ -114,8 +114,8 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
     return column_table("Fits", columns, caption, ("fit",))
 
 
-def _cell(one: FitCase, is_share: bool) -> str:
-    return f"{100.0 * one.converged:.0f} %" if is_share else significant(one.spread) if one.worst else ABSENT
+def _cell(case: FitCase, is_share: bool) -> str:
+    return f"{100.0 * case.converged:.0f} %" if is_share else significant(case.spread) if case.worst else ABSENT
 
 
 def fit_table(fits: Sequence[FitCase]) -> RenderableType:

@@ -68,9 +68,9 @@ class Choice:
         return affordable(self.nearest, self.scene)
 
 
-def affordable(one: Predicted, scene: Requirements) -> bool:
+def affordable(prediction: Predicted, scene: Requirements) -> bool:
     """Return whether its frame, as estimated, is within the budget."""
-    return scene.budget.ms is None or one.ms <= scene.budget.ms
+    return scene.budget.ms is None or prediction.ms <= scene.budget.ms
 
 
 def laws(setting: Setting) -> dict[str, ProfileLaw]:

@@ -83,8 +83,8 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
     albedos = catalogue.albedo_laws(records, matched=False)
 
-    def chosen(one: Named, label: str) -> bool:
-        return bool({label, one.name, *one.records} & set(requested)) if requested else not quick or label in QUICK
+    def chosen(named: Named, label: str) -> bool:
+        return bool({label, named.name, *named.records} & set(requested)) if requested else not quick or label in QUICK
 
     todo: list[Job] = []
     for one in profiles:
@@ -120,23 +120,23 @@ def run(todo: list[Job]) -> Iterator[Findings]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _of_law(one: Named, folder: Records, quick: bool, more: tuple[str, ...]) -> Findings:
-    limits = law_cells.limits_of(one, folder)
+def _of_law(named: Named, folder: Records, quick: bool, more: tuple[str, ...]) -> Findings:
+    limits = law_cells.limits_of(named, folder)
     arithmetics = QUICK_ARITHMETICS if quick else law_cells.COMPUTED
-    text = map_cells.in_reduced(one)
-    cells = [*law_cells.cells_of(text, limits, arithmetics), *law_cells.model_cells(one, limits)]
+    text = map_cells.in_reduced(named)
+    cells = [*law_cells.cells_of(text, limits, arithmetics), *law_cells.model_cells(named, limits)]
     cells += misuse.of_law(text)
-    if one.label in DERIVED and not quick:
-        cells += gradients.of_law(text, (*DERIVED[one.label], *more), limits.valid.alpha or EVERYWHERE)
-    return _findings(one.label, cells)
+    if named.label in DERIVED and not quick:
+        cells += gradients.of_law(text, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
+    return _findings(named.label, cells)
 
 
-def _of_map(one: Named, folder: Records, quick: bool) -> Findings:
-    text = map_cells.in_reduced(one)
-    cells = [*map_cells.cells_of(one, folder), *misuse.of_map(text)]
-    if one.label in DERIVED_MAPS and not quick:
-        cells += gradients.of_map(text, validity.of_map(one, folder))
-    return _findings(map_label(one), cells)
+def _of_map(named: Named, folder: Records, quick: bool) -> Findings:
+    text = map_cells.in_reduced(named)
+    cells = [*map_cells.cells_of(named, folder), *misuse.of_map(text)]
+    if named.label in DERIVED_MAPS and not quick:
+        cells += gradients.of_map(text, validity.of_map(named, folder))
+    return _findings(map_label(named), cells)
 
 
 def _of_exact(folder: Records, quick: bool) -> Findings:

@@ -62,7 +62,7 @@ MAPS: dict[str, Function] = {
 }
 
 
-def of_law(one: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
+def of_law(named: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
     """Yield the derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
     alpha = ArgumentAxis("α", "-", np.array(ALPHA))
     for name in names:
@@ -71,23 +71,23 @@ def of_law(one: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
         sure = valid & _within(symbol, u) & _within("α", a)
-        derivatives = _derivatives(FUNCTIONS[name], one.law, u, a, symbol, one.law.constant_names() != ())
+        derivatives = _derivatives(FUNCTIONS[name], named.law, u, a, symbol, named.law.constant_names() != ())
         for by, triple in derivatives.items():
-            yield _cells(one.label, one.law.entry.own, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
+            yield _cells(named.label, named.law.entry.own, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
 
 
-def of_map(one: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
+def of_map(named: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
     """Yield the derivatives of both directions of a map."""
     ways = ((ALPHA_OF, "A", REFLECTANCE), (REFLECTANCE_OF, "α", ALPHA))
     for (name, symbol, values), span in zip(ways, spans, strict=True):
         axis = ArgumentAxis(symbol, "-", np.array(values))
         u = axis.values
-        derivatives = _derivatives(MAPS[name], one.law, u, np.full_like(u, 0.5), symbol, True)
+        derivatives = _derivatives(MAPS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
         sure = valid & _within(symbol, u)
         for by in (symbol, "constants"):
             quantity = f"∂{name}/∂{by}"
-            yield _cells(map_label(one), one.law.entry.own, quantity, (axis,), derivatives[by], valid, sure)
+            yield _cells(map_label(named), named.law.entry.own, quantity, (axis,), derivatives[by], valid, sure)
 
 
 def _within(symbol: str, values: Floats) -> NDArray[np.bool_]:

@@ -83,11 +83,11 @@ OF_MODELS = {
 }
 
 
-def advice_of(one: Named, arithmetic: str) -> str:
+def advice_of(named: Named, arithmetic: str) -> str:
     """Return what helps where a law is red; that of the arithmetic, an empty text, where it is no law's own."""
     if arithmetic == MODEL:
-        return OF_MODELS.get(one.name.partition(":")[0], "")
-    return OF_LIANG if isinstance(one.law, Liang) and arithmetic in HELD else ""
+        return OF_MODELS.get(named.name.partition(":")[0], "")
+    return OF_LIANG if isinstance(named.law, Liang) and arithmetic in HELD else ""
 
 
 @dataclass(frozen=True)
@@ -103,29 +103,29 @@ class Limits:
         return max(own, HALF_BOUND) if dtype is np.float16 else own
 
 
-def limits_of(one: Named, folder: Folder) -> Limits:
+def limits_of(named: Named, folder: Folder) -> Limits:
     """Return a tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
-    model = MEASURED.get(one.name) or bounds.of_profile(one, folder).values
+    model = MEASURED.get(named.name) or bounds.of_profile(named, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
     errors = {PROFILE: rel, PDF: rel, CDF: ks, SAMPLE: drawn}
     known = {name: ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
-    return Limits(known, validity.of_profile(one, folder))
+    return Limits(known, validity.of_profile(named, folder))
 
 
-def cells_of(one: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
+def cells_of(named: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
     """Yield all quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
-        yield from computed(one, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
+        yield from computed(named, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
-def computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
+def computed(named: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
     """Yield all quantities of a law in one arithmetic on a grid."""
     nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else dense_grid.LEAST_X
     stored = arithmetic == STORED16
-    albedo = _stored_albedo(RoundedText(one.law, np.float32), at.arguments[2]) if stored else None
-    reference = Reference(one.law, at, albedo, nearest)
-    for name, value in _values(one.law, arithmetic, at).items():
+    albedo = _stored_albedo(RoundedText(named.law, np.float32), at.arguments[2]) if stored else None
+    reference = Reference(named.law, at, albedo, nearest)
+    for name, value in _values(named.law, arithmetic, at).items():
         places = (at.alpha, at.xi if name == SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
         value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
@@ -136,10 +136,10 @@ def computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> I
         else:
             error = absolute(value, exactly) if name == CDF else relative(value, exactly)
         yield judged_cells(
-            one.label, one.law.entry.own, name, arithmetic, places, value, exactly, error, bound,
+            named.label, named.law.entry.own, name, arithmetic, places, value, exactly, error, bound,
             inside & (arithmetic in HELD), judge=inside, dim=reference.dim(name, exactly),
             wrong_way=_wrong_way(name, value, reference), unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
-            advice=advice_of(one, arithmetic),
+            advice=advice_of(named, arithmetic),
         )  # fmt: skip
 
 
@@ -317,19 +317,19 @@ INVERSE, ENERGY = "g, not clipped (19)", "energy (17)"
 ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
 
 
-def model_cells(one: Named, limits: Limits) -> Iterator[Cells]:
+def model_cells(named: Named, limits: Limits) -> Iterator[Cells]:
     """Yield R_d, cdf and radii against the exact profile of a law's setting; and what only Liang et al.'s laws have."""
-    if one.setting.is_solved:
-        yield from _against_exact(one, limits)
-    if isinstance(one.law, Liang):
-        yield unclipped(one, limits)
-        yield own_energy(one, limits)
+    if named.setting.is_solved:
+        yield from _against_exact(named, limits)
+    if isinstance(named.law, Liang):
+        yield unclipped(named, limits)
+        yield own_energy(named, limits)
 
 
-def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
+def _against_exact(named: Named, limits: Limits) -> Iterator[Cells]:
     alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
-    law, setting = one.law.in_reduced(), one.setting
+    law, setting = named.law.in_reduced(), named.setting
     own = np.asarray(unreduced(albedo, setting.g))  # of the medium that has this reduced albedo, and l* = 1
     medium = own, 1.0 - own * setting.g, setting
     within = np.asarray(exact.cdf(r, *medium))
@@ -348,8 +348,8 @@ def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
         (SAMPLE, (alpha, xi), drawn, drawn, absolute(reached, np.broadcast_to(share, drawn.shape)), draws),
     ):
         yield judged_cells(
-            one.label, one.law.entry.own, name, MODEL, places, value, reference, error, MODEL_BOUNDS[name], inside,
-            judge=inside, advice=advice_of(one, MODEL),
+            named.label, named.law.entry.own, name, MODEL, places, value, reference, error, MODEL_BOUNDS[name], inside,
+            judge=inside, advice=advice_of(named, MODEL),
         )  # fmt: skip
 
 
@@ -357,7 +357,7 @@ def _holds(span: validity.Range | None, alpha: Floats) -> Mask:
     return span.holds(alpha) if span else np.zeros(alpha.shape, bool)
 
 
-def unclipped(one: Named, limits: Limits) -> Cells:
+def unclipped(named: Named, limits: Limits) -> Cells:
     """Return g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
     axes = (
         ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
@@ -365,10 +365,10 @@ def unclipped(one: Named, limits: Limits) -> Cells:
     )
     alpha = axes[0].values[:, None]
     with np.errstate(all="ignore"):
-        value = np.asarray(one.law.sampler.unclipped(axes[1].values[None], alpha))
+        value = np.asarray(named.law.sampler.unclipped(axes[1].values[None], alpha))
     error, inside = np.where(value < 0, np.abs(value), 0.0), _holds(limits.valid.alpha, alpha)
     cells = judged_cells(
-        one.label,
+        named.label,
         False,
         INVERSE,
         FLOAT64,
@@ -384,14 +384,14 @@ def unclipped(one: Named, limits: Limits) -> Cells:
     return replace(cells, reference=value)
 
 
-def own_energy(one: Named, limits: Limits) -> Cells:
+def own_energy(named: Named, limits: Limits) -> Cells:
     """Return cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
     alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
     with np.errstate(all="ignore"):
-        whole = np.asarray(one.law.unscaled_energy(np.inf, alpha.values))
-        value = whole / np.asarray(one.law.albedo.reflectance(alpha.values))
+        whole = np.asarray(named.law.unscaled_energy(np.inf, alpha.values))
+        value = whole / np.asarray(named.law.albedo.reflectance(alpha.values))
     error, inside = absolute(value, np.ones_like(value)), _holds(limits.valid.alpha, alpha.values)
     return judged_cells(
-        one.label, False, ENERGY, MODEL, (alpha,), value, np.ones(()), error, ENERGY_BOUND, inside, judge=inside,
+        named.label, False, ENERGY, MODEL, (alpha,), value, np.ones(()), error, ENERGY_BOUND, inside, judge=inside,
         advice=OF_LIANG,
     )  # fmt: skip

@@ -59,33 +59,33 @@ OF_MAPS = (
 UNSTATED = "no record states the error of this direction"
 
 
-def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
+def cells_of(named: Named, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
-    text, model, spans = in_reduced(one), bounds.of_map(one, folder), validity.of_map(one, folder)
+    text, model, spans = in_reduced(named), bounds.of_map(named, folder), validity.of_map(named, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (FLOAT64, FLOAT32, TEXT32, TEXT16):
             yield _computed(text, name, arithmetic, limit, span)
     yield from _kept_in_half(text, spans[1])
-    if one.setting.is_solved:
-        yield from _against_exact(one, *spans, model)
+    if named.setting.is_solved:
+        yield from _against_exact(named, *spans, model)
 
 
-def in_reduced(one: Named) -> Named:
+def in_reduced(named: Named) -> Named:
     """Return a law as a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
-    return replace(one, law=one.law.in_reduced())
+    return replace(named, law=named.law.in_reduced())
 
 
-def _computed(one: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
+def _computed(named: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
     dtype = DTYPES[arithmetic]
     axis = layout.reflectance(dtype) if name == ALPHA_OF else layout.alpha(dtype)
-    value, reference = _value(one.law, name, arithmetic, axis), _reference(one.law, name, axis)
+    value, reference = _value(named.law, name, arithmetic, axis), _reference(named.law, name, axis)
     limit = max(limit, HALF_BOUND) if dtype is np.float16 else limit
-    return _cells(one, name, arithmetic, axis, value, reference, limit, span)
+    return _cells(named, name, arithmetic, axis, value, reference, limit, span)
 
 
 def _cells(
-    one: Named,
+    named: Named,
     name: str,
     arithmetic: str,
     axis: ArgumentAxis,
@@ -98,15 +98,15 @@ def _cells(
     """Return the cells of one direction; the error is |value - reference| by default."""
     inside, held = span.holds(axis.values), arithmetic in HELD
     return judged_cells(
-        map_label(one), one.law.entry.own, name, arithmetic, (axis,), value, reference,
+        map_label(named), named.law.entry.own, name, arithmetic, (axis,), value, reference,
         absolute(value, reference) if error is None else error, limit, inside & held, judge=inside,
         wrong_way=steps_down(value, 0, DTYPES[arithmetic], 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
     )  # fmt: skip
 
 
-def map_label(one: Named) -> str:
+def map_label(named: Named) -> str:
     """Return the label of a map, apart from the law of its name."""
-    return one.label if one.records else f"map {one.label}"
+    return named.label if named.records else f"map {named.label}"
 
 
 def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: ArgumentAxis) -> Floats:
@@ -124,31 +124,31 @@ def _reference(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
     return np.asarray(RoundedText(law, EXTENDED).call(WAYS[name][1], axis.values), float)
 
 
-def _kept_in_half(one: Named, span: Range) -> Iterator[Cells]:
+def _kept_in_half(named: Named, span: Range) -> Iterator[Cells]:
     """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
     axis = layout.alpha(np.float32)
-    text, reference = RoundedText(one.law, np.float32), _reference(one.law, REFLECTANCE_OF, axis)
+    text, reference = RoundedText(named.law, np.float32), _reference(named.law, REFLECTANCE_OF, axis)
     half = axis.values.astype(np.float16).astype(np.float32)
     root = np.sqrt(1.0 - axis.values).astype(np.float16).astype(np.float32)
     for name, alpha in ((REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
         value = np.asarray(text.call(WAYS[REFLECTANCE_OF][1], alpha), float)
-        yield _cells(one, name, STORED16, axis, value, reference, HALF_BOUND, span)
+        yield _cells(named, name, STORED16, axis, value, reference, HALF_BOUND, span)
 
 
-def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
+def _against_exact(named: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = ArgumentAxis("α", "-", 1.0 - root**2)
-    own = unreduced(alpha.values, one.setting.g)
-    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(own, setting=one.setting)))
-    law = one.law.in_reduced()
+    own = unreduced(alpha.values, named.setting.g)
+    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(own, setting=named.setting)))
+    law = named.law.in_reduced()
     with np.errstate(all="ignore"):
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     stated = model.get(WAYS[REFLECTANCE_OF][0]) or np.nan
-    bound = min(MODEL_BOUND, FACTOR * stated) if one.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha)
+    bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
+    yield _cells(named, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    yield _cells(one, ALPHA_OF, MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error)
+    yield _cells(named, ALPHA_OF, MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error)
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.

@@ -40,25 +40,25 @@ ORDINARY = {"r": 1.0, "xi": 0.5, "alpha": 0.5, "mfp": 1.0}
 CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in Python does: a shader refuses nothing"
 
 
-def of_law(one: Named) -> Iterator[Cells]:
+def of_law(named: Named) -> Iterator[Cells]:
     """Yield each function of a profile law, in Python and by its shader source."""
-    law: ProfileLaw = one.law
+    law: ProfileLaw = named.law
     functions = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
     text = RoundedText(law, np.float32)
     for name, function in functions.items():
         cases = cases_of(name)
-        yield refusals(one.label, law.entry.own, name, cases, _with_keyword(function, name))
-        yield _clamped(one.label, law.entry.own, name, cases, text)
+        yield refusals(named.label, law.entry.own, name, cases, _with_keyword(function, name))
+        yield _clamped(named.label, law.entry.own, name, cases, text)
 
 
-def of_map(one: Named) -> Iterator[Cells]:
+def of_map(named: Named) -> Iterator[Cells]:
     """Yield both directions of a map."""
-    law: AlbedoLaw = one.law
+    law: AlbedoLaw = named.law
     for name, symbol, key, call in (
         (ALPHA_OF, "A", "reflectance", law.alpha),
         (REFLECTANCE_OF, "α", "alpha", law.reflectance),
     ):
-        yield refusals(map_label(one), law.entry.own, name, _cases((symbol, key, SHARES)), _alone(call))
+        yield refusals(map_label(named), law.entry.own, name, _cases((symbol, key, SHARES)), _alone(call))
 
 
 def of_exact() -> Iterator[Cells]:

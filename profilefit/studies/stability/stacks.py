@@ -194,20 +194,20 @@ def _largest(law: StackLaw, d: Floats | float, r: Floats) -> Floats:
     return largest
 
 
-def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
+def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
     """Yield quantities over thickness and radius or uniform number."""
-    dtype, law, channel = DTYPES[arithmetic], one.law, np.zeros(1)
+    dtype, law, channel = DTYPES[arithmetic], case.law, np.zeros(1)
 
     def rounded(values: Sequence[float], scale: float = 1.0) -> Floats:
         return (np.array(values) * scale).astype(dtype).astype(float)
 
     d, r, xi = rounded(THICKNESS, law.top.mfp)[:, None], rounded(RADIUS, law.top.mfp), rounded(SHARE)
-    text = one.text(np.float32) if arithmetic == TEXT32 else None
+    text = case.text(np.float32) if arithmetic == TEXT32 else None
     python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
-    whole, within = (np.asarray(one.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
+    whole, within = (np.asarray(case.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
     for name in names:
         given = () if name == TOTAL else (xi if name == SAMPLE else r,)
-        reference = np.asarray(one.reference.call(CALLED[name], *given, channel, d), float)
+        reference = np.asarray(case.reference.call(CALLED[name], *given, channel, d), float)
         if text is not None:
             value = np.asarray(text.call(CALLED[name], *given, channel, d), float)
         else:
@@ -216,40 +216,40 @@ def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)
             ends = np.select([d == 0, d == d[-1]], [law.below.whole(), law.top.whole()], reference)
             value, reference = value[:, 0], ends[:, 0]
         if name == SAMPLE:
-            error = _misplaced(one.reference, value, xi, d)
+            error = _misplaced(case.reference, value, xi, d)
         else:
             error = absolute(value, reference) if name == CDF else relative(value, reference)
         if name == PROFILE:  # NaN where extended precision has no digits of it
             unit = law.top.mfp
             lost = cancelled(
-                law, unit * np.array(THICKNESS)[:, None], unit * np.array(RADIUS), reference, one.bound(name)
+                law, unit * np.array(THICKNESS)[:, None], unit * np.array(RADIUS), reference, case.bound(name)
             )
             error[lost] = np.nan
-        yield _cells(one, name, arithmetic, (value, reference, error), whole, within)
+        yield _cells(case, name, arithmetic, (value, reference, error), whole, within)
 
 
 def _cells(
-    one: StackCase, name: str, arithmetic: str, triple: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
+    case: StackCase, name: str, arithmetic: str, triple: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
 ) -> Cells:
     """Return cells of value, reference and error; whole is A (thicknesses, 1), within the cdf (thicknesses, radii)."""
-    dtype, bound, (value, reference, error) = DTYPES[arithmetic], one.bound(name), triple
-    first, below = (float(each.whole()) for each in (one.law.top, one.law.below))
+    dtype, bound, (value, reference, error) = DTYPES[arithmetic], case.bound(name), triple
+    first, below = (float(each.whole()) for each in (case.law.top, case.law.below))
     seen = within <= SEEN if name in (PROFILE, PDF) else np.ones(value.shape, bool)
     bright = (whole[:, 0] if name == TOTAL else whole) >= DARKEST
-    inside = seen & bright & one.holds & (within >= NEXT_TO_SOURCE if name == PDF else True)
+    inside = seen & bright & case.holds & (within >= NEXT_TO_SOURCE if name == PDF else True)
     dim: Mask | bool = False
     wrong_way = None
     if name in (PROFILE, PDF):
-        scaled = np.abs(reference) * one.law.top.mfp ** (2 if name == PROFILE else 1)
+        scaled = np.abs(reference) * case.law.top.mfp ** (2 if name == PROFILE else 1)
         dim = (scaled < DIMMEST[dtype]) & (reference != 0)
     elif name == CDF:  # light over A: A may be far less than what it is the difference of
         wrong_way = steps_down(value, 1, dtype, max(first, below) / np.maximum(whole, np.finfo(dtype).tiny))
     elif name == TOTAL:
         wrong_way = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
     return judged_cells(
-        one.label, one.own, name, arithmetic, _axes(name), value, reference, error, bound, inside,
+        case.label, case.own, name, arithmetic, _axes(name), value, reference, error, bound, inside,
         judge=seen if name == PDF else None, dim=dim, wrong_way=wrong_way, unjudged=NO_DIGITS,
-        advice=OF_LAWS if one.own else OF_BORROWER,
+        advice=OF_LAWS if case.own else OF_BORROWER,
     )  # fmt: skip
 
 
@@ -274,9 +274,9 @@ def _misplaced(reference: RoundedText, value: Floats, xi: Floats, d: Floats) -> 
     return least
 
 
-def energies(one: StackCase) -> Cells:
+def energies(case: StackCase) -> Cells:
     """Return the integral of 2 pi r R_d to the last radius over A by the text, which the closed cdf gives as well."""
-    unit, text, channel = one.law.top.mfp, one.text(np.float64), np.zeros(1)
+    unit, text, channel = case.law.top.mfp, case.text(np.float64), np.zeros(1)
     u, step = np.linspace(np.log(NEAREST), np.log(FARTHEST), POINTS, retstep=True)
     r, d = unit * np.exp(u), unit * np.array(THICKNESS)[:, None]
     ring = 2.0 * np.pi * r**2 * text.call("profile", r, channel, d)
@@ -284,10 +284,10 @@ def energies(one: StackCase) -> Cells:
     reference = np.asarray(text.call("cdf", r[-1:], channel, d))[:, 0]
     light = (np.sum(ring, axis=1) - 0.5 * (ring[:, 0] + ring[:, -1])) * step
     value = np.where(whole > 0, light / np.where(whole > 0, whole, 1.0), reference)
-    error, inside = absolute(value, reference), (whole >= DARKEST) & one.holds
+    error, inside = absolute(value, reference), (whole >= DARKEST) & case.holds
     return judged_cells(
-        one.label, one.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside,
-        advice=OF_LAWS if one.own else OF_BORROWER,
+        case.label, case.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside,
+        advice=OF_LAWS if case.own else OF_BORROWER,
     )  # fmt: skip
 
 

@@ -118,11 +118,11 @@ def _standing(point: Point, among: Sequence[Point]) -> str:
     return FRONT
 
 
-def _is_nearer(one: Point, other: Point) -> bool:
+def _is_nearer(point: Point, other: Point) -> bool:
     """Return whether all errors that both have are smaller by more than their spread."""
-    return all(a.is_below(b) for a, b in zip(one.errors, other.errors, strict=False))
+    return all(a.is_below(b) for a, b in zip(point.errors, other.errors, strict=False))
 
 
-def _is_farther_off(one: Point, other: Point) -> bool:
+def _is_farther_off(point: Point, other: Point) -> bool:
     """Return whether any error is larger by more than its spread."""
-    return any(b.is_below(a) for a, b in zip(one.errors, other.errors, strict=False))
+    return any(b.is_below(a) for a, b in zip(point.errors, other.errors, strict=False))

@@ -150,17 +150,19 @@ def _uniform(hazard: Contender) -> Contender:
     return Contender("uniform radii, hazard", law, sampler, law.shape, sampler, another=True)
 
 
-def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
+def ways_of(contender: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
     """Return a sampler weighed by its own density; and by its law's, where that is another."""
-    sampler = one.judged
+    sampler = contender.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
-    own = WeighedSampler(one.name, one, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)
+    own = WeighedSampler(contender.name, contender, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)
     if not apart or isinstance(sampler, UniformSampler):
         return [own]
     return [
         own,
-        WeighedSampler(f"{one.name}, law's density", one, noise_ratios(unweighted, sampler, sizes), biases[..., 1]),
+        WeighedSampler(
+            f"{contender.name}, law's density", contender, noise_ratios(unweighted, sampler, sizes), biases[..., 1]
+        ),
     ]
 
 
@@ -204,16 +206,16 @@ def error_ratios(
     return float(square), float(mine.variance.mean() / best.variance.mean())
 
 
-def points_of(one: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
-    square, variance = one.noise
+def points_of(way: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
+    square, variance = way.noise
     worst = square[np.argmax(np.median(square, axis=1))]
     middle = np.exp(np.log(square).mean(axis=0))
     facts = {"samples": SAMPLES, "variance": float(np.exp(np.log(variance).mean()))}
     rms, largest = (
         WithSpread(float(value), max(float(value) - ROUNDING, 0.1 * ROUNDING), float(value) + ROUNDING)
-        for value in (np.sqrt(np.mean(one.bias**2)), np.max(np.abs(one.bias)))
+        for value in (np.sqrt(np.mean(way.bias**2)), np.max(np.abs(way.bias)))
     )
     return (
-        Point("noise", one.name, "", cost, WithSpread.of(middle), WithSpread.of(worst), facts),
-        Point("bias", one.name, "", cost, rms, largest, facts),
+        Point("noise", way.name, "", cost, WithSpread.of(middle), WithSpread.of(worst), facts),
+        Point("bias", way.name, "", cost, rms, largest, facts),
     )

@@ -166,9 +166,9 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
     every, notes = contestants(sizes)
     energies: dict[str, list[RingEnergies]] = {one.key: [] for one in every}
 
-    def work(one: Contestant) -> stopwatch.Work:
+    def work(contestant: Contestant) -> stopwatch.Work:
         def run(seed: int) -> int:
-            energies[one.key].append(one.run(seed))
+            energies[contestant.key].append(contestant.run(seed))
             return 1
 
         return run
@@ -208,18 +208,26 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     return contestants, notes
 
 
-def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
-    middle, worst = zip(*(one.annuli.errors(each.energy) for each in energies), strict=True)
-    stated = [each.stated[one.annuli.judged] for each in energies if each.stated is not None]
-    if estimate and (one.annuli, one.method, one.label) == (MATCHED, EXACT, AS_IS):
+def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
+    middle, worst = zip(*(contestant.annuli.errors(each.energy) for each in energies), strict=True)
+    stated = [each.stated[contestant.annuli.judged] for each in energies if each.stated is not None]
+    if estimate and (contestant.annuli, contestant.method, contestant.label) == (MATCHED, EXACT, AS_IS):
         stated = [np.asarray(exact.error_estimate(MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
     facts: dict[str, float | int | str] = {
-        "photons": one.photons,
-        "first_call": rates.first[one.key],
+        "photons": contestant.photons,
+        "first_call": rates.first[contestant.key],
         "stated": float(np.sqrt(np.mean(np.square(stated)))) if stated else "",
     }
-    seconds = WithSpread.of(rates.seconds(one.key))
-    return Point(one.annuli.panel, one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
+    seconds = WithSpread.of(rates.seconds(contestant.key))
+    return Point(
+        contestant.annuli.panel,
+        contestant.method,
+        contestant.label,
+        seconds,
+        WithSpread.of(middle),
+        WithSpread.of(worst),
+        facts,
+    )
 
 
 def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
