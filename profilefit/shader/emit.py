@@ -67,18 +67,18 @@ def clamps(law: Constants) -> str:
 
 
 def law_text(
-    law: ProfileLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None
+    law: ProfileLaw, lang: str = "glsl", name: str | None = None, remarks: Mapping[str, str] | None = None
 ) -> str:
     """Return the law with its constants, ready to include: no version line, no precision line, no main.
 
     lang  "glsl" (also for GLSL ES, which differs only in what a shader says before it), "hlsl" or "python"
     name  the prefix of its names, `prefix(law)` by default
-    told  a remark for each constant, which stands behind it
+    remarks  a remark for each constant, which stands behind it
     InputError for a law that has no text.
     """
     text = _text(law, ProfileLaw)
     files = [*parts(law), *map(read_text, text.ends)]
-    return filled(files, name or prefix(law), numbers(law), text.count, lang, told or {})
+    return filled(files, name or prefix(law), numbers(law), text.count, lang, remarks or {})
 
 
 def numbers(law: ProfileLaw) -> Numbers:
@@ -125,11 +125,13 @@ def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
     return members(made["law_shape"](alpha), "")
 
 
-def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
+def map_text(
+    law: AlbedoLaw, lang: str = "glsl", name: str | None = None, remarks: Mapping[str, str] | None = None
+) -> str:
     """Return the map between alpha and A: NAME_alpha(A), NAME_map_reflectance(alpha); arguments as for `law_text`."""
     text = _text(law, AlbedoLaw)
     constants = {HIGHEST: max_reflectance(law), **_prefixed(law)}
-    remarks = {f"map_{key}": value for key, value in (told or {}).items()}
+    remarks = {f"map_{key}": value for key, value in (remarks or {}).items()}
     files = [read_text(part) for part in ("common", *text.parts, text.file)]
     return filled(files, name or prefix(law), constants, 0, lang, remarks)
 
@@ -169,14 +171,16 @@ def read_text(file: str) -> str:
     return text_beside(__name__, f"glsl/{file}.glsl")
 
 
-def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:
+def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, remarks: Mapping[str, str]) -> str:
     """Fill texts, the first of which is `common`, with a prefix and its constants, in a language."""
     if not PREFIX.fullmatch(name):
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
     lines = []
     for key, value in constants.items():
-        lines.append(f"const float {name}_{key} = {literal(value)};" + (f" // {told[key]}" if told.get(key) else ""))
+        lines.append(
+            f"const float {name}_{key} = {literal(value)};" + (f" // {remarks[key]}" if remarks.get(key) else "")
+        )
     own = _repeated("\n".join(["\n".join(lines) + "\n", *rest]), count).replace(PLACEHOLDER, f"{name}_")
     digest = f"0x{hashlib.sha256(own.encode()).hexdigest()[:7]}"  # a positive int in every language
     guarded = own if lang == "python" else GUARD.format(name=name, digest=digest, text=own)

@@ -124,8 +124,8 @@ def export_medium(
     lines = []
     for name, (each, errors) in values.items():
         kind = "float" if each.size == 1 else f"vec{each.size}"
-        told = f"{kind} {start}_{name} = {kind}({', '.join(f'{one:.6g}' for one in each)});"
-        lines.append(f"const {told} // +- {', '.join(f'{one:.2g}' for one in errors)}\n")
+        line = f"{kind} {start}_{name} = {kind}({', '.join(f'{one:.6g}' for one in each)});"
+        lines.append(f"const {line} // +- {', '.join(f'{one:.2g}' for one in errors)}\n")
     return f"{export(named, folder, name=start)}\n{commented(head, '//')}{''.join(lines)}"
 
 

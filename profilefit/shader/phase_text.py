@@ -17,17 +17,17 @@ NAMES = (
 )
 
 
-def phase_text(phase: Phase, lang: str = "glsl", name: str = "phase", told: Mapping[str, str] | None = None) -> str:
+def phase_text(phase: Phase, lang: str = "glsl", name: str = "phase", remarks: Mapping[str, str] | None = None) -> str:
     """Return a sum of one to four terms of Henyey and Greenstein, ready to include: NAME_pdf(off), NAME_sample(xi).
 
-    lang, name, told  as for `emit.law_text`;  InputError on any other phase function: fit terms to it
+    lang, name, remarks  as for `emit.law_text`;  InputError on any other phase function: fit terms to it
     """
     constants: dict[str, float] = {}
     weights, terms = _terms(phase)
     for number, (weight, g) in enumerate(zip(weights, terms, strict=True), start=1):
         constants |= {f"w{number}": weight, f"g{number}": g}
     texts = [emit.read_text(part) for part in ("common", "phase")]
-    return emit.filled(texts, name, constants, len(terms), lang, told or {})
+    return emit.filled(texts, name, constants, len(terms), lang, remarks or {})
 
 
 def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = None) -> str:
@@ -42,8 +42,8 @@ def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = Non
         kept = {key: content[key] for key in ("title", "equations", "note", "data", "data_digest", "constants")}
         return json_file({**kept, "phase": as_table(record.phase(form, how))})
     start = name or record.path.stem.replace("-", "_")
-    told = {key: error_remark(errors) for key, errors in constants.items()}
-    text = phase_text(record.phase(form, how), TRANSLATED.get(lang, lang), start, told)
+    remarks = {key: error_remark(errors) for key, errors in constants.items()}
+    text = phase_text(record.phase(form, how), TRANSLATED.get(lang, lang), start, remarks)
     own, data = content["phases"][form][how], content["data"]
     head = [f"phase function {record.path.stem}: {FORMS[form].title}"]
     head += [f"{start}_{called:<20}{words}" for called, words in NAMES]

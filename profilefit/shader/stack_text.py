@@ -36,12 +36,12 @@ Numbers = dict[str, float]
 
 
 def stack_text(
-    laws: Sequence[StackLaw], lang: str = "glsl", name: str = NAME, told: Mapping[str, str] | None = None
+    laws: Sequence[StackLaw], lang: str = "glsl", name: str = NAME, remarks: Mapping[str, str] | None = None
 ) -> str:
     """Return the laws of a stack's three channels, ready to include, with the first layer's thickness as an argument.
 
     NAME_profile(r, channel, thickness) and what else `glsl/README.md` lists; channel 0, 1, 2 is red, green, blue.
-    lang, name, told  as for `emit.law_text`;  InputError on laws of unlike stacks
+    lang, name, remarks  as for `emit.law_text`;  InputError on laws of unlike stacks
     """
     count = _one_count(laws)
     constants: Numbers = {}
@@ -50,7 +50,7 @@ def stack_text(
     common, *parts = emit.shapeless(laws[0].top.law)
     own = [one.replace(emit.PLACEHOLDER, f"{emit.PLACEHOLDER}{LAYER}_") for one in parts]
     texts = [common, *own, emit.read_text("channel"), *_layer_texts(laws), emit.read_text("stack")]
-    return emit.filled(texts, name, constants, count, lang, told or {})
+    return emit.filled(texts, name, constants, count, lang, remarks or {})
 
 
 def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME}_once") -> str:
@@ -78,8 +78,8 @@ def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: st
     lang, name  as for `emit.law_text`;  InputError on sums of unlike numbers
     """
     if len(sums) != len(CHANNELS) or len({one.count() for one in sums}) > 1:
-        told = ", ".join(str(one.count()) for one in sums) or "none"
-        raise InputError(f"sums must be three of one number of Gaussians, of red, green and blue, got {told}")
+        got = ", ".join(str(one.count()) for one in sums) or "none"
+        raise InputError(f"sums must be three of one number of Gaussians, of red, green and blue, got {got}")
     shapes = [_rounded(one.text_shape()) for one in sums]
     prefix = emit.PLACEHOLDER.removesuffix("_")
     texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), _of_channel(prefix, "_shape", shapes)]
@@ -222,12 +222,12 @@ def _one_count(laws: Sequence[StackLaw]) -> int:
         raise InputError(f"laws must be three laws of a stack, of red, green and blue, got {_kinds(laws)}")
     settings = {replace(layer.setting, g=0.0) for law in laws for layer in law.layers}
     if len(settings) > 1:
-        told = "; ".join(sorted(map(str, settings)))
-        raise InputError(f"laws must be of one light and one n in all layers and channels, got {told}")
+        got = "; ".join(sorted(map(str, settings)))
+        raise InputError(f"laws must be of one light and one n in all layers and channels, got {got}")
     texts = {emit.source(layer.law) for law in laws for layer in law.layers}
     if len(texts) > 1 or not texts <= set(HALF_SPACES):
-        told = ", ".join(sorted(texts))
-        raise InputError(f"laws must be of half spaces by one text, {' or '.join(HALF_SPACES)}, got {told}")
+        got = ", ".join(sorted(texts))
+        raise InputError(f"laws must be of half spaces by one text, {' or '.join(HALF_SPACES)}, got {got}")
     return _one_number("laws", [len(law.layers) for law in laws])
 
 
@@ -240,15 +240,15 @@ def _one_index(media: Sequence[Medium]) -> tuple[float, int]:
             raise InputError(f"media must have an infinite last layer, got thickness {one.layers[-1].thickness:g}")
     indices = {layer.n / one.n_above for one in media for layer in one.layers}
     if len(indices) > 1 or min(indices) < 1.0:
-        told = ", ".join(f"{index:g}" for index in sorted(indices))
-        raise InputError(f"media must be of one n in all layers and channels, 1 or more over that above, got {told}")
+        got = ", ".join(f"{index:g}" for index in sorted(indices))
+        raise InputError(f"media must be of one n in all layers and channels, 1 or more over that above, got {got}")
     return indices.pop(), _one_number("media", [len(one.layers) for one in media])
 
 
 def _one_number(name: str, counts: Sequence[int]) -> int:
     if len(set(counts)) > 1 or counts[0] < 2:
-        told = ", ".join(map(str, counts))
-        raise InputError(f"{name} must have one number of layers in all channels, two or more, got {told}")
+        got = ", ".join(map(str, counts))
+        raise InputError(f"{name} must have one number of layers in all channels, two or more, got {got}")
     return counts[0]
 
 

@@ -72,7 +72,7 @@ ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 @dataclass(frozen=True)
 class SumRecord:
-    """A record, read. stack  what it is of;  content  all that it says;  path  of its file"""
+    """Record of the sums of a stack. stack  its layers;  content  all that it says;  path  of its file"""
 
     stack: LayerStack
     content: Mapping[str, Any]

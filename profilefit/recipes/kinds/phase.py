@@ -34,6 +34,7 @@ DEFAULT = ("4-terms", HELD)
 FULL_SPHERE = 4 * np.pi  # [sr], the integral of values that are said relative to isotropic ones
 NEAR_ONE = 0.1
 SMALLEST = 1e-4  # share that is printed
+USUAL = RecipeRun("quick", SEED, Path(), None, None)  # of a table that is fitted without a record
 OF_FIT: Fields = {
     "": TABLE,
     ".held": TEXTS,
@@ -139,8 +140,8 @@ def load(path: Path) -> PhaseRecord:
 
 def fits_of(data: PhaseData, angles: tuple[float, float] = ALL_ANGLES, seed: int = SEED) -> list[PhaseFit]:
     """Fit every form to a table, its moments free and then held, as many as it has numbers for."""
-    holds = {name: ((), MOMENTS[: form.free]) for name, form in FORMS.items()}
-    return [fit_phase(data, name, hold, angles, seed) for name, both in holds.items() for hold in both]
+    each = ((name, hold) for name, form in FORMS.items() for hold in ((), MOMENTS[: form.free]))
+    return [fit_phase(data, name, hold, angles, seed) for name, hold in each]
 
 
 def table_lines(data: Mapping[str, Any]) -> list[str]:
@@ -184,7 +185,7 @@ def described(data: PhaseData) -> dict[str, Any]:
     }
 
 
-def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun | None = None) -> dict[str, Any]:
+def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun = USUAL) -> dict[str, Any]:
     """Return what a record says."""
     constants: dict[str, Any] = {}
     phases: dict[str, Any] = {name: {} for name in FORMS}
@@ -212,7 +213,7 @@ def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun | None = N
         "law": PIPELINE,
         "pipeline": PIPELINE,
         "equations": EQUATIONS,
-        "note": NOTE + (run.unused() if run else ""),
+        "note": NOTE + run.unused(),
         "setting": Setting(),
         "constants": constants,
         "phases": phases,
@@ -220,8 +221,8 @@ def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun | None = N
         "fit": {"result": record.first_failure([each.best.result for each in fits])},
         "quality": quality(fits),
         "truth": {"kind": "table"},
-        "preset": run.preset if run else "quick",
-        "seed": run.seed if run else SEED,
+        "preset": run.preset,
+        "seed": run.seed,
         "versions": record.versions(),
         "data_digest": data.digest,
     }

@@ -106,7 +106,7 @@ class StackRequest:
 
 @dataclass(frozen=True)
 class StackRecord:
-    """A record, read. laws  of red, green, blue;  content  all that it says;  digest  sha256 of its file"""
+    """Record of a stack. laws  of red, green, blue;  content  all that it says;  digest  sha256 of its file"""
 
     name: str
     stack: LayerStack

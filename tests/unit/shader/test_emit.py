@@ -45,13 +45,13 @@ def test_a_constant_is_a_number(value):
 
 def test_every_constant_of_a_law_stands_in_its_text_once():
     told = {"s0": "a remark"}
-    declared = DECLARED.findall(emit.law_text(BURLEY, told=told))
+    declared = DECLARED.findall(emit.law_text(BURLEY, remarks=told))
     names = [name for name, _ in declared if name.startswith("burley_")]
     of_map = [f"map_{name}" for name in BURLEY.albedo.constants()]
     own = ["MAX_REFLECTANCE", *of_map, "power", *BURLEY.constants()]
     assert names == [f"burley_{name}" for name in own]
     assert dict(declared)["burley_s0"] == "1.85"
-    assert "const float burley_s0 = 1.85; // a remark\n" in emit.law_text(BURLEY, told=told)
+    assert "const float burley_s0 = 1.85; // a remark\n" in emit.law_text(BURLEY, remarks=told)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 8])
