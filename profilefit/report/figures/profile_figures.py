@@ -133,7 +133,7 @@ def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | No
     if not isinstance(one, Fitted):
         return None
     known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)
-    return None if known.off is None else derived.profile(known, r, alpha).interval()
+    return None if known.discrepancy is None else derived.profile(known, r, alpha).interval()
 
 
 def _draw(ax: Axes, r: Floats, one: Any, evaluate: Any, name: str) -> None:
