@@ -110,35 +110,35 @@ def photo(
         require_folder(out, "medium.glsl", "photo.html", "photo.json", make=False)
     law = None if out is None else diffuse_law(setting)
     with working("measuring", quiet):
-        found = measured(
+        answer = measured(
             shots, scale, card or [], grey or [], dark or [], setting, beliefs,
             _known("--reflectance", reflectance),
         )  # fmt: skip
-    body = photo_content(found)
+    body = photo_content(answer)
     if out is not None and law is not None:  # after photographs that cannot be measured, which leave no folder
         require_folder(out)
-        text = medium_text(found, law)
-        figures = _figures(found, out)
+        text = medium_text(answer, law)
+        figures = _figures(answer, out)
         write_whole(out / "medium.glsl", text)
-        write_whole(out / "photo.html", photo_page(found, out, text))
+        write_whole(out / "photo.html", photo_page(answer, out, text))
         write_whole(out / "photo.json", json_text(body))
         notes(quiet).print(f"wrote photo.html, photo.json, medium.glsl and {figures} figures into {out}", markup=False)
     if as_json:
         print_json(body)
     else:
         console = screen()
-        show(photo_tables(found), console)
-        for line in photo_lines(found):
+        show(photo_tables(answer), console)
+        for line in photo_lines(answer):
             console.print(line, markup=False, emoji=False)
-    if not all(one.converged for one in found.fits.values()):
+    if not all(one.converged for one in answer.fits.values()):
         raise typer.Exit(FAILED)
 
 
-def _figures(found: Photo, out: Path) -> int:
+def _figures(answer: Photo, out: Path) -> int:
     with interruptible(__name__):
         from profilefit.report.figures.photo_figures import rings_figure, spot_figure
 
-    return len([*spot_figure(found, out), *rings_figure(found, out)])
+    return len([*spot_figure(answer, out), *rings_figure(answer, out)])
 
 
 def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, quiet: bool) -> None:

@@ -62,11 +62,11 @@ class LawWithErrors:
     free: tuple[str, ...]
     objective: str
     statistical: Floats | None
-    off: Discrepancy | None
+    discrepancy: Discrepancy | None
 
     @classmethod
-    def of_fit(cls, fit: Fit, off: Discrepancy | None) -> LawWithErrors:
-        return cls(fit.law, fit.free, fit.objective, fit.statistical, off)
+    def of_fit(cls, fit: Fit, process: Discrepancy | None) -> LawWithErrors:
+        return cls(fit.law, fit.free, fit.objective, fit.statistical, process)
 
     @classmethod
     def of_record(cls, law: Any, content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> LawWithErrors:
@@ -124,14 +124,14 @@ class AtAlbedo:
     @cached_property
     def covariance(self) -> Floats:
         """Covariance (n, n) of the model's error in ring energies."""
-        off, n = self.known.off, EDGES.size - 1
-        if off is None:
+        process, n = self.known.discrepancy, EDGES.size - 1
+        if process is None:
             return np.full((n, n), np.nan)
         unit = unit_energy(self.known.objective, self.energy[None], np.array([self.alpha]), EDGES)[0]
         unit = np.where(self.energy > 0, unit, 0.0)
         relative = self.slope / np.where(unit > 0, unit, 1.0)[:, None]
-        u, s = np.log(self.middle), off.places(np.full(n, self.alpha), self.known.law.setting)
-        return off.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
+        u, s = np.log(self.middle), process.places(np.full(n, self.alpha), self.known.law.setting)
+        return process.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
 
     @property
     def middle(self) -> Floats:
@@ -151,7 +151,7 @@ class AtAlbedo:
         density = (inside[place] - before) / (EDGES[place + 1] - EDGES[place])
         moved = -(weight - share) / total / density  # d radius / d ring energy
         gain = moved @ self.slope
-        model = float(np.sqrt(max(moved @ self.covariance @ moved, 0.0))) if self.known.off else np.nan
+        model = float(np.sqrt(max(moved @ self.covariance @ moved, 0.0))) if self.known.discrepancy else np.nan
         return float(value), float(self.known.statistical_error(gain[None])[0]), model
 
 
@@ -175,9 +175,9 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     value = np.asarray(known.reduced.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
-    off = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
+    model = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
     at = np.log(radii)
-    relative = [np.interp(at, np.log(here.middle), np.where(here.energy > 0, part, np.nan)) for part in (noise, off)]
+    relative = [np.interp(at, np.log(here.middle), np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
     return Quantity(value, np.abs(value) * relative[0], np.abs(value) * relative[1])
 
 
@@ -191,9 +191,9 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
-    if known.off is not None:
-        spread = known.off.law_covariance(
-            0.0 * albedos, known.off.places(albedos, known.law.setting), slope[:, 0] / energy
+    if known.discrepancy is not None:
+        spread = known.discrepancy.law_covariance(
+            0.0 * albedos, known.discrepancy.places(albedos, known.law.setting), slope[:, 0] / energy
         )
         model = value * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
@@ -204,19 +204,19 @@ def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_W
 
     Where profiles are of several settings, those of the law's setting count.
     """
-    off = []
+    errors = []
     settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
     for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
         if setting == known.law.setting and alpha < 1.0 and cdf[-1] > share:
             truth = float(np.interp(share, cdf, profiles.r_edges))
-            off.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
-    return float(np.sqrt(np.mean(np.square(off)))) if off else np.nan
+            errors.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 
 def summary(known: LawWithErrors, profiles: Profiles) -> dict[str, Any]:
     """Return a record's table of A, or of the radius that holds 99.5 % of the energy, at a few albedos."""
     if known.is_map:
         return {"alpha": SHOWN, "quantity": "reflectance", **vars(reflectance(known, SHOWN))}
-    found = radius(known, SHOWN)
-    model = np.fmax(found.model, found.value * tail_error(known, profiles))
-    return {"alpha": SHOWN, "quantity": "radius", **vars(replace(found, model=model))}
+    radii = radius(known, SHOWN)
+    model = np.fmax(radii.model, radii.value * tail_error(known, profiles))
+    return {"alpha": SHOWN, "quantity": "radius", **vars(replace(radii, model=model))}

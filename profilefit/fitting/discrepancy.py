@@ -158,10 +158,10 @@ def of_residuals(data: Residuals) -> Discrepancy:
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = likeliest(
+    theta, curved, worth, converged = likeliest(
         begin, limits, (apart(u, u), apart(s, s), y, unit_columns(slope), noise)
     )
-    amplitude, length_u, length_s = map(float, np.exp(found))
+    amplitude, length_u, length_s = map(float, np.exp(theta))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
     across = data.influence, kernel_s, kernel_u, data.influence

@@ -133,8 +133,8 @@ def radial(law, rings: Rings) -> Tables:
 
 def albedo(law, rings: Rings) -> Tables:
     """alpha(A) - alpha of reduced albedos, unweighted over those given."""
-    found = law.under(rings.surface).alpha(rings.reflectance[:, None])
-    return (reduced(found, law.setting.g).alpha - rings.alpha[:, None],)
+    mapped = law.under(rings.surface).alpha(rings.reflectance[:, None])
+    return (reduced(mapped, law.setting.g).alpha - rings.alpha[:, None],)
 
 
 def reflectance(law, rings: Rings) -> Tables:

@@ -103,7 +103,7 @@ def _truth(alpha: float, outer: float, setting: Setting) -> _Truth:
 
 def _measures(truth: _Truth, profile: Floats, even: Floats, law_cdf: Floats) -> tuple[float | tuple[float, float], ...]:
     """Fields of `Quality` for one albedo, from a law's R_d at the truth's radii and even radii and its cdf far out."""
-    off = np.abs(profile / truth.profile - 1.0)
+    error = np.abs(profile / truth.profile - 1.0)
     ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.
     l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(truth.cdf)))
@@ -113,7 +113,7 @@ def _measures(truth: _Truth, profile: Floats, even: Floats, law_cdf: Floats) -> 
         for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))
     )
     mse_halves, r2_halves = zip(*halves, strict=True)
-    return float(off.mean()), float(ks), float(l1), mse, r2, mse_halves, r2_halves, float(off.max())
+    return float(error.mean()), float(ks), float(l1), mse, r2, mse_halves, r2_halves, float(error.max())
 
 
 @dataclass(frozen=True)

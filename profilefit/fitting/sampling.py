@@ -203,10 +203,10 @@ def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floa
     """
     x = _called(_sample, sampler, xi, alpha)
     with jax.enable_x64(True):
-        found = np.asarray(sampler.undone(x, xi, alpha))
+        own = np.asarray(sampler.undone(x, xi, alpha))
     if isinstance(target, LawTarget) and target.law is sampler.law:
-        return found
-    return found + target.cdf(x, alpha) - LawTarget(sampler.law).cdf(x, alpha)
+        return own
+    return own + target.cdf(x, alpha) - LawTarget(sampler.law).cdf(x, alpha)
 
 
 def _at_atoms(
@@ -265,7 +265,7 @@ def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) 
 def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> list[tuple[float, float, float]]:
     """Return runs of equal radii on the scan, their ends found to rounding."""
     edges = np.diff(np.concatenate([[0], still.astype(int), [0]]))
-    found = []
+    flats = []
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         value = float(x[first])
         low, high = float(SCAN[first]), float(SCAN[last])
@@ -273,8 +273,8 @@ def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> lis
             low = _boundary(radius, SCAN[first - 1], low, value)
         if last < SCAN.size - 1:
             high = _boundary(radius, SCAN[last + 1], high, value)
-        found.append((low, high, value))
-    return found
+        flats.append((low, high, value))
+    return flats
 
 
 def _boundary(radius: Callable[[Floats], Floats], outside: float, inside: float, value: float) -> float:

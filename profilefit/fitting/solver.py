@@ -169,12 +169,12 @@ def solve_batch(
     One after the other: one program serves them all and `least_squares` too, and none waits for the slowest.
     """
     begins, leaves = np.asarray(starts, np.float64), jax.tree.map(np.asarray, data)
-    found = []
+    solutions = []
     for row, begin in enumerate(begins):
         item = jax.tree.map(lambda leaf, row=row: leaf[row], leaves)
         scale = None if scales is None else np.asarray(scales)[row]
-        found.append(least_squares(residual, begin, item, worth=worth, scale=scale))
-    return tuple(found)
+        solutions.append(least_squares(residual, begin, item, worth=worth, scale=scale))
+    return tuple(solutions)
 
 
 def best_apart(places: NDArray[np.int_], costs: Floats) -> list[int]:

@@ -97,7 +97,7 @@ class ForwardHalfSpace(ProfileLaw):
         of = self.parts(jnp.asarray(0.0))
         white, slowest = guess(of)
         curve = ("kappa", "source", "w", "h", "a", "b", "c")
-        found: dict[str, Any] = {
+        numbers: dict[str, Any] = {
             "reflectance": self.total_reflectance,
             "share": of.share,
             "rest": of.rest,
@@ -106,4 +106,4 @@ class ForwardHalfSpace(ProfileLaw):
             "white": white,
             "slowest": slowest,
         }
-        return {name: float(value) for name, value in found.items()}
+        return {name: float(value) for name, value in numbers.items()}

@@ -140,13 +140,13 @@ class RefractingHazard(TwoPartHazard):
         here = self.here()
         rho, strength = float(here.trapped), float(here.source / here.once)
         y = float(here.critical) / strength
-        found: dict[str, dict[str, float]] = {}
+        by_part: dict[str, dict[str, float]] = {}
         for name in self.constant_names():
             if not name.startswith("once"):  # letter, which of its coefficients, power of rho
-                found.setdefault(name[:2], {})[name] = rho ** int(name[2])
+                by_part.setdefault(name[:2], {})[name] = rho ** int(name[2])
         twice = 2.0 * float(self.once_b0 + self.once_b1 * y) * strength**2
         return {
-            **found,
+            **by_part,
             "once_h": {"once_h": y / strength},
             "once_a": {"once_a0": strength, "once_a1": y * strength},
             "once_b": {"once_b0": twice, "once_b1": y * twice},

@@ -277,10 +277,10 @@ def length(name: str, text: str, unit: str, accepted: str = "a length > 0 such a
         raise InputError(
             f"{name} must be without a unit where the data has none (`unit` gives it one), got {shown(text)}"
         )
-    found = float(match[1]) * (factor(match[2], unit) if match[2] and match[2] != unit else 1.0)
-    if not SMALLEST <= found <= LARGEST:
+    value = float(match[1]) * (factor(match[2], unit) if match[2] and match[2] != unit else 1.0)
+    if not SMALLEST <= value <= LARGEST:
         raise InputError(f"{name} must lie between {SMALLEST:g} and {LARGEST:g} {unit or 'in size'}, got {shown(text)}")
-    return found
+    return value
 
 
 def factor(source: str, target: str) -> float:

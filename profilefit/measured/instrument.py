@@ -178,14 +178,14 @@ def _read(path: Path) -> Profiled:
     rows: list[list[float]] = []
     for number, (at, line) in enumerate(lines):
         cells = CELLS.split(line)
-        found = [_number(cell) for cell in cells]
-        if number == 0 and any(math.isnan(one) for one in found):
+        numbers = [_number(cell) for cell in cells]
+        if number == 0 and any(math.isnan(one) for one in numbers):
             continue
-        if len(found) != 2 or not all(math.isfinite(one) and one >= 0 for one in found):
+        if len(numbers) != 2 or not all(math.isfinite(one) and one >= 0 for one in numbers):
             raise InputError(f"{path}:{at}: expected a radius >= 0 and an irradiance >= 0, got {line[:40]!r}")
-        if rows and found[0] <= rows[-1][0]:
-            raise InputError(f"{path}:{at}: expected radii that rise above {rows[-1][0]:g}, got {found[0]:g}")
-        rows.append(found)
+        if rows and numbers[0] <= rows[-1][0]:
+            raise InputError(f"{path}:{at}: expected radii that rise above {rows[-1][0]:g}, got {numbers[0]:g}")
+        rows.append(numbers)
     while len(rows) > 2 and rows[-1][1] == rows[-2][1] == 0.0:  # darkness beyond the beam
         rows.pop()
     if not 2 <= len(rows) <= MOST_ROWS or not any(value > 0 for _, value in rows[:-1]):

@@ -229,8 +229,8 @@ def exact_light(setting: Setting) -> ExactLight:
         return _filled(forward_table.light(setting))
     parts = ("rest", "kappa", "share")
     name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
-    found = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
-    return tabulated(setting, NEAREST, STEP, *(found[part] for part in parts))
+    arrays = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
+    return tabulated(setting, NEAREST, STEP, *(arrays[part] for part in parts))
 
 
 def light_at_hand(setting: Setting) -> ExactLight:

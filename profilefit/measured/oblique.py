@@ -94,12 +94,12 @@ def centres(alpha: float, n: float, g: float, angle: float, x: Floats) -> Floats
             light += (by_flux * depth / d * (1.0 / d + kappa) + sign * by_fluence / diffusion) * np.exp(-kappa * d) / d
         return np.asarray(np.cos(azimuth) @ (light @ weight).T, float)
 
-    found = np.full(x.size, weight @ aside)
+    middle = np.full(x.size, weight @ aside)
     for _ in range(ROUNDS):
-        here = first_moment(found)
-        step = here * STEP / (first_moment(found + STEP) - here)
-        found -= np.clip(step, -0.2, 0.2)
-    return found
+        here = first_moment(middle)
+        step = here * STEP / (first_moment(middle + STEP) - here)
+        middle -= np.clip(step, -0.2, 0.2)
+    return middle
 
 
 def sources(alpha: float, g: float) -> tuple[Floats, Floats, float]:

@@ -144,7 +144,7 @@ def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool
     numbers = _numbers(path, header, rows)
     inner, outer = _radii(path, header, rows, numbers)
     length = _length_unit(path, header, unit)
-    found, errors = _values(path, header, rows, numbers)
+    means, errors = _values(path, header, rows, numbers)
     _require_one_measure(path, header)
     times = _value_factor(path, header, length, scaled)
     return Measured(
@@ -152,12 +152,12 @@ def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool
         hashlib.sha256(content).hexdigest(),
         inner,
         outer,
-        found.value * times,
-        found.sigma * times,
-        found.freedom,
+        means.value * times,
+        means.sigma * times,
+        means.freedom,
         errors,
         length,
-        pooled=found.pooled,
+        pooled=means.pooled,
         notes=notes,
         stated=stated,
     )
@@ -207,7 +207,7 @@ def _text(path: Path, content: bytes) -> str:
 
 def _stated(path: Path, lines: list[str]) -> tuple[dict[str, Fact], list[Fact]]:
     """Return the facts that comments state, such as # n = 1.4, by name, and the statements that are none of these."""
-    found: dict[str, Fact] = {}
+    facts: dict[str, Fact] = {}
     others: list[Fact] = []
     for at, line in enumerate(lines, start=1):
         if not line.lstrip().startswith("#"):
@@ -221,13 +221,13 @@ def _stated(path: Path, lines: list[str]) -> tuple[dict[str, Fact], list[Fact]]:
             )
             others += [] if is_sentence or not value else [Fact(spelled, at)]
             continue
-        if name in found:
+        if name in facts:
             raise InputError(f"{path}:{at}: expected {name} once, got it again")
         if not value:
             raise InputError(f"{path}:{at}: expected a value of {name}, got none")
         unit = next((word for word in BRACKETED.findall(spelled) for word in word if word in UNITS), "")
-        found[name] = Fact(f"{value} {unit}" if unit and value[-1:].isdigit() else value, at)
-    return found, others
+        facts[name] = Fact(f"{value} {unit}" if unit and value[-1:].isdigit() else value, at)
+    return facts, others
 
 
 def _notes(others: list[Fact], named: Fact | None, unit: str | None) -> tuple[str, ...]:
@@ -385,20 +385,20 @@ def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Fl
     if header.replicates:
         samples = np.stack([numbers[name] for name in header.replicates], axis=1)
         _require_light(path, samples.mean(axis=1))
-        found = moderated_variances(samples)
+        means = moderated_variances(samples)
         errors = f"standard errors of the means of {samples.shape[1]} replicates, variances moderated by their trend"
         named = header.replicates[0]
     else:
         _require_light(path, numbers["value"])
-        found = ModeratedVariance(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
+        means = ModeratedVariance(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
         named, errors = "sigma", "as given"
-    for row, one in zip(rows, found.sigma, strict=True):
+    for row, one in zip(rows, means.sigma, strict=True):
         if not 0 < one < np.inf and header.replicates:
             expected = f"replicates that differ, here or in {FEWEST} other rows, to know their standard error"
             raise InputError(f"{path}:{row.line}: column {named}: expected {expected}, got the same value in all")
         if not one > 0:
             raise InputError(f"{path}:{row.line}: column {named}: expected a standard error > 0, got {one:g}")
-    return found, errors
+    return means, errors
 
 
 def _require_light(path: Path, value: Floats) -> None:
@@ -408,16 +408,16 @@ def _require_light(path: Path, value: Floats) -> None:
 
 def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
     names = ("r_in", "r_out") if header.rings else ("r",)
-    found = {header.unit(name) for name in names} - {""}
-    for one in found:
+    written = {header.unit(name) for name in names} - {""}
+    for one in written:
         if one not in UNITS:
             raise InputError(
                 f"{path}:{header.line}: column {names[0]}: expected a unit of {', '.join(UNITS)}, got {_shown(one)}"
             )
-    if len({UNITS.get(one) for one in found | ({unit} if unit else set())}) > 1:
-        units = ", ".join(sorted(found | ({unit} if unit else set())))
+    if len({UNITS.get(one) for one in written | ({unit} if unit else set())}) > 1:
+        units = ", ".join(sorted(written | ({unit} if unit else set())))
         raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in `unit`, got {units}")
-    return found.pop() if found else checked_unit("unit", unit) if unit else ""
+    return written.pop() if written else checked_unit("unit", unit) if unit else ""
 
 
 def _require_one_measure(path: Path, header: _Header) -> None:
@@ -485,34 +485,34 @@ def read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Me
     kept = slice(start, start + groups * AVERAGED)
     means = samples[:, kept].reshape(len(samples), groups, AVERAGED).mean(axis=2)
     middle = r[kept].reshape(groups, AVERAGED).mean(axis=1)
-    found = moderated_variances(means.T)
+    moderated = moderated_variances(means.T)
     notes = (
         f"{colour}: {len(samples)} records; {start} pixels up to the brightest one left out, the others "
         f"averaged by {AVERAGED}",
     )
     errors = f"standard errors of the means of {len(samples)} records, variances moderated by their trend"
     return Measured(
-        str(path), hashlib.sha256(content).hexdigest(), middle, middle, found.value, found.sigma, found.freedom,
-        errors, "mm", pooled=found.pooled, notes=notes,
+        str(path), hashlib.sha256(content).hexdigest(), middle, middle, moderated.value, moderated.sigma,
+        moderated.freedom, errors, "mm", pooled=moderated.pooled, notes=notes,
     )  # fmt: skip
 
 
 def _records(path: Path, text: str) -> Floats:
     """Return values (records, pixels)."""
-    found: list[list[float]] = []
+    records: list[list[float]] = []
     for at, line in enumerate(text.splitlines(), start=1):
         cells = [cell for cell in CELLS.split(line.strip(" \ufeff\t")) if cell]
         if not cells or not cells[0].isdigit():
             continue  # words between records
         record, pixel, value = _tls_row(path, at, cells)
-        if record == len(found) + 1 and pixel == 1 and record <= MOST_RECORDS:
-            found.append([])
-        if record != len(found) or pixel != len(found[-1]) + 1 or pixel > MOST_PIXELS:
+        if record == len(records) + 1 and pixel == 1 and record <= MOST_RECORDS:
+            records.append([])
+        if record != len(records) or pixel != len(records[-1]) + 1 or pixel > MOST_PIXELS:
             raise InputError(f"{path}:{at}: expected records and pixels that count from 1, got {record} and {pixel}")
-        found[-1].append(value)
-    if not found or len({len(one) for one in found}) != 1:
-        raise InputError(f"{path}: expected records of as many pixels each, got {len(found)} that differ, or none")
-    return np.array(found)
+        records[-1].append(value)
+    if not records or len({len(one) for one in records}) != 1:
+        raise InputError(f"{path}: expected records of as many pixels each, got {len(records)} that differ, or none")
+    return np.array(records)
 
 
 def _tls_row(path: Path, at: int, cells: list[str]) -> tuple[int, int, float]:

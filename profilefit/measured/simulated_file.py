@@ -42,39 +42,39 @@ ALL_LIGHT = 1.0 + 1e-3  # files are rounded
 def read_mco_profile(path: Path) -> Measured:
     """Read Rd_r of an .mco file, lengths in cm."""
     content = read_whole(path, mco.MAX_BYTES)
-    found = mco.parse_mco(content, str(path))
-    grid, photons = found.run.grid, found.run.photons
-    entered = 1.0 - found.specular_reflectance
+    result = mco.parse_mco(content, str(path))
+    grid, photons = result.run.grid, result.run.photons
+    entered = 1.0 - result.specular_reflectance
     if not entered > 0:
-        raise InputError(f"{path}: expected a specular reflectance below 1, got {found.specular_reflectance:g}")
-    energy = (found.reflectance_r * grid.r_areas)[:-1]
+        raise InputError(f"{path}: expected a specular reflectance below 1, got {result.specular_reflectance:g}")
+    energy = (result.reflectance_r * grid.r_areas)[:-1]
     each = entered / photons
     notes = (f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",)
     return _counted(
         path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
-        "bounds: no photon weighs more than it entered with", True, found.run.medium, "searchlight",
-        (*notes, *_layers(found.run.medium)),
+        "bounds: no photon weighs more than it entered with", True, result.run.medium, "searchlight",
+        (*notes, *_layers(result.run.medium)),
     )  # fmt: skip
 
 
 def read_npz_profile(path: Path) -> Measured:
     """Read reflectance_r of the results of `mcml-sim run`, with its own errors, lengths in cm."""
     content = read_whole(path, tally_file.MAX_BYTES)
-    found = tally_file.parse_results(content, str(path))
-    if found.photons < 2:
+    result = tally_file.parse_results(content, str(path))
+    if result.photons < 2:
         raise InputError(f"{path}: expected two photons or more, since one has no standard error, got 1")
-    estimate = found.estimates["reflectance_r"]
-    areas = found.grid.r_areas
+    estimate = result.estimates["reflectance_r"]
+    areas = result.grid.r_areas
     with np.errstate(over="ignore"):  # impossible reflectances are refused below
         energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
     if not np.all(error <= ALL_LIGHT):
         raise InputError(f"{path}: expected standard errors of no more than all of the light")
     _require_light(path, energy)
-    squares = error**2 + energy**2 / (found.photons - 1.0)
+    squares = error**2 + energy**2 / (result.photons - 1.0)
     return _counted(
-        path, content, found.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
-        float(found.photons), "standard errors of the simulation", False, found.medium, found.illumination,
-        tuple(_layers(found.medium)),
+        path, content, result.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
+        float(result.photons), "standard errors of the simulation", False, result.medium, result.illumination,
+        tuple(_layers(result.medium)),
     )  # fmt: skip
 
 

@@ -66,13 +66,13 @@ def times(shots: Sequence[Exposure]) -> Times:
     stated = [one.seconds or 0.0 for one in shots]
     light = [sum(float(each.counts.mean()) for each in one.planes) for one in shots]
     order = np.lexsort((light, stated)) if all(stated) else np.argsort(light)
-    found, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
+    value, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
     for at in range(len(shots) - 2, -1, -1):
         shorter, longer = order[at], order[at + 1]
         ratio, error = _ratio(shots[shorter], shots[longer])
-        found[shorter] = found[longer] * ratio
+        value[shorter] = value[longer] * ratio
         covariance[np.ix_(order[: at + 1], order[: at + 1])] += error**2
-    return Times(found, covariance)
+    return Times(value, covariance)
 
 
 def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
@@ -125,11 +125,11 @@ def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
             good = (other.counts < FULL * other.range) & (other.counts > 0)
             if np.count_nonzero(good) < LEAST_PAIRS:
                 continue
-            light, off = other.counts[good], one.counts[good] - ratio * other.counts[good]
+            light, residual = other.counts[good], one.counts[good] - ratio * other.counts[good]
             edges = np.unique(np.quantile(light, np.linspace(0.0, 1.0, BINS + 1)))
             at = np.clip(np.searchsorted(edges, light, side="right") - 1, 0, edges.size - 2)
             for each in range(edges.size - 1):
-                inside = off[at == each]
+                inside = residual[at == each]
                 if inside.size < LEAST_PAIRS:
                     continue
                 middle = float(light[at == each].mean())
@@ -139,8 +139,8 @@ def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
     if len(rows) < 2:
         return Sensor(1.0, 1.0)
     matrix, weight = np.array(rows), np.array(weights)
-    found, *_ = np.linalg.lstsq(matrix * weight[:, None], np.array(squares) * weight, rcond=None)
-    return Sensor(1.0 / max(float(found[0]), 1e-9), float(np.sqrt(max(found[1], ROUNDED))))
+    best, *_ = np.linalg.lstsq(matrix * weight[:, None], np.array(squares) * weight, rcond=None)
+    return Sensor(1.0 / max(float(best[0]), 1e-9), float(np.sqrt(max(best[1], ROUNDED))))
 
 
 def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Picture]:
@@ -169,10 +169,10 @@ def _unclipped(plane: BayerPlane, reach: int) -> NDArray[np.bool_]:
 
 def _rough(shots: Sequence[Exposure], relative: Floats, at: int) -> Plane:
     """Light that neighbouring pixels share, of the longest exposure that has it."""
-    found: Plane = np.full(shots[0].planes[at].counts.shape, np.nan, np.float32)
+    rough: Plane = np.full(shots[0].planes[at].counts.shape, np.nan, np.float32)
     for shot, time in sorted(zip(shots, relative, strict=True), key=lambda pair: pair[1]):
         one = shot.planes[at]
         good = _unclipped(one, REACH + SHARED // 2)
         smooth = uniform_filter(one.counts, SHARED, mode="nearest") / np.float32(time)
-        found = np.where(good | np.isnan(found), smooth, found)
-    return found
+        rough = np.where(good | np.isnan(rough), smooth, rough)
+    return rough

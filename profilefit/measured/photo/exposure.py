@@ -98,11 +98,11 @@ def _raw(path: Path) -> Exposure:
             own = [[colours[int(which)] for which in row] for row in pattern]
             black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
             seconds = float(raw.other.shutter_speed)
-            found = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
-            found = replace(found, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
+            exposure = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
+            exposure = replace(exposure, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
     except rawpy.LibRawError as error:
         raise _refused(path, "a raw file", error) from None
-    return found
+    return exposure
 
 
 @contextmanager

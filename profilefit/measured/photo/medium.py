@@ -192,14 +192,14 @@ class Shot:
     def middle(self) -> Floats:
         """Prior means (p,) of the coordinates; 0 of which nothing is known."""
         given, halos = self.beliefs, len(self.beliefs.halos)
-        found = np.zeros(len(self.names))
+        x = np.zeros(len(self.names))
         if given.scale is not None:
-            found[2] = np.log(given.scale.value)
+            x[2] = np.log(given.scale.value)
         if given.beam is not None:
-            found[3] = np.log(0.5 * given.beam.value)
-        found[4], found[6 + halos] = given.surface.value, given.corner.value
-        found[5 : 5 + halos] = given.glare.value / halos
-        return found
+            x[3] = np.log(0.5 * given.beam.value)
+        x[4], x[6 + halos] = given.surface.value, given.corner.value
+        x[5 : 5 + halos] = given.glare.value / halos
+        return x
 
     @cached_property
     def knowledge(self) -> tuple[Floats, Floats]:
@@ -360,8 +360,8 @@ class PhotoFit:
     @cached_property
     def values(self) -> dict[str, float]:
         """A, alpha, l, mu_s', mu_a, scale."""
-        found = model.quantities(self.x[None, :3], np.array([self.total[0]]))
-        return {name: float(value[0]) for name, value in found.items()}
+        each = model.quantities(self.x[None, :3], np.array([self.total[0]]))
+        return {name: float(value[0]) for name, value in each.items()}
 
     @cached_property
     def errors(self) -> dict[str, float]:
@@ -382,8 +382,8 @@ class PhotoFit:
 
 def fitted(shot: Shot) -> PhotoFit:
     """Fit a shot by least squares: the lowest minimum that a search finds, and its rivals."""
-    found = lowest((_descended(shot, start) for start in shot.starts), compared=len(model.NAMES))
-    first, *others = (_ended(shot, one) for one in (found, *found.others))
+    end = lowest((_descended(shot, start) for start in shot.starts), compared=len(model.NAMES))
+    first, *others = (_ended(shot, one) for one in (end, *end.others))
     within = RIVAL * first.widening**2
     rivals = tuple(one for one in others if one.chi2 - first.chi2 < within and not first.holds(one.values))
     return replace(first, rivals=rivals, result=RIVALLED if rivals and first.converged else first.result)

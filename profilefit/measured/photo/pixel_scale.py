@@ -38,13 +38,13 @@ class PixelScale:
         middle = m @ (*centre, 1.0)
         affine = bool(np.all(m[2, :2] == 0.0))
         away = 1.0 if affine else m[2, 0] * columns + m[2, 1] * rows + m[2, 2]
-        found = []
+        both = []
         for row, start in zip(m[:2], middle[:2] / middle[2], strict=True):
             # About the centre already where that loses no digits.
             shift = -row[:2] @ centre if affine else row[2]
             place = (np.float32(row[0]) * columns + np.float32(row[1]) * rows + np.float32(shift)) / away
-            found.append(np.asarray(place if affine else place - start, np.float32))
-        x, y = np.broadcast_arrays(*found)
+            both.append(np.asarray(place if affine else place - start, np.float32))
+        x, y = np.broadcast_arrays(*both)
         return x, y
 
     def pixel(self, centre: tuple[float, float]) -> float:
@@ -87,8 +87,8 @@ def _by_marker(option: str, side: float, shots: Sequence[Exposure], unit: str) -
     points = (corners[0].reshape(4, 2) * step).astype(np.float32)
     square = side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
     matrix = np.asarray(cv2.getPerspectiveTransform(points, square), float)
-    found = PixelScale(matrix, "")
-    size = found.pixel((float(points[:, 0].mean()), float(points[:, 1].mean())))
+    plate = PixelScale(matrix, "")
+    size = plate.pixel((float(points[:, 0].mean()), float(points[:, 1].mean())))
     return PixelScale(matrix, f"{size:.4g} {unit} a pixel, and the tilt, by a marker of {side:g} {unit}")
 
 

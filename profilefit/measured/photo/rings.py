@@ -71,10 +71,10 @@ class SpotRings:
 
 def edges_of(reach: float, pixel: float) -> Floats:
     """Radii from the centre to `reach`, at least FINEST pixels apart [unit]."""
-    found = [0.0]
-    while (following := max(found[-1] * FACTOR, found[-1] + FINEST * pixel)) < reach:
-        found.append(following)
-    return np.array(found)
+    edges = [0.0]
+    while (following := max(edges[-1] * FACTOR, edges[-1] + FINEST * pixel)) < reach:
+        edges.append(following)
+    return np.array(edges)
 
 
 def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Floats, plate: PixelScale) -> SpotRings:
@@ -105,12 +105,12 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
     polynomials = _polynomials(powers, products)
     sums = np.zeros((2, cells))
     for ring, across, cell, light in kept:
-        off = light - np.sum(polynomials[:, ring] * across ** POWERS[:, None], axis=0)
-        sums += np.bincount(cell, minlength=cells), np.bincount(cell, off, cells)
+        residual = light - np.sum(polynomials[:, ring] * across ** POWERS[:, None], axis=0)
+        sums += np.bincount(cell, minlength=cells), np.bincount(cell, residual, cells)
     many, total = sums.reshape(2, count, SECTORS)
     pixels, whole = many.sum(axis=1), np.all(many > 0, axis=1)
-    covariance, off = np.zeros((count, count)), total[whole] / many[whole]
-    covariance[np.ix_(whole, whole)] = shrunk(off - off.mean(axis=1)[:, None])
+    covariance, residual = np.zeros((count, count)), total[whole] / many[whole]
+    covariance[np.ix_(whole, whole)] = shrunk(residual - residual.mean(axis=1)[:, None])
     narrow = ~whole | (np.pi * (edges[1:] + edges[:-1]) < SECTORS * GRAIN * plate.pixel(centre))
     covariance = _of_grains(covariance, pixels, light_of, narrow)
     number, square = places_of.reshape(2, count, PARTS)
@@ -150,15 +150,15 @@ def _polynomials(powers: Floats, products: Floats) -> Floats:
     return np.asarray(np.einsum("nij,jn->in", np.linalg.pinv(np.moveaxis(powers[at], 2, 0)), products), float)
 
 
-def shrunk(off: Floats) -> Floats:
+def shrunk(residual: Floats) -> Floats:
     """Covariance (n, n) of means over sectors from their deviations (n, sectors)."""
-    sectors = off.shape[1]
-    variance = np.sum(off**2, axis=1) / (sectors - 1)
-    scaled = off / np.sqrt(np.maximum(variance, np.finfo(float).tiny))[:, None]
+    sectors = residual.shape[1]
+    variance = np.sum(residual**2, axis=1) / (sectors - 1)
+    scaled = residual / np.sqrt(np.maximum(variance, np.finfo(float).tiny))[:, None]
     products = scaled[:, None] * scaled[None]
     correlation = products.sum(axis=2) / (sectors - 1)
     noise = np.sum((products - products.mean(axis=2, keepdims=True)) ** 2, axis=2) * sectors / (sectors - 1) ** 3
-    apart = ~np.eye(len(off), dtype=bool)
+    apart = ~np.eye(len(residual), dtype=bool)
     share = float(np.clip(noise[apart].sum() / max(np.sum(correlation[apart] ** 2), 1e-12), 0.05, 1.0))
     kept = np.where(apart, (1.0 - share) * correlation, 1.0)
     size = np.sqrt(variance / sectors)

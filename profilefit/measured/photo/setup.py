@@ -157,7 +157,7 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     if setup.grey is not None:
         scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.grey * card))
     rng = np.random.default_rng(setup.seed)
-    found = {}
+    exposures = {}
     enough = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black)
     brightest = {name: max(float(light[0]) for _, light in radial.values()) for name, radial in scenes.items()}
     electrons = enough / (SHORTEST * brightest["spot"])
@@ -165,8 +165,8 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
         first = enough / (electrons * brightest[name])
         stated = [first * STEP**at for at in range(setup.exposures)]
         times = {one: one * (1.0 + setup.late * rng.standard_normal()) for one in stated}
-        found[name] = simulated.taken(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
-    return found
+        exposures[name] = simulated.taken(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
+    return exposures
 
 
 def written(setup: Setup, out: Path) -> list[Path]:

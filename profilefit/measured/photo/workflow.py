@@ -49,12 +49,14 @@ class Bracket:
     @property
     def seconds(self) -> Known | None:
         """Time of the longest exposure: the mean of what all state, and the error that their scatter says."""
-        off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said])
-        if off.size == 0:
+        offsets = np.array(
+            [np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said]
+        )
+        if offsets.size == 0:
             return None
-        scatter = (WORTH * LATE**2 + np.sum((off - off.mean()) ** 2)) / (WORTH + off.size - 1)
-        value = float(np.exp(off.mean()))
-        return Known(value, value * float(np.sqrt(scatter / off.size)))
+        scatter = (WORTH * LATE**2 + np.sum((offsets - offsets.mean()) ** 2)) / (WORTH + offsets.size - 1)
+        value = float(np.exp(offsets.mean()))
+        return Known(value, value * float(np.sqrt(scatter / offsets.size)))
 
     @property
     def colours(self) -> tuple[str, ...]:
@@ -104,9 +106,9 @@ def photo(
             own = [_darkened(one, level) for one in _read(paths, exposures[0])]
             coded += [one.source for one in own if not one.linear]
             shown.append((bracketed(own, size), known))
-    found = measured(seen, shown, size, where, beliefs or Beliefs())
+    answer = measured(seen, shown, size, where, beliefs or Beliefs())
     notes = tuple(f"{one}: eight bits, taken for sRGB: not a measurement" for one in coded[:1])
-    return replace(found, notes=(*notes, *found.notes))
+    return replace(answer, notes=(*notes, *answer.notes))
 
 
 def measured(
@@ -147,14 +149,14 @@ def measured(
 def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]:
     """Exposures of one camera, `like` another of it."""
     _require_count(paths)
-    found: list[Exposure] = []
+    exposures: list[Exposure] = []
     for path in paths:
-        found.append(read(path))
-        own, other = found[-1], like or found[0]
+        exposures.append(read(path))
+        own, other = exposures[-1], like or exposures[0]
         for expected, got in zip(_kind(other), _kind(own), strict=True):
             if None not in (expected, got) and expected != got:
                 raise InputError(f"{own.source}: expected {expected} as {other.source} has, got {got}")
-    return found
+    return exposures
 
 
 def _require_count(paths: Sequence[Path]) -> None:
@@ -217,11 +219,11 @@ def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
     """
     pictures, pixel = one.pictures(colour), size.pixel(one.spot.centre)
     edges = rings.edges_of(one.spot.reach * pixel, pictures[0].step * pixel)
-    found = rings.rings(pictures, one.spot.centre, edges, size)
-    share = found.value[:, None] * bracket.shares(found.value, one.times.value, one.sensor, one.most)
-    covariance = found.covariance + share @ one.times.covariance @ share.T
+    seen = rings.rings(pictures, one.spot.centre, edges, size)
+    share = seen.value[:, None] * bracket.shares(seen.value, one.times.value, one.sensor, one.most)
+    covariance = seen.covariance + share @ one.times.covariance @ share.T
     seconds = 1.0 if one.seconds is None else one.seconds.value
-    return replace(found, value=found.value / seconds, covariance=covariance / seconds**2)
+    return replace(seen, value=seen.value / seconds, covariance=covariance / seconds**2)
 
 
 def carded(card: Bracket, colour: str, size: PixelScale, reflectance: Known | None, seen: Bracket) -> Card:

@@ -136,7 +136,7 @@ def _truth_band(fitted: Fitted | None, r: Floats, alpha: float) -> tuple[Floats,
     if fitted is None:
         return None
     known = derived.LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays)
-    return None if known.off is None else derived.profile(known, r, alpha).interval()
+    return None if known.discrepancy is None else derived.profile(known, r, alpha).interval()
 
 
 def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:

@@ -102,14 +102,14 @@ def test_reflectance_of_a_map(normalisation):
 def test_a_record_says_it_again(known, truth):
     content = {
         "protocol": {"weighting": {"objective": "energy"}},
-        "covariance": {"names": FREE, "statistical": known.statistical, "model": known.off.covariance},
-        "discrepancy": known.off.content(),
+        "covariance": {"names": FREE, "statistical": known.statistical, "model": known.discrepancy.covariance},
+        "discrepancy": known.discrepancy.content(),
     }
-    again = LawWithErrors.of_record(known.law, plain(content), known.off.arrays())
+    again = LawWithErrors.of_record(known.law, plain(content), known.discrepancy.arrays())
     np.testing.assert_allclose(derived.radius(again, 0.8).error, derived.radius(known, 0.8).error, rtol=1e-9)
     old = {key: value for key, value in content.items() if key != "discrepancy"}
     silent = LawWithErrors.of_record(known.law, plain(old), {})
-    assert silent.off is None
+    assert silent.discrepancy is None
     assert np.isnan(derived.radius(silent, 0.8).model[0])
 
 
