@@ -182,7 +182,7 @@ def fit(of: StackRequest, run: RecipeRun) -> Work:
     parts = []
     for number, medium in enumerate(different):
         starts = list(of.starts[of.stack.media.index(medium)]) if of.starts else []
-        parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}")))
+        parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}", medium)))
 
     def finish(results: list[Any]) -> RecordContent:
         colours = zip(CHANNELS, of.stack.media, strict=True)
