@@ -151,10 +151,7 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
 def described_fit(
     recipe: Recipe, run: RecipeRun, light: Orders | None
 ) -> tuple[Fit, Profiles, dict[str, Any], dict[str, Any]]:
-    """Fit a recipe's law: the fit, what it was fitted to, and what every record of a fit says, with its arrays.
-
-    That includes what random starts and the other truth say of the fit.
-    """
+    """Fit a recipe's law, and check the fit: it, what it was fitted to, and what every record says, with its arrays."""
     profiles, start, checks = truth_of(recipe, light), starts.starting_law(recipe, run.out), dict[str, Any]()
     result = fit_from(recipe, profiles, start)
     if recipe.random_starts:

@@ -57,15 +57,9 @@ def requests_of(names: Sequence[str] = ()) -> list[Request]:
 
 
 def regenerate(requests: Sequence[Request], run: RecipeRun, processes: int = 1) -> list[Step]:
-    """Make and write records: first the maps that others are normalised with, last what compares them.
+    """Make and write the records of requests: first the maps that others are normalised with, last what compares them.
 
-    Args:
-        requests: what to fit, as `requests_of` finds it.
-        run: preset, seed and folders.
-        processes: number of processes that fit side by side; the records do not depend on it.
-
-    Returns:
-        The light that was made ready, and each record as it was written.
+    Records do not depend on the number of processes. Return the light that was made ready, and each record.
     """
     works = sorted((kind.module.fit(request, run) for kind, request in requests), key=lambda work: work.order)
     steps = list(run.steps)

@@ -131,7 +131,7 @@ def fit(of: StackRequest, run: RecipeRun) -> Work:
         arrays = {f"{light}_{name}": array for light, one in lights.items() for name, array in one["arrays"].items()}
         return _content(of, run, lights, arrays), arrays
 
-    part = partial(_of_lights, of.stack.media, Tracing.of(run, f"{of.name}-sums"))
+    part = partial(_of_lights, of.stack.media, Tracing.of(run, f"{of.name}-sums", of.stack.media[0]))
     return Work(f"{SUMS}/{of.name}", (part,), finish, order=(LAWS, 1, 1))
 
 

@@ -157,9 +157,8 @@ def requested(file: str, content: Table) -> StackRequest:
     stack = read_layers(file, content)
     name = Path(file).stem
     if len(stack.names) < 2:
-        raise tables.bad(
-            "", "layers", "two layers or more: one is a half space, as `profilefit export hazard` has it", 1
-        )
+        accepted = "two layers or more: one is a half space, as `profilefit export hazard` has it"
+        raise tables.bad("", "layers", accepted, 1)
     if not schema.is_line(name):
         raise InputError(f"{file!r}: the name of a stack must be one printable line")
     return StackRequest(
@@ -172,17 +171,14 @@ def requested(file: str, content: Table) -> StackRequest:
 
 
 def fit(of: StackRequest, run: RecipeRun) -> Work:
-    """Return the record to be made of a stack, a part for each colour that differs: half a minute to two minutes.
-
-    InputError if no law fits.
-    """
+    """Return the record to be made of a stack, a part for each colour that differs; InputError if no law fits."""
     for medium in of.stack.media:
         stacks.require(medium)
     different = list(dict.fromkeys(of.stack.media))
     parts = []
     for number, medium in enumerate(different):
         starts = list(of.starts[of.stack.media.index(medium)]) if of.starts else []
-        parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}")))
+        parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}", medium)))
 
     def finish(results: list[Any]) -> RecordContent:
         colours = zip(CHANNELS, of.stack.media, strict=True)

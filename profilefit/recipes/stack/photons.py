@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
+from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw
@@ -24,6 +25,7 @@ from profilefit.recipes.run import PHOTONS, RecipeRun
 
 Floats = NDArray[np.float64]
 HALF_SPACE_PHOTONS, STACK_PHOTONS = 2**22, 2**21
+LEAST = 2**17  # photons: with 20 000, sums of seven Gaussians have no optimum
 RINGS = 120
 NEAREST, FARTHEST, SLOWEST = 0.01, 40.0, 0.03  # mean free paths; decay lengths; the least rate that these are of
 LAST_SHARE = 0.997
@@ -62,8 +64,11 @@ class Tracing(NamedTuple):
     store: Path | None = None
 
     @classmethod
-    def of(cls, run: RecipeRun, name: str) -> Tracing:
-        """Return how a command traces the light of a medium of this name, which no other has."""
+    def of(cls, run: RecipeRun, name: str, medium: Medium) -> Tracing:
+        """Return how a command traces the light of a medium, under a name that no other has; InputError on too few."""
+        if run.photons is not None and run.photons < LEAST and any(layer.g > 0 for layer in medium.layers):
+            accepted = f"a whole number >= {LEAST} where a layer scatters forward"
+            raise InputError(f"photons must be {accepted}, got {run.photons}")
         times = PHOTONS[run.preset] // PHOTONS["quick"]
         return cls(run.seed, run.photons, times, run.store and run.store / "stacks" / name)
 

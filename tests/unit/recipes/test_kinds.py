@@ -143,6 +143,8 @@ def test_records_of_names_are_those_beside_the_first(tmp_path):
         records_of(["skin"], tmp_path)
 
 
+TRACED = Medium((Layer(1.4, 0.1, 10.0, 0.8, 0.5), Layer(1.4, 0.5, 5.0, 0.5, np.inf)))
+EXACT = Medium(tuple(layer.similar for layer in TRACED.layers))
 GIVEN = RecipeRun("full", 7, Path("out"), Path("photons"), 1000)
 
 
@@ -182,24 +184,27 @@ def test_traced_light_is_that_of_its_run(monkeypatch):
     monkeypatch.setattr(photons, "traced", lambda *given: calls.append(given))
     edges = np.array([0.0, 1.0])
     for medium, light, offset in ((1, "diffuse", 0), (2, "diffuse", 0), (1, "searchlight", 0), (1, "diffuse", 3)):
-        Tracing.of(GIVEN, "skin-0").rings(medium, light, edges, 2**20, offset)
+        Tracing.of(GIVEN, "skin-0", EXACT).rings(medium, light, edges, 2**20, offset)
     assert [given[3:5] for given in calls] == [(1000, 7)] * 3 + [(1000, 10)]
     stores = [given[5] for given in calls]
     assert len(set(stores)) == 4
     assert {store.parent for store in stores} == {Path("photons/stacks/skin-0")}
-    Tracing.of(replace(GIVEN, photons=None), "skin-0").rings(1, "diffuse", edges, 2**20, 0)
+    Tracing.of(replace(GIVEN, photons=None), "skin-0", EXACT).rings(1, "diffuse", edges, 2**20, 0)
     Tracing().rings(1, "diffuse", edges, 2**20, 0)
     assert [given[3:] for given in calls[-2:]] == [(20 * 2**20, 7, stores[0]), (2**20, 1, None)]
+    with pytest.raises(
+        InputError, match="photons must be a whole number >= 131072 where a layer scatters forward, got 1000"
+    ):
+        Tracing.of(GIVEN, "skin-0", TRACED)
 
 
 @pytest.mark.slow
 def test_traced_light_resumes(tmp_path):
-    medium = Medium((Layer(1.4, 0.1, 10.0, 0.8, 0.5), Layer(1.4, 0.5, 5.0, 0.5, np.inf)))
     tracing, edges = Tracing(3, 2000, store=tmp_path / "new"), np.append(0.0, np.geomspace(0.01, 10.0, 20))
-    first = tracing.rings(medium, "diffuse", edges, 1, 5)
+    first = tracing.rings(TRACED, "diffuse", edges, 1, 5)
     (batch,) = tmp_path.rglob("batch-*")
     before = batch.stat().st_mtime_ns
-    again, plain = (one.rings(medium, "diffuse", edges, 1, 5) for one in (tracing, tracing._replace(store=None)))
+    again, plain = (one.rings(TRACED, "diffuse", edges, 1, 5) for one in (tracing, tracing._replace(store=None)))
     assert batch.stat().st_mtime_ns == before
     for one in (again, plain):
         np.testing.assert_array_equal(one.energy, first.energy)
