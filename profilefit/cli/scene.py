@@ -9,6 +9,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.options import AsJson, Quiet
+from profilefit.scenes import SCENES
 
 OUT = Path("scene")
 
@@ -18,7 +19,7 @@ def scene(
         str,
         typer.Argument(
             metavar="FILE.toml",
-            help="What is drawn, and how; with --example the name of a scene: skin, layers, heart, sea, fur.",
+            help=f"What is drawn, and how; with --example the name of a scene: {', '.join(SCENES)}.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,
@@ -48,7 +49,6 @@ def scene(
         from mcml_sim.runs.progress import working
         from profilefit.errors import InputError
         from profilefit.recipes.folder import shipped
-        from profilefit.scenes import SCENES
 
     known = ", ".join(SCENES)
     if example:
