@@ -445,7 +445,7 @@ def test_a_scene_with_a_renderer_of_its_own_is_seen(tmp_path):
 
 # Words that name nothing: a public function, class, argument or attribute says what it is.
 NAMELESS = frozenset(
-    "found one made told taken again alike off lit begun wanted right need".split()  # noqa: SIM905 - as it is read
+    "found one made told taken again alike off lit begun wanted need".split()  # noqa: SIM905 - as it is read
 )
 
 

@@ -92,17 +92,17 @@ def places(mfp: float, within: float) -> Floats:
     return within * mfp * (np.arange(PLACES) + 0.5) / PLACES
 
 
-def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
+def nearest_length(stack: RingShares, half_space: RingShares, within: float) -> float:
     """Return the mean free path of a half space, whose rings are in it, that makes the difference at an edge least."""
 
     def quartile(rings: RingShares) -> float:
         return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
 
-    first = np.exp(quartile(stack) - quartile(one))
+    first = np.exp(quartile(stack) - quartile(half_space))
 
     def residual(mfp: Floats) -> Floats:
         d = places(float(mfp[0]), within)
-        return stack.beyond(d) - one.beyond(d / mfp)
+        return stack.beyond(d) - half_space.beyond(d / mfp)
 
     bounds = first / SPAN, first * SPAN
     found = solve(differences(residual, STEP * first), np.array([first]), bounds, tolerance=TOLERANCE)

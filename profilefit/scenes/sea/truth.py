@@ -59,7 +59,7 @@ def caustic_irradiance(
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)
     with np.errstate(divide="ignore", invalid="ignore"):
-        light = np.where(rays.lit(place) & (flux > 0.0), flux / np.abs(stretch), 0.0)
+        light = np.where(rays.is_lit(place) & (flux > 0.0), flux / np.abs(stretch), 0.0)
     found = np.bincount(target, light, where.size).reshape(where.shape)
     return float(found) if found.ndim == 0 else found
 
@@ -194,7 +194,7 @@ class _Rays:
         signed = np.where(rises, 1.0, -1.0) * self._sent(place)
         return np.bincount(target, signed, x.size).astype(float)
 
-    def lit(self, x: Floats) -> NDArray[np.bool_]:
+    def is_lit(self, x: Floats) -> NDArray[np.bool_]:
         """Return whether no crest is in the way: the place is farther across the rays than all before it."""
         cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 1)
         return self._across(x) >= self._before[cell]
@@ -209,7 +209,7 @@ class _Rays:
         for point, weight in GAUSS:
             here = near + point * (far - near)
             flux = self.at(here)[2]
-            found += weight * np.where(self.lit(here), flux, 0.0)
+            found += weight * np.where(self.is_lit(here), flux, 0.0)
         return found * (far - near)
 
     def _across(self, x: Floats) -> Floats:

@@ -124,9 +124,9 @@ class Renderer:
         last = passes[-1].writes
         return self.read(last if isinstance(last, str) else last[0])
 
-    def fragments(self, one: Pass) -> int:
+    def fragments(self, shader_pass: Pass) -> int:
         """Run a pass, and return the number of fragments that it draws."""
-        return fragments(self.context, lambda: self._run(one))
+        return fragments(self.context, lambda: self._run(shader_pass))
 
     def time(self, *passes: Pass) -> float:
         """Run passes, and return their milliseconds."""
