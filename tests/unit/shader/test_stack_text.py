@@ -203,7 +203,7 @@ def by_opengl(context, laws):
 
 
 def test_every_number_stands_in_the_text_once_by_its_name():
-    text = stack_text(LAWS["three layers"], told={"red_w": "a remark"})
+    text = stack_text(LAWS["three layers"], remarks={"red_w": "a remark"})
     declared = dict(re.findall(r"^const float stack_(\w+) = (\S+);", text, re.MULTILINE))
     assert len(re.findall(r"^const float stack_", text, re.MULTILINE)) == len(declared)
     assert (declared["red_w"], declared["blue_mfp"], declared["green_scale2"]) == ("0.0258", "0.143", "0.646586345382")
