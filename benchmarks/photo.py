@@ -147,7 +147,7 @@ def exposures(
     stated = [first * 4.0**step for step in range(STEPS)]
     times = {one: one * (1.0 + LATE * rng.standard_normal()) for one in stated}
     radial = {name: wavy[name if name in wavy else ""] for name in simulated.CHANNELS}
-    taken = simulated.taken(radial, camera, 1.0, times, int(rng.integers(2**31)))
+    taken = simulated.exposures_of(radial, camera, 1.0, times, int(rng.integers(2**31)))
     return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
 
 

@@ -425,12 +425,12 @@ class _Density(eqx.Module):
 
     @filter_jit
     def __call__(self, points):
-        def one(theta):
+        def log_density(theta):
             moved = self.centre + self.adjust @ (theta - self.centre)
             misfit = self.problem.cost(moved, (self.law, self.rings))
             return -0.5 * (misfit - self.least) / self.variance
 
-        value = jnp.where(jnp.all(jnp.abs(points) < self.bound, axis=1), jax.vmap(one)(points), -jnp.inf)
+        value = jnp.where(jnp.all(jnp.abs(points) < self.bound, axis=1), jax.vmap(log_density)(points), -jnp.inf)
         return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
 

@@ -220,10 +220,10 @@ def _in_lengths(r: Floats, length: float) -> Floats:
     return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
 
 
-def apart(one: Floats, other: Floats) -> Floats:
+def apart(first: Floats, other: Floats) -> Floats:
     """Return distances (k, l) of numbers, or of points in a plane or in space."""
-    between = one[:, None] - other
-    return np.abs(between) if one.ndim == 1 else np.linalg.norm(between, axis=-1)
+    between = first[:, None] - other
+    return np.abs(between) if first.ndim == 1 else np.linalg.norm(between, axis=-1)
 
 
 def kernel(x: Floats, length: float) -> Floats:

@@ -201,9 +201,9 @@ def lowest(ends: Iterable[Solution], compared: int | None = None) -> Solution:
     return replace(first, others=tuple(apart))
 
 
-def are_apart(one: Solution, other: Solution, compared: int | None = None) -> bool:
+def are_apart(first: Solution, other: Solution, compared: int | None = None) -> bool:
     """Return whether two solutions are two minima: one of the first `compared` parameters differs by over `APART`."""
-    return bool(np.max(np.abs(one.parameters - other.parameters)[:compared]) > APART)
+    return bool(np.max(np.abs(first.parameters - other.parameters)[:compared]) > APART)
 
 
 @filter_jit

@@ -102,7 +102,7 @@ class ForwardHalfSpace(ProfileLaw):
             "share": of.share,
             "rest": of.rest,
             **{f"once.{name}": getattr(of.once, name) for name in curve},
-            **{f"again.{name}": getattr(of.again, name) for name in curve},
+            **{f"again.{name}": getattr(of.multiple, name) for name in curve},
             "white": white,
             "slowest": slowest,
         }

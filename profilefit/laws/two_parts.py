@@ -58,17 +58,17 @@ class Parts(NamedTuple):
     """
 
     once: Shape
-    again: Shape
+    multiple: Shape
     share: Array
     rest: Array
 
     def density(self, x: Array) -> Array:
         """2 pi x R_d / A [1/mfp]."""
-        return self.share * density(x, self.once) + self.rest * density(x, self.again)
+        return self.share * density(x, self.once) + self.rest * density(x, self.multiple)
 
     def cdf(self, x: Array) -> Array:
         """Share of the light within x [-]."""
-        both = self.share * left(x, self.once) + self.rest * left(x, self.again)
+        both = self.share * left(x, self.once) + self.rest * left(x, self.multiple)
         return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - both, 0.0, 1.0), 1.0), 0.0)
 
 
@@ -197,7 +197,7 @@ class TwoPartSampler(Sampler):
     def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
         """Each part draws every radius once."""
         of = self.law.parts(alpha)
-        once, again = (-jnp.expm1(-cumulative(x, shape)) for shape in (of.once, of.again))
+        once, again = (-jnp.expm1(-cumulative(x, shape)) for shape in (of.once, of.multiple))
         first, second = of.share * once, of.share + of.rest * again
         return jnp.where(jnp.abs(first - xi) < jnp.abs(second - xi), first, second)
 
@@ -212,12 +212,12 @@ class TwoPartSampler(Sampler):
         def own(shape: Shape, is_once: bool) -> Array:
             return map_density(x, shape, lambda t: drawn(t, growth(t), of, is_once, self.steps))
 
-        return of.share * own(of.once, True) + of.rest * own(of.again, False)
+        return of.share * own(of.once, True) + of.rest * own(of.multiple, False)
 
 
 def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int) -> Array:
     """Return x at t = -ln S of a part, growth = (e^t - 1) / t."""
-    first, rest = of.once, of.again
+    first, rest = of.once, of.multiple
     p, _, d, _, _, _, g = AGAIN
     white, slowest = guess(of)
     stretch = jnp.maximum((1.0 - white) + p * t + white * growth, LEAST_STRETCH)
@@ -238,7 +238,7 @@ def guess(of: Parts) -> tuple[Array, Array]:
 
     Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t).
     """
-    rest, (_, q, d, m, e, f, _) = of.again, AGAIN
+    rest, (_, q, d, m, e, f, _) = of.multiple, AGAIN
     rate = m * jnp.sqrt(d * jnp.maximum(-rest.w, NEAREST) / rest.h)
     white = q * jnp.minimum(rate * rest.c / rest.b * jnp.exp(-0.5 * rest.w * rest.h), MOST_WHITE)
     return white, rate * (1.0 + rest.kappa * (e + f * rest.kappa))

@@ -165,7 +165,7 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
         first = enough / (electrons * brightest[name])
         stated = [first * STEP**at for at in range(setup.exposures)]
         times = {one: one * (1.0 + setup.late * rng.standard_normal()) for one in stated}
-        exposures[name] = simulated.taken(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
+        exposures[name] = simulated.exposures_of(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
     return exposures
 
 
@@ -196,23 +196,24 @@ def room(setup: Setup) -> float:
     return ROOM + scenes * setup.exposures * 2 * math.prod(setup.camera.sides)
 
 
-def as_dng(one: SimulatedExposure) -> bytes:
+def as_dng(exposure: SimulatedExposure) -> bytes:
     """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
-    codes = tuple(CFA[colour] for row in one.pattern for colour in row)
+    codes = tuple(CFA[colour] for row in exposure.pattern for colour in row)
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
     tags: list[tuple[int, str, int, Any, bool]] = [
         (50706, "B", 4, (1, 4, 0, 0), True), (50707, "B", 4, (1, 1, 0, 0), True),  # versions
         (50708, "s", 0, "profilefit", True), (271, "s", 0, "profilefit", True), (272, "s", 0, "simulated", True),
         (33421, "H", 2, (2, 2), True), (33422, "B", 4, codes, True),  # the pattern
-        (50713, "H", 2, (2, 2), True), (50714, "H", 4, (one.black,) * 4, True), (50717, "I", 1, one.white, True),
+        (50713, "H", 2, (2, 2), True), (50714, "H", 4, (exposure.black,) * 4, True),
+        (50717, "I", 1, exposure.white, True),
         (50721, "2i", 9, identity, True), (50778, "H", 1, 21, True), (50728, "2I", 3, (1, 1, 1, 1, 1, 1), True),
-        (33434, "2I", 1, _ratio(one.seconds), True),
+        (33434, "2I", 1, _ratio(exposure.seconds), True),
     ]  # fmt: skip
     file = io.BytesIO()
     tifffile.imwrite(
-        file, one.counts, photometric=32803, compression=None, metadata=None, extratags=tags, subfiletype=0,
-        rowsperstrip=one.counts.shape[0],
+        file, exposure.counts, photometric=32803, compression=None, metadata=None, extratags=tags, subfiletype=0,
+        rowsperstrip=exposure.counts.shape[0],
     )  # fmt: skip
     return file.getvalue()
 

@@ -190,7 +190,7 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
     return (middle + half * PANEL[0]).ravel(), (half * PANEL[1]).ravel()
 
 
-def taken(
+def exposures_of(
     radial: Mapping[str, tuple[Floats, Floats]],
     camera: SpotCamera,
     electrons: float,

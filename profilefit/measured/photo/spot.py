@@ -119,10 +119,10 @@ def _evened(
     return float(centre[0]), float(centre[1])
 
 
-def places(one: Picture, plate: PixelScale, centre: tuple[float, float]) -> tuple[Places, Places, Places]:
+def places(picture: Picture, plate: PixelScale, centre: tuple[float, float]) -> tuple[Places, Places, Places]:
     """Places of a plane's pixels about the centre [unit], and their light, (n,) each."""
-    rows, columns = one.light.shape
-    across = (np.arange(columns, dtype=np.float32) * one.step + one.offset[1])[None]
-    down = (np.arange(rows, dtype=np.float32) * one.step + one.offset[0])[:, None]
+    rows, columns = picture.light.shape
+    across = (np.arange(columns, dtype=np.float32) * picture.step + picture.offset[1])[None]
+    down = (np.arange(rows, dtype=np.float32) * picture.step + picture.offset[0])[:, None]
     x, y = plate.from_centre(across, down, centre)
-    return x.ravel(), y.ravel(), one.light.ravel()
+    return x.ravel(), y.ravel(), picture.light.ravel()

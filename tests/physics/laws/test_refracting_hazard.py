@@ -129,7 +129,7 @@ def test_inverse_in_a_fixed_number_of_steps(steps, error):
         t, alpha = jnp.asarray(-np.log1p(-xi)), jnp.asarray(ALPHA)[:, None]
         for setting in (*QUICK, *OTHERS, Setting(n=1.001), Setting("diffuse", n=1.001)):
             of = load("hazard", setting=setting).parts(alpha)
-            for part, share, is_once in ((of.once, of.share, True), (of.again, 1 - of.share, False)):
+            for part, share, is_once in ((of.once, of.share, True), (of.multiple, 1 - of.share, False)):
                 x = drawn(t, growth(t), of, is_once, steps)
                 worst = max(worst, float(np.max(np.abs(np.exp(-cumulative(x, part)) - np.exp(-t)) * share)))
     assert error / 1e3 < worst < error

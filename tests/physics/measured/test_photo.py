@@ -43,7 +43,7 @@ def light():
 def shots(light):
     first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
     times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step)) for step in range(5)}
-    taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, times, 3)
+    taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, times, 3)
     return [bench.as_read(one, str(at)) for at, one in enumerate(taken)], np.array(list(times.values()))
 
 
@@ -129,7 +129,7 @@ def test_what_spills_out_of_full_pixels_does_not_change_times():
         camera = replace(CAMERA, well=2.0e4)
         first = 0.5 * camera.gain * (camera.white - camera.black) / light[0]
         times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step + seed)) for step in range(5)}
-        taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, (radii, light)), camera, 1.0, times, seed)
+        taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, (radii, light)), camera, 1.0, times, seed)
         found = bracket.times([bench.as_read(one, "card") for one in taken])
         real = np.array(list(times.values()))
         errors = np.sqrt(np.diag(found.covariance))[:-1]
@@ -179,8 +179,8 @@ def test_exposures_of_one_time_are_a_bracket(light):
     """Chance makes one of them the brighter."""
     first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
     for seed in range(4):
-        taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed)
-        again = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed + 50)
+        taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed)
+        again = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed + 50)
         found = bracket.times([bench.as_read(one, str(at)) for at, one in enumerate((*taken, *again))])
         np.testing.assert_allclose(found.value, 1.0, rtol=0.02)
 
@@ -213,7 +213,7 @@ def test_rings_err_as_they_say(light):
     edges, camera = rings.edges_of(15.0, 2 * PITCH), replace(CAMERA, grain=2.5)
     found = []
     for seed in range(12):
-        (one,) = simulated.taken(
+        (one,) = simulated.exposures_of(
             dict.fromkeys(simulated.CHANNELS, light), camera, 1.0, {1.0: 2000.0 / light[1][0]}, seed
         )
         exposure = bench.as_read(one, "one")
@@ -347,7 +347,8 @@ def test_few_photons_are_a_picture_too():
     radii = simulated.radii(bench.FARTHEST, optics)
     light = simulated.light(ALPHA, LENGTH, SETTING, optics, radii, photons=1000)
     assert CubicSpline(radii, light)(np.linspace(0.0, radii[-1], 100_000)).min() < 0.0, "a control"
-    (one,) = simulated.taken(dict.fromkeys(simulated.CHANNELS, (radii, light)), CAMERA, 1e4 / light[0], {1.0: 1.0}, 3)
+    radial = dict.fromkeys(simulated.CHANNELS, (radii, light))
+    (one,) = simulated.exposures_of(radial, CAMERA, 1e4 / light[0], {1.0: 1.0}, 3)
     assert np.median(one.counts) == CAMERA.black < CAMERA.black + 2000 < one.counts.max()
 
 
