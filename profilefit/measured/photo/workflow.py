@@ -212,17 +212,17 @@ def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
     )  # fmt: skip
 
 
-def ringed(bracket: Bracket, colour: str, size: PixelScale) -> SpotRings:
+def ringed(scene: Bracket, colour: str, size: PixelScale) -> SpotRings:
     """Rings of a colour, in counts a second of the longest exposure, where it states its time.
 
     What the times of the bracket leave open is an error that rings of one exposure share.
     """
-    pictures, pixel = bracket.pictures(colour), size.pixel(bracket.spot.centre)
-    edges = rings.edges_of(bracket.spot.reach * pixel, pictures[0].step * pixel)
-    seen = rings.rings(pictures, bracket.spot.centre, edges, size)
-    share = seen.value[:, None] * bracket.shares(seen.value, bracket.times.value, bracket.sensor, bracket.most)
-    covariance = seen.covariance + share @ bracket.times.covariance @ share.T
-    seconds = 1.0 if bracket.seconds is None else bracket.seconds.value
+    pictures, pixel = scene.pictures(colour), size.pixel(scene.spot.centre)
+    edges = rings.edges_of(scene.spot.reach * pixel, pictures[0].step * pixel)
+    seen = rings.rings(pictures, scene.spot.centre, edges, size)
+    share = seen.value[:, None] * bracket.shares(seen.value, scene.times.value, scene.sensor, scene.most)
+    covariance = seen.covariance + share @ scene.times.covariance @ share.T
+    seconds = 1.0 if scene.seconds is None else scene.seconds.value
     return replace(seen, value=seen.value / seconds, covariance=covariance / seconds**2)
 
 
