@@ -179,7 +179,7 @@ def _of_coefficients(mu_a: str, mu_s: str, given: dict[str, str], g: float) -> t
 
 
 def _option(name: str) -> str:
-    """The option that gives this length."""
+    """Return the command-line option that sets a length."""
     parametrised = name in ("falloff_searchlight", "falloff_diffuse")
     return "--falloff" if parametrised else f"--{name.replace('_', '-')}"
 

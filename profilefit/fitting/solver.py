@@ -144,7 +144,9 @@ def least_squares(
         start: (p,) parameters to start from, in the caller's units.
         data: any pytree of arrays.
         bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
-        worth, scale: as of `solve`.
+        worth: share of the sum of squares by which a step must promise to reduce it for the search to go on [-].
+        scale: (p,) size of each parameter, in its unit. By default the size with which its column of the Jacobian at
+            the start has length 1.
     """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type

@@ -123,7 +123,8 @@ def noise(
         data: n rows.
         light: (n,) that a fit expects: of counts it predicts the variance better than the counts.
         widening: factor on every variance.
-        model: (n, n) as in `Noise`; lack, too.
+        model: (n, n) covariance of the error of the reference, as in `Noise`; None for none.
+        lack: (n, n) covariance of a lack of fit, as in `Noise`; None for none.
     """
     expected = data.value if light is None or not data.counted else light
     others = data.photons - 1.0

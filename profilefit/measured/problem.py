@@ -158,8 +158,9 @@ class Problem:
         """Yield residuals (m,) and derivatives (m, 3) of what is known beside the rows, at points (m, 3).
 
         Args:
-            points: coordinates.
-            total: (m,) total reflectance A there; `slope` (m, 3) its derivatives.
+            points: (m, 3) coordinates.
+            total: (m,) total reflectance A at the points [-].
+            slope: (m, 3) derivatives of the total reflectance by the coordinates.
         """
         spec = self.spec
         if (known := spec.total) is not None:

@@ -189,13 +189,26 @@ def fit(
 ) -> MediumPosterior:
     """Fit a medium to a measured or simulated profile, and judge the fit.
 
-    Args:
-        data: a file (see `reading.read`), or what was read from one, for instance `within` some radii.
-        law, constants, setting, held, total, scale, folder, oblique: as of `premises.specified`.
-        seed: of the posterior's walkers.
-        walk: whether to sample it; else intervals are of the statistical error alone.
+    A fit that fails is returned and says so.
 
-    InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is returned and says so.
+    Args:
+        data: a file (see `reading.read`), or what was read from one, for example `within` some radii.
+        law: "exact", light solved exactly, or a law's name.
+        constants: which of the law's constants, as for `catalogue.load`.
+        setting: illumination, surface and scattering, or all premises; by default what the file states, else a normal
+            pencil beam ("searchlight"), n = 1 and g = 0.
+        held: fixed quantities by name: alpha or A [-], l [unit of the data].
+        total: total reflectance A [-], if it was measured too.
+        scale: factor on the light that gives the data's values: a number, a value with an error, or None if unknown.
+        seed: of the posterior's walkers.
+        walk: whether to sample the posterior; else intervals are of the statistical error alone.
+        folder: of the records, by default the ones shipped.
+        oblique: centre of a circle of the same medium's light, where a beam fell in obliquely.
+
+    Raises:
+        InputError: the data or the fixed quantities cannot be fitted.
+        SettingError: the law does not cover the setting.
+        RecordError: a record is missing or damaged.
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
     spec = specified(measured, law, constants, setting, held, total, scale, folder, oblique)

@@ -133,8 +133,10 @@ def places(settings: Sequence[Setting]) -> dict[str, list[float]]:
 
 
 def by_index(law: Any, settings: Sequence[Setting]) -> dict[str, list[float]]:
-    """Return the worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at
-    each n and g."""
+    """Return the worst `rel`, `ks` and error at a single radius over held-out albedos, at each n and g.
+
+    The radius is within 99.5 % of the energy.
+    """
     alpha = albedo_values(QUALITY_ALBEDOS)
     each = [profile_quality(law.at(setting), alpha) for setting in settings]
     worst = {name: [float(np.max(getattr(one, name))) for one in each] for name in ("rel", "ks", "largest")}

@@ -306,7 +306,7 @@ def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[st
 
 
 def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
-    """A TOML value as the type its field declares, or RecipeError."""
+    """Return a TOML value as the type its field declares, or raise RecipeError."""
     tables = {"Albedos": Albedos, "RingLayout | None": RingLayout, "Weighting": Weighting, "Setting": Setting}
     if annotation in tables:
         if not isinstance(value, dict):

@@ -171,8 +171,10 @@ def record_name(base: str, setting: Setting) -> str:
 
 
 def spanning_name(base: str, setting: Setting) -> str:
-    """Return the name of the record for every index of a range, such as hazard-refracting, -diffuse-refracting; or,
-    where scattering has a direction, for every g, too: hazard-forward, -diffuse-forward."""
+    """Return the name of the record for every index of a range, for example hazard-refracting or -diffuse-refracting.
+
+    Under anisotropic scattering the record holds for every g, too, for example hazard-forward or -diffuse-forward.
+    """
     spanning = REFRACTING if setting.g == 0.0 else FORWARD
     return f"{record_name(base, replace(setting, n=1.0, g=0.0))}-{spanning}"
 
@@ -270,8 +272,11 @@ class Records:
         )
 
     def name(self, base: str, setting: Setting) -> str:
-        """Return the name of a setting's record: its own, that of a range of indices and g where there is such and none
-        of its own, and its own where there is neither."""
+        """Return the name of a setting's record.
+
+        A record of the setting itself comes first, then one of a range of indices and g. Where there is neither, the
+        name is the setting's.
+        """
         own, spanning = record_name(base, setting), self.folder / f"{spanning_name(base, setting)}.json"
         if (self.folder / f"{own}.json").exists() or not spanning.exists():
             return own

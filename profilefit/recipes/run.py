@@ -153,7 +153,7 @@ def written(works: Sequence[Work], out: Path, workers: Workers, say: Say = silen
 
 
 def _done(part: Callable[[], Any]) -> tuple[Any, float]:
-    """Result of a part, and the seconds it took."""
+    """Run a part, and return its result and the seconds it took."""
     begin = time.perf_counter()
     # Matrices are small here: threads of BLAS wait for each other, and their number would decide digits.
     with threadpool_limits(1, "blas"):

@@ -21,11 +21,14 @@ class Tables:
     """The tables of one file. `where` names a table in messages, "" the file's own keys."""
 
     def __init__(self, file: str, known: Mapping[str, tuple[str, ...]]) -> None:
-        """known  the keys that each table may have"""
+        """Take the name of a file, and by table the keys that each may have."""
         self.file, self.keys = file, known
 
     def table(self, content: Table, name: str, default: Table | None = None, within: str = "") -> Table:
-        """The table of that name, of known keys only; an error where it is missing and there is no default."""
+        """Return the table of that name, with known keys only.
+
+        InputError where it is missing and there is no default.
+        """
         value = content.get(name, default)
         where = f"{within}.{name}" if within else name
         if value is None:
@@ -45,7 +48,7 @@ class Tables:
                 raise InputError(f"{self.file}: {place}keys must be of {', '.join(keys)}, got {shown(key)}")
 
     def number(self, where: str, key: str, table: Table, default: float | None = None, most: float = math.inf) -> float:
-        """A finite number > 0, or the default."""
+        """Return a finite number > 0, or the default."""
         value = table.get(key, default)
         if not is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
             raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
@@ -62,7 +65,7 @@ class Tables:
         return float(ends[0]), float(ends[1])
 
     def whole(self, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
-        """A whole number from least to most."""
+        """Return a whole number from least to most."""
         value = table.get(key, default)
         if type(value) is not int or not least <= value <= most:
             raise self.bad(where, key, f"a whole number in {least} ... {most}", value)
@@ -90,7 +93,7 @@ class Tables:
     def text(
         self, where: str, key: str, table: Table, default: str | None = None, accepted: tuple[str, ...] = ()
     ) -> str:
-        """A short text, or one of those accepted."""
+        """Return a short text, or one of those accepted."""
         value = table.get(key, default)
         text = value if isinstance(value, str) else "\n"
         if not text.isprintable() or len(text) > LONGEST_TEXT or (accepted and text not in accepted):
@@ -106,7 +109,7 @@ class Tables:
             raise type(error)(f"{self.file}: [{where}] {error}") from None
 
     def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:
-        """The error of a key's value; None is a value that is missing."""
+        """Return the error of a key's value; None stands for a missing value."""
         got = "nothing" if value is None else shown(value)
         place = f"[{where}] " if where else ""
         return InputError(f"{self.file}: {place}{key} must be {accepted}, got {got}")

@@ -138,7 +138,10 @@ def map_text(
 
 @cache
 def text_beside(module: str, file: str) -> str:
-    """Return a text in the folder of a module, or below it, as it is: text_beside(__name__, "glsl/x.frag")."""
+    """Return the text of a file in the folder of a module or below it, unchanged.
+
+    For example, `text_beside(__name__, "glsl/x.frag")`.
+    """
     return (resources.files(module.rpartition(".")[0]) / file).read_text(encoding="utf-8")
 
 
@@ -168,6 +171,7 @@ def _prefixed(albedo: AlbedoLaw) -> Numbers:
 
 
 def read_text(file: str) -> str:
+    """Return the content of a GLSL file of this package."""
     return text_beside(__name__, f"glsl/{file}.glsl")
 
 

@@ -124,12 +124,13 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
 
 
 def _of_grains(covariance: Floats, pixels: Floats, light: Floats, narrow: NDArray[np.bool_]) -> Floats:
-    """Covariance (n, n) of rings, no smaller where sectors are `narrow` (n,) than that of other rings lets expect.
+    """Return the covariance (n, n) of rings, raised in narrow rings to at least the level that the other rings suggest.
 
     Args:
-        covariance: (n, n) that of sectors; zero where a sector has no pixel.
+        covariance: (n, n) of the means of rings, from sectors; zero where a sector has no pixel.
         pixels: (n,) number of each ring's pixels.
         light: (2, n) sums of their light, and of its square.
+        narrow: (n,) mask of the rings with an empty sector, or with sectors too narrow for grains.
     """
     variance = np.diag(covariance)
     # Relative variance of a pixel, grains included: a mean over pixels of light y has that times (sum y^2) / n^2.

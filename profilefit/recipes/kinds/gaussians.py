@@ -72,7 +72,13 @@ ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 @dataclass(frozen=True)
 class SumRecord:
-    """Record of the sums of a stack. stack  its layers;  content  all that it says;  path  of its file"""
+    """Record of the sums of a stack.
+
+    Attributes:
+        stack: layers of the stack.
+        content: everything that the record says.
+        path: path of the record's file.
+    """
 
     stack: LayerStack
     content: Mapping[str, Any]

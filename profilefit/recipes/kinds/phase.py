@@ -60,7 +60,12 @@ SHOWN: Fields = {
 
 @dataclass(frozen=True)
 class PhaseRecord:
-    """Record of the fits to a table. content  all that it says;  path  of its file"""
+    """Record of the fits to a table.
+
+    Attributes:
+        content: everything that the record says.
+        path: path of the record's file.
+    """
 
     content: Mapping[str, Any]
     path: Path

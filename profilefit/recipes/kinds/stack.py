@@ -106,7 +106,15 @@ class StackRequest:
 
 @dataclass(frozen=True)
 class StackRecord:
-    """Record of a stack. laws  of red, green, blue;  content  all that it says;  digest  sha256 of its file"""
+    """Record of a stack.
+
+    Attributes:
+        name: name of the record.
+        stack: layers of the stack.
+        laws: laws of red, green and blue.
+        content: everything that the record says.
+        digest: SHA-256 of the record's file.
+    """
 
     name: str
     stack: LayerStack
@@ -422,10 +430,10 @@ def _recorded_layer(layer: Any) -> Table:
 
 
 def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mapping[str, float]]) -> list[LayerLaw]:
-    """Return the half spaces of a medium's layers: today's, which the record's must be, or its own where it scatters
-    forward.
+    """Return the laws of the semi-infinite media that a medium's layers would be alone.
 
-    A stack's constants belong to its half spaces'. InputError where what is recorded is of another kind.
+    They are the catalogue's current laws, which the record's constants must match. Where a layer scatters forward, all
+    take the constants of the record instead. InputError where what is recorded is of another kind.
     """
     for constants in recorded:
         if not isinstance(constants, Mapping) or not all(map(schema.is_number, constants.values())):

@@ -106,7 +106,10 @@ def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:
 
 
 def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
-    """a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that gives no pole left of zero."""
+    """Return a, b, c from y (r + c) = a r + b, which is linear in all three.
+
+    A plain guess is returned where that gives no pole left of zero.
+    """
     columns = np.stack([r, np.ones_like(r), -y], axis=1)[used]
     found = np.linalg.lstsq(columns, (y * r)[used], rcond=None)[0]
     return np.asarray(found if found[2] > 0 else [-0.05, 0.5, 0.5], np.float64)
@@ -121,7 +124,7 @@ class Truth(Protocol):
     """Source of reflectances and fine even rings."""
 
     def reflectance(self, alpha: Floats) -> Floats:
-        """A (m,) [-]."""
+        """Return the total diffuse reflectance A (m,) [-] at albedos alpha (m,)."""
 
     def profiles(self, alpha: Floats) -> Profiles:
         """On even rings from 0."""

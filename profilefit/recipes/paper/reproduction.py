@@ -84,7 +84,10 @@ class Reading:
 
 
 def judge(constant_distance: float, curve_distance: float) -> str:
-    """The verdict on a reading: the curve decides, the constants say whether the data could pin them."""
+    """Return the verdict on a reading.
+
+    The curve decides; the constants say whether the data could pin them.
+    """
     if not curve_distance <= CURVE_TOLERANCE:
         return "not reproduced"
     return "reproduced" if constant_distance <= CONSTANT_TOLERANCE else "curve only"
@@ -145,13 +148,13 @@ def readings(truth: Truth | None = None) -> tuple[Reading, ...]:
 
 
 def law_energy(r: Floats, alpha: Floats, b0: float) -> Floats:
-    """A cdf(r) of (17) with the printed a, c and exponents and this b0 [-]: r, alpha (m,)."""
+    """Return A cdf(r) of (17) [-] at r and alpha, both (m,), with the printed a, c and exponents and this b0."""
     a, b, c = printed_coefficients(alpha, b0)
     return 2 * np.pi * (a * r + (b - a * c) * np.log1p(r / c))
 
 
 def printed_coefficients(alpha: Floats, b0: float = PUBLISHED["(13)"]["b0"]) -> tuple[Floats, Floats, Floats]:
-    """a [1/mfp], b [-], c [mfp] of (9)-(15) as printed, b0 apart."""
+    """Return a [1/mfp], b [-], c [mfp] of (9)-(15) with printed constants, except b0, which is given."""
     exponents = list(PUBLISHED["(13)"].values())[1:]
     return a_law(alpha, _printed("(11)")), b_law(alpha, [b0, *exponents]), c_law(alpha, _printed("(15)"))
 
@@ -227,7 +230,7 @@ def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[
 
 
 def _law_readings(points: Coefficients, choices: str, exponent_free: bool = False) -> list[Reading]:
-    """The laws through one set of coefficients, printed exponents held and perhaps free as well."""
+    """Return the readings of laws through one set of coefficients, printed exponents fixed and perhaps free as well."""
     alpha, (a, b, c) = points.alpha, points.values.T
     a3, c2 = PUBLISHED["(11)"]["a3"], PUBLISHED["(15)"]["c2"]
     a1, a2 = _held([alpha, 10.0 ** (a3 * (alpha - 1))], a)

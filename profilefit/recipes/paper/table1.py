@@ -103,7 +103,10 @@ def table1(truth: Truth | None = None, regenerated: Mapping[str, ProfileLaw] | N
 
 
 def printed_halves() -> tuple[HalvesCheck, ...]:
-    """The halves hold equally many rings (give or take one), so their mean must be the whole."""
+    """Check that the printed halves average to the printed whole.
+
+    The halves hold equally many rings (give or take one), so their mean must be the whole.
+    """
     return tuple(
         HalvesCheck(material, model, (mse[0] + mse[1]) / 2 / mse[2] - 1, 2 * mse[2] - mse[0])
         for material, models in PRINTED.items()
@@ -124,13 +127,13 @@ def r_squared(law: Floats, data: Floats) -> dict[str, Triple]:
 
 
 def normalized_diffusion(r: Floats, reflectance: float, mfp: float) -> Floats:
-    """r R_d [1/length] of Christensen and Burley (2015), searchlight: s = 1.85 - A + 7 |A - .8|^3."""
+    """Return r R_d [1/length] of Christensen and Burley (2015) under a pencil beam: s = 1.85 - A + 7 |A - .8|^3."""
     s = 1.85 - reflectance + 7 * abs(reflectance - 0.8) ** 3
     return reflectance * s / (8 * np.pi * mfp) * (np.exp(-s * r / mfp) + np.exp(-s * r / (3 * mfp)))
 
 
 def rational(r: Floats, alpha: float, reflectance: float, mfp: float, b0: float, corrected: bool) -> Floats:
-    """r R_d [1/length] of (7), zero beyond r_max, divided by cdf(r_max) of (18) if `corrected`."""
+    """Return r R_d [1/length] of (7), zero beyond r_max, divided by cdf(r_max) of (18) if `corrected`."""
     a, b, c = printed_coefficients(np.array(alpha), b0)
     x = r / mfp
     value = np.maximum((a * x + b) / (x + c), 0.0) / mfp
@@ -169,7 +172,10 @@ def _row(printed, material, channel, model, choice, end, law: Floats, data: Floa
 
 
 def _nearest_range(r: Floats, law: Floats, data: Floats, printed: str) -> float:
-    """The whole number of mm, or half below 5 mm as in (6), whose three diffusion MSEs are nearest to print."""
+    """Return the range r'_max [mm] whose three diffusion MSEs are nearest to print.
+
+    The candidates are whole numbers of mm, and halves below 5 mm as in (6).
+    """
     ends = np.concatenate([np.arange(0.5, 5.0, 0.5), np.arange(5.0, 31.0)])
     ends = ends[ends <= r[-1]]
     target = np.log(PRINTED[printed]["diffusion"][0])

@@ -57,12 +57,18 @@ class Span:
 
 @dataclass(frozen=True)
 class PhaseData:
-    """source  of the numbers, in words;  digest  of their file
+    """Phase function read from a table.
 
-    angles    (n,) [rad], rising, >= 0;  values  (n,) [1/sr], > 0, brought to an integral of 1
-    sigma     (n,) relative standard errors [-], or None
-    integral  that the values had, in `unit`: 1/m where they had 1/(m sr), none where they had 1/sr or no unit
-    spans     below the first angle > 0, between rows that are more than `WIDEST` apart, and beyond the last angle
+    Attributes:
+        source: source of the numbers, in words.
+        digest: SHA-256 of their file.
+        angles: (n,) [rad], rising, >= 0.
+        values: (n,) [1/sr], > 0, brought to an integral of 1.
+        sigma: (n,) relative standard errors [-], or None.
+        integral: integral of the values as read, in `unit`.
+        unit: unit of the integral, 1/m where the values had 1/(m sr), none where they had 1/sr or no unit.
+        spans: angles without rows: below the first angle > 0, between rows more than `WIDEST` apart, and beyond the
+            last angle.
     """
 
     source: str
@@ -81,7 +87,7 @@ class PhaseData:
 
     @property
     def mean_cosine(self) -> float:
-        """[-]"""
+        """Mean cosine of the table [-]."""
         return float(self.table.mean_cosine)
 
     @property
@@ -103,7 +109,10 @@ class PhaseData:
 
 
 def read_phase(path: Path) -> PhaseData:
-    """A table; InputError in one line, FILE:LINE: expected ..., got ..."""
+    """Read the table of a phase function.
+
+    InputError in one line, FILE:LINE: expected ..., got ...
+    """
     content = read_whole(path, MAX_BYTES)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a phase function of at most {MAX_BYTES} bytes, got a longer file")

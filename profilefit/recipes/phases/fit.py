@@ -69,7 +69,7 @@ class PhaseFit:
 
     @property
     def mean_cosine(self) -> float:
-        """[-]"""
+        """Mean cosine of the fitted phase function [-]."""
         return float(self.phase.mean_cosine)
 
     @property
@@ -123,7 +123,7 @@ def fit_phase(
 
 
 def built(form: PhaseForm, constants: Floats) -> Phase:
-    """The phase function of constants (c,), checked."""
+    """Return the checked phase function of constants (c,)."""
     return from_table(as_table(form.phase([float(one) for one in constants])))
 
 
@@ -207,7 +207,10 @@ def _errors(
 def _jackknife(
     form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: tuple[Floats, ...], used: NDArray[np.bool_]
 ) -> Floats:
-    """Standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2); NaN where a refit fails."""
+    """Return the standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2).
+
+    They are NaN where a refit fails.
+    """
     cosine, level, weight, moments = arrays
     group = np.where(used, (np.cumsum(used) - 1) // TOGETHER % JACKKNIFE_GROUPS, -1)
     moved = []

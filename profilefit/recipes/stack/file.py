@@ -132,7 +132,14 @@ class LayerStack:
 
 
 class _LayerTable(NamedTuple):
-    """One [[layers]], read. colours  the layer in red, green and blue"""
+    """One [[layers]] of a file, as read.
+
+    Attributes:
+        colours: the layer in red, green and blue.
+        name: name of the layer, "" for none.
+        source: source of the numbers, in words.
+        map: image of the thickness, or None.
+    """
 
     colours: tuple[Layer, ...]
     name: str
@@ -141,7 +148,7 @@ class _LayerTable(NamedTuple):
 
 
 def read_layers(file: Path | str, content: Table) -> LayerStack:
-    """The stack of a file's content, of which only the keys `unit` and `layers` are looked at.
+    """Read the stack of a file's content; only the keys `unit` and `layers` are looked at.
 
     InputError in one line that names file, table and key, what was got and what is accepted.
     """
@@ -152,7 +159,7 @@ def read_layers(file: Path | str, content: Table) -> LayerStack:
 
 
 def stack_of(tables: Tables, content: Any, unit: str = UNIT) -> LayerStack:
-    """The stack of a list of tables [[layers]] in the file that `tables` names; `unit` is that of its lengths.
+    """Return the stack of a list of tables [[layers]] in the file that `tables` names, with lengths in `unit`.
 
     An image is looked for beside that file. InputError as for `read_layers`.
     """
@@ -199,7 +206,7 @@ def _layer(tables: Tables, number: int, table: Table, unit: str) -> _LayerTable:
 
 
 def _number(tables: Tables, where: str, key: str, table: Table) -> float:
-    """A number; whether there can be such a layer is for `Layer` to say."""
+    """Return a number; `Layer` checks whether such a layer can exist."""
     value = table.get(key)
     if not is_number(value):
         raise tables.bad(where, key, "a number", value)
@@ -207,7 +214,7 @@ def _number(tables: Tables, where: str, key: str, table: Table) -> float:
 
 
 def _colours(tables: Tables, where: str, key: str, table: Table) -> Three:
-    """A coefficient of red, green and blue [1/unit]."""
+    """Return a coefficient of red, green and blue [1/unit]."""
     value = table.get(key)
     if value is None:
         raise tables.bad(where, key, "a number", value)
@@ -249,7 +256,7 @@ def _map(tables: Tables, where: str, table: Table) -> ThicknessMap:
 
 
 def _values(tables: Tables, where: str, name: str) -> Floats:
-    """An image's values over their full scale, or as they are where they are floating point."""
+    """Return an image's values over their full scale; floating-point values are returned as they are."""
 
     def refused(got: str, accepted: str = IMAGE) -> InputError:
         return InputError(f"{tables.file}: [{where}] thickness.image must be {accepted}, got {name}{got}")
@@ -303,7 +310,7 @@ def _is_grey(image: ImageFile) -> bool:
 
 @contextmanager
 def _sound(refused: InputError) -> Iterator[None]:
-    """The error that is given, whatever Pillow raises at a file that is not what was written; its warnings are not."""
+    """Raise the error that is given, whatever Pillow raises at a damaged file, and hide Pillow's warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

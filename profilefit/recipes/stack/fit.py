@@ -234,6 +234,7 @@ def require_exact(tables: Tables, stack: LayerStack, what: str) -> None:
 
 
 def require(medium: Medium) -> None:
+    """Raise InputError where no law of a stack can be fitted to a medium."""
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
     if not medium.is_half_space:
@@ -300,8 +301,11 @@ def _searched(
 
 
 def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
-    """Return a start whose A(d) is that of added slabs of isotropic light, T^2 A_2 / (1 - A_1 A_2) beside A_1: u = 0, w
-    = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over dark a white layer's A falls as h / (d + h), which no other start finds."""
+    """Return a start whose A(d) is that of added slabs of isotropic light.
+
+    A(d) is A_1 + T^2 A_2 / (1 - A_1 A_2), with u = 0 and w = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over a dark layer the A
+    of a white one falls as h / (d + h), which no other start finds.
+    """
     first, second, rate = float(top.whole()), float(below.whole()), _fading(top, below)
     w = np.clip(first * (first - second) / (1.0 - first * second + 1e-12), 1e-4, 1.0 - min(rate, 0.5))
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])

@@ -116,7 +116,7 @@ def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: i
 def shared_gaussians(
     media: Sequence[Medium], illumination: str = "searchlight", count: int = 6
 ) -> tuple[MediumGaussians, ...]:
-    """Sums of the same 1 to 8 variances, in one unit of length, for media of one unit: red, green and blue, say.
+    """Fit sums of the same 1 to 8 variances to media of one unit of length, for example red, green and blue.
 
     Each x is in mean free paths of its own first layer.
     """
@@ -234,10 +234,10 @@ def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
 
 
 def _places(weights: Floats) -> tuple[Floats, Floats]:
-    """offset (N + m N,), slopes (N + m N, p): ln variances and weights are offset + slopes @ parameters.
+    """Return offset (N + m N,) and slopes (N + m N, p): ln variances and weights are offset + slopes @ parameters.
 
-    Parameters are ln variances and the weights that are not 0, but the largest of each light, which is what the others
-    leave of 1.
+    Parameters are ln variances and the weights that are not 0, except the largest weight of each light, which is 1 less
+    the others.
     """
     lights, count = weights.shape
     size = count * (1 + lights)
@@ -297,7 +297,7 @@ def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
 
 
 def _of(parameters: Floats, lights: int) -> tuple[Floats, Floats, Floats]:
-    """ln v (N,), weights (lights, N), and their derivatives (N + lights N, p)."""
+    """Return ln v (N,), weights (lights, N), and their derivatives (N + lights N, p)."""
     count = (parameters.size + lights) // (lights + 1)
     first, rises, logits = parameters[:1], parameters[1:count], parameters[count:].reshape(lights, count - 1)
     level = np.cumsum(np.concatenate([first, np.logaddexp(0.0, rises)]))
@@ -389,7 +389,10 @@ def quality(light: SumLight, variances: Floats, weights: Floats) -> dict[str, fl
 
 
 def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """d parameters / d ln energy (p, n) of the rings, A the sum of its rings and of what lies beyond them."""
+    """Return d parameters / d ln energy (p, n) of the rings.
+
+    A is the sum of its rings and of the energy beyond them.
+    """
     weight = np.concatenate([light.weight for light in lights])
     # With r = w (m / e - 1): the slope J^T r moves by -J^T (w + 2 r) d ln e.
     slope = found.best.jacobian * (weight + 2.0 * found.best.residuals)[:, None]
@@ -435,7 +438,7 @@ def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium],
 
 
 def _jackknife(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """Standard errors of a grouped jackknife over rings (Efron, The Jackknife, 1982, ch. 2)."""
+    """Return the standard errors of a grouped jackknife over rings (Efron, The Jackknife, 1982, ch. 2)."""
     moved = []
     for group in range(JACKKNIFE_GROUPS):
         fewer = []

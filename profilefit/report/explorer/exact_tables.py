@@ -41,6 +41,7 @@ GRID, COARSE = TableGrid(65, 111), TableGrid(49, 89)
 
 
 def grid_of(setting: Setting) -> TableGrid:
+    """Return the grid of a setting's table: coarser under a refracting interface."""
     return GRID if setting.n == 1.0 else COARSE
 
 

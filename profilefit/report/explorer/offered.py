@@ -32,8 +32,16 @@ class Refracting:
 
 @dataclass(frozen=True)
 class Offered:
-    """id for addresses; name of the law; light that its constants belong to; label for readers; text in GLSL ES of
-    n = 1; refracting that of other indices, where the law has constants for them."""
+    """Law that the explorer offers under one illumination.
+
+    Attributes:
+        id: name in addresses.
+        name: name of the law.
+        light: illumination that the law's constants belong to.
+        label: name for readers.
+        text: shader source in GLSL ES at n = 1.
+        refracting: shader source at other indices, where the law has constants for them.
+    """
 
     id: str
     name: str

@@ -156,6 +156,7 @@ def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -
 
 
 def draw(ax: Axes, source: Source, record: str) -> None:
+    """Draw the error of a record's inverse cdf over alpha, beside the printed constants."""
     fitted = source.usable(record)
     if fitted is None:
         return

@@ -199,6 +199,7 @@ def _forward(result: MediumPosterior) -> float | None:
 
 
 def p_value(value: float) -> str:
+    """Return a p-value as text."""
     return f"below {TINIEST:g}" if value < TINIEST else f"{value:.2g}"
 
 

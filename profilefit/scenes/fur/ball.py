@@ -20,8 +20,9 @@ SKIN, NOTHING = -1.0, -2.0  # in place of a height
 
 
 class FurView(NamedTuple):
-    """Rays of a picture: from the eye, through forward + x right + y up, x and y in -1 ... 1; or all along forward,
-    from eye + x right + y up, if they are parallel.
+    """Rays of a picture from the eye, through forward + x right + y up, x and y in -1 ... 1.
+
+    If they are parallel, all run along forward, from eye + x right + y up.
     """
 
     eye: Floats

@@ -198,7 +198,6 @@ class FurRender(NamedTuple):
 
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
-
         draw, time = (
             (lambda count: self.picture(by, count)),
             (lambda count: self.renderer.time(*self._passes(by, count))),

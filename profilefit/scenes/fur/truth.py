@@ -64,6 +64,7 @@ def random_patch(
 
 
 def strand_count(density: float, side: float) -> int:
+    """Return the number of strands on a square, 1 at least: density [1/area] times side [length] squared."""
     if not (is_number(density) and 0 < density < np.inf and 0 < density * side * side <= MOST_STRANDS):
         raise InputError(f"density must be a number > 0 of {MOST_STRANDS} strands at most, got {shown(density)}")
     return max(round(density * side * side), 1)

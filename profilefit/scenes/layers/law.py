@@ -99,12 +99,16 @@ def single_scattering(
 
 
 class Plate(NamedTuple):
-    """Light through a part of a thickness D that has a stack's upper layers on both sides, over what arrives:
+    """Light through a part of a thickness D that has a stack's upper layers on both sides, over what arrives.
 
     T = strength / sinh(rate (D - skins) + offset)
 
-    rate  the decay rate of the last layer [1/length], exact far inside;  skins  thickness of all upper layers [length]
-    strength, offset  fitted [-];  error  largest relative error of T at the thicknesses that they were fitted at
+    Attributes:
+        rate: decay rate of the last layer [1/length], exact far inside.
+        skins: thickness of all upper layers [length].
+        strength: fitted [-].
+        offset: fitted [-].
+        error: largest relative error of T at the thicknesses that the constants were fitted at [-].
     """
 
     rate: float
@@ -121,11 +125,11 @@ class Plate(NamedTuple):
 
 @lru_cache(maxsize=32)
 def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
-    """Fit the two constants of a stack to the exact transmittance of five plates. A second; InputError as of
-    `exact.solve`.
+    """Fit the two constants of a stack to the exact transmittance of five plates, in about a second.
 
-    Within .5 % where the last layer is no darker than alpha = 0.8; light through darker ones is little: a plate of two
-    mean free paths of alpha = 0.6 lets a hundredth through, 3 % of that off.
+    The error of T is below .5 % where the last layer is no darker than alpha = 0.8. Darker layers let little through.
+    For example, a plate of two mean free paths of alpha = 0.6 transmits 1 % of the light, with an error of 3 % of that.
+    InputError as of `exact.solve`.
     """
     *upper, core = medium.layers
     skins = 2.0 * sum(layer.thickness for layer in upper)

@@ -52,10 +52,13 @@ class Splat(Enum):
 
 
 class CausticMap(NamedTuple):
-    """Irradiance of a tile: light  (pixels, pixels), row 0 at y = 0, 1 is the mean of the flux that entered [-]
+    """Irradiance of a tile.
 
-    entered       that mean, over the sun's irradiance across its rays [-]
-    fragments     that were blended into the map;  milliseconds  of the passes, hits included, until OpenGL had finished
+    Attributes:
+        light: (pixels, pixels) irradiance, row 0 at y = 0, relative to the mean of the flux that entered [-].
+        entered: mean of the flux that entered, over the sun's irradiance across its rays [-].
+        fragments: number of fragments that were blended into the map.
+        milliseconds: time of the passes, hits included, until OpenGL had finished.
     """
 
     light: Floats
@@ -110,8 +113,13 @@ class Caustics:
 
         Args:
             renderer: whose maps have names that begin with `name`.
-            vertices, pixels: along a side of the tile.
-            waves, depth, tilt, n, floor: of `caustic_map`.
+            waves: the sea's surface.
+            vertices: rays along a side of the tile.
+            pixels: pixels of the map along a side of the tile.
+            depth: depth of a level floor [m].
+            tilt: angle of the sun from the vertical; light goes toward +x [rad].
+            n: refractive index of the water [-].
+            floor: an uneven floor in place of the level one, with the sea's tile.
             name: of this sea and floor among those of a renderer.
         """
         self.renderer, self.waves = renderer, waves

@@ -72,7 +72,8 @@ class SeaPasses:
             renderer: that has the maps.
             world: what light meets.
             splats: of the floor's map, and of each depth's.
-            vertices, texels: along a side of the tile.
+            vertices: rays along a side of the tile.
+            texels: texels of a map along a side of the tile.
             slices: maps in depths.
         """
         self.renderer, self.world, self.reach = renderer, world, reach_of(world)

@@ -80,8 +80,14 @@ class Sunlight:
 
 
 class Event(NamedTuple):
-    """Event of paths: seen  (n, 3) radiance that comes in there;  kept  share of the path's light (n or 1, 3 or 1)
-    turned  (n,) density of the turn that light would take over that of the one drawn;  place, way  (n, 3) on from there
+    """Event of paths.
+
+    Attributes:
+        seen: (n, 3) radiance that comes in at the event.
+        kept: (n or 1, 3 or 1) share of the path's light that goes on [-].
+        turned: (n,) density of the turn that light would take, over the density that the turn was drawn from [-].
+        place: (n, 3) start of the path's next part.
+        way: (n, 3) direction of the path's next part.
     """
 
     seen: Floats

@@ -89,8 +89,10 @@ def columns() -> tuple[Floats, Floats]:
 
 
 def row(radius: Floats, ring: Floats, share: Floats) -> tuple[Singles, Singles]:
-    """Return a row of x at each t, and of density 2 pi x R_d / A and cdf at each x: ln(x/t) (DRAWN, 1), ln density and
-    -ln(1 - cdf) (KNOWN, 2)."""
+    """Return a row of x at each t, and a row of density and cdf at each x.
+
+    They are ln(x/t) (DRAWN, 1), and the logarithm of the density 2 pi x R_d / A beside -ln(1 - cdf) (KNOWN, 2).
+    """
     left = np.maximum(1.0 - share, np.exp(-MOST_DEPTH - 10.0))
     known = np.stack([np.log(np.maximum(ring, LEAST_DENSITY)), -np.log(left)], axis=-1)
     return np.log(np.minimum(radius, FARTHEST) / columns()[0])[:, None].astype(np.float32), known.astype(np.float32)

@@ -132,9 +132,13 @@ class Stage:
         """Return the milliseconds of each repeat, by `seconds`; all is compiled before.
 
         Args:
-            law, mfp, sampling, fixed_alpha: of `scatter`.
+            law: one with a shader source, an `ExactLaw`, which is sampled, or a technique of another kind.
+            mfp: transport mean free path of red, green and blue, or one for all [mm].
+            sampling: of each pixel.
             repeats: how often.
             passes: "scatter", pass 3 alone, or "frame", all four of the scene last drawn.
+            fixed_alpha: reduced single-scattering albedo of the three, or one for all [-]; by default that of A, pixel
+                by pixel.
         """
         if passes not in PASSES:
             raise InputError(f"passes must be one of {', '.join(PASSES)}, got {passes!r}")

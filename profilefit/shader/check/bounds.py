@@ -53,39 +53,39 @@ class ModelError:
         return self.values.get(measure)
 
 
-def of_profile(one: LoadedLaw, folder: Folder) -> ModelError:
-    """The errors of a profile law, from its records, or those of the regenerated law of its name and setting.
+def of_profile(loaded: LoadedLaw, folder: Folder) -> ModelError:
+    """Return the errors of a profile law, from its records or from the regenerated law of its name and setting.
 
-    What no record states is measured on the float64 law, where the setting has an exact profile.
+    An error that no record states is measured on the float64 law, where the setting has an exact profile.
     """
     records = Records.of(folder)
-    owner = one if one.records else _regenerated(one, profile_laws(records, matched=False))
-    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, records, one.setting)
+    owner = loaded if loaded.records else _regenerated(loaded, profile_laws(records, matched=False))
+    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, records, loaded.setting)
     source = " + ".join(owner.records) if owner and found else "measured here"
-    held = {name for each in one.records for name in records.content(each)["constants"]}
-    whole = not one.records or held >= set(one.law.constant_names())
-    if whole and "rel" not in found and one.setting.is_solved:
-        quality = profile_quality(one.law, ALBEDOS)
-        found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
+    held = {name for each in loaded.records for name in records.content(each)["constants"]}
+    whole = not loaded.records or held >= set(loaded.law.constant_names())
+    if whole and "rel" not in found and loaded.setting.is_solved:
+        quality = profile_quality(loaded.law, ALBEDOS)
+        found |= {measure: MEASURES[measure].worst(getattr(quality, measure)) for measure in ("rel", "ks")}
     if not found:
-        raise RecordError(f"{one.label} cannot be judged: no record states its errors; regenerate it")
+        raise RecordError(f"{loaded.label} cannot be judged: no record states its errors; regenerate it")
     return ModelError(found, source)
 
 
-def of_map(one: LoadedLaw, folder: Folder) -> ModelError:
-    """The errors of a map, likewise."""
+def of_map(loaded: LoadedLaw, folder: Folder) -> ModelError:
+    """Return the errors of a map, from its records or from the regenerated map of its name and setting."""
     records = Records.of(folder)
-    owner = one if one.records else _regenerated(one, albedo_laws(records, matched=False))
-    found = _recorded(owner.records, MAP_MEASURES, records, one.setting) if owner else {}
+    owner = loaded if loaded.records else _regenerated(loaded, albedo_laws(records, matched=False))
+    found = _recorded(owner.records, MAP_MEASURES, records, loaded.setting) if owner else {}
     source = " + ".join(owner.records) if owner and found else "measured here"
     if missing := [name for name in MAP_MEASURES if name not in found]:
-        quality = albedo_quality(one.law)
+        quality = albedo_quality(loaded.law)
         found |= {name: getattr(quality, name) for name in missing}
     return ModelError(found, source)
 
 
-def _regenerated(one: LoadedLaw, laws: Sequence[LoadedLaw]) -> LoadedLaw | None:
-    same = (law for law in laws if law.records and (law.name, law.setting) == (one.name, one.setting))
+def _regenerated(loaded: LoadedLaw, laws: Sequence[LoadedLaw]) -> LoadedLaw | None:
+    same = (law for law in laws if law.records and (law.name, law.setting) == (loaded.name, loaded.setting))
     return next(same, None)
 
 
@@ -98,7 +98,7 @@ def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, s
         try:
             if setting == record_setting(content):
                 own = quality.get("regenerated", {})
-                found |= {one: MEASURES[one].worst(own[one]) for one in measures if one in own}
+                found |= {measure: MEASURES[measure].worst(own[measure]) for measure in measures if measure in own}
             else:
                 found |= _around(setting, quality["by_index"], measures)
         except (KeyError, TypeError, ValueError):
@@ -107,13 +107,15 @@ def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, s
 
 
 def _around(setting: Setting, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:
-    """Return the value at a measured index, else the worse of both neighbours; nothing below the least. The worst of
-    all where a law has g."""
+    """Return the value at a measured index, else the worse of both neighbours; nothing below the least index.
+
+    Where a law has g, return the worst of all.
+    """
     if setting.g:
-        return {one: float(np.max(by_index[one])) for one in measures if one in by_index}
+        return {measure: float(np.max(by_index[measure])) for measure in measures if measure in by_index}
     known, n = by_index["n"], setting.n
     i = int(np.searchsorted(known, n))
     if n < known[0]:
         return {}
     near = slice(i, i + 1) if i < len(known) and known[i] == n else slice(i - 1, i + 1)
-    return {one: float(np.max(by_index[one][near])) for one in measures if one in by_index}
+    return {measure: float(np.max(by_index[measure][near])) for measure in measures if measure in by_index}

@@ -1,6 +1,4 @@
-"""The dense grid that laws are evaluated on, both ends included, and what is found on it: errors, and counts of what
-must not be.
-"""
+"""Dense grid on which laws are evaluated, both ends included, with its errors and counts of bad numbers."""
 
 from __future__ import annotations
 
@@ -73,13 +71,13 @@ def _shown(share: float) -> str:
 
 
 def arguments() -> Arguments:
-    """The whole grid."""
+    """Return the arguments of the whole grid."""
     r = (X[:, None] * MFP).astype(np.float32).astype(np.float64)
     return Arguments(ALPHA[:, None, None], r[None], XI[None, :, None], MFP)
 
 
 def reference(law: ProfileLaw, at: Arguments) -> Values:
-    """The law in float64; xi = 1 is taken for the largest float below, as the text does."""
+    """Return a law's values in float64; xi = 1 is taken for the largest float below 1, as the shader source does."""
     r = np.maximum(at.r, LEAST_X * at.mfp)
     xi = np.minimum(at.xi, 1.0 - ULP)
     sampler = drawn_by(law)
@@ -94,7 +92,7 @@ def reference(law: ProfileLaw, at: Arguments) -> Values:
 
 
 def drawn_by(law: ProfileLaw) -> Sampler:
-    """The sampler that the text has: of several the one of two steps."""
+    """Return the sampler of a law's shader source: the one of two steps where there are several."""
     return law.samplers.get("two steps", law.sampler)
 
 
@@ -145,6 +143,7 @@ class Count:
 
 
 def bad_numbers(count: Count) -> Bound:
+    """Return the bound that allows none of the counted results."""
     return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
 
 

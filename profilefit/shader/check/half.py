@@ -30,9 +30,9 @@ class HalfCheck:
     ks: dict[str, float]
 
 
-def check_half(context: moderngl.Context, one: LoadedLaw) -> HalfCheck:
+def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
     """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
-    law = one.law.in_reduced()
+    law = loaded.law.in_reduced()
     r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]
     cdf = np.asarray(law.cdf(r, alpha))
     truth = np.asarray(law.profile(r, alpha)), cdf, cdf <= ENERGY_WITHIN
@@ -45,7 +45,7 @@ def check_half(context: moderngl.Context, one: LoadedLaw) -> HalfCheck:
     if half_extension(context):
         found[ARITHMETIC] = ShaderLaw(context, law, half=True).values(r, 0.5, alpha)
     errors = {name: _errors(values, *truth) for name, values in found.items()}
-    return HalfCheck(one, {n: error[0] for n, error in errors.items()}, {n: error[1] for n, error in errors.items()})
+    return HalfCheck(loaded, {n: error[0] for n, error in errors.items()}, {n: error[1] for n, error in errors.items()})
 
 
 def _half(values: Floats) -> Floats:

@@ -50,7 +50,7 @@ class Twin:
         self._name = name
 
     def radius(self, xi: Floats, alpha: Floats) -> Floats:
-        """x = r/l at xi, as the text draws it."""
+        """Return x = r/l at xi, as the shader source draws it."""
         shape = self._names[f"{self._name}_shape"](alpha)
         return np.asarray(self._names[f"{self._name}_radius"](xi, shape))
 
@@ -85,7 +85,7 @@ class Twin:
         return (self.radius(xi + STEP * rest, alpha) - self.radius(xi - STEP * rest, alpha)) / (2.0 * STEP * rest)
 
     def _searched(self, x: Floats, alpha: Floats, low: Floats, high: Floats) -> Floats:
-        """xi between low and high at which x is drawn, by halves."""
+        """Return xi between low and high at which x is drawn, found by bisection."""
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             below = self.radius(middle, alpha) < x
@@ -118,10 +118,12 @@ JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 
 @dataclass(frozen=True)
 class LawCheck(ShaderCheck):
-    """Findings on one law: `rel`, `ks` and `inversion_error`, and
+    """Findings on one law: `rel`, `ks` and `inversion_error`, and the errors of float32.
 
-    spreads  float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
-             cdf; sample as the share between the radii of float32 and float64; pdf of the map against the pdf's text
+    Attributes:
+        spreads: float32 errors by name. R_d and pdf are relative, over the range of `rel` or wherever a float32 holds
+            them; cdf is absolute. Sample is the share between the radii of float32 and float64; pdf of the map is
+            compared with the pdf of the shader source.
     """
 
     spreads: dict[str, Spread]
@@ -130,39 +132,41 @@ class LawCheck(ShaderCheck):
 def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        references = pool.map(lambda one: dense_grid.reference(one.law.in_reduced(), dense_grid.arguments()), laws)
-        for one, exact in zip(laws, references, strict=True):
-            yield check_law(context, one, folder, exact=exact)
+        references = pool.map(
+            lambda loaded: dense_grid.reference(loaded.law.in_reduced(), dense_grid.arguments()), laws
+        )
+        for loaded, exact in zip(laws, references, strict=True):
+            yield check_law(context, loaded, folder, exact=exact)
 
 
 def check_law(
-    context: moderngl.Context, one: LoadedLaw, folder: Folder, text: str = "", exact: Values | None = None
+    context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text: str = "", exact: Values | None = None
 ) -> LawCheck:
     """Check a profile law with its constants. ShaderError if it does not compile.
 
     text   in place of its own; exact  the law in float64 on the grid, where that is known already
     """
-    model, valid = bounds.of_profile(one, folder), validity.of_profile(one, folder)
-    shader, at = ShaderLaw(context, one.law, text), dense_grid.arguments()
+    model, valid = bounds.of_profile(loaded, folder), validity.of_profile(loaded, folder)
+    shader, at = ShaderLaw(context, loaded.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        exact = exact or dense_grid.reference(one.law.in_reduced(), at)
+        exact = exact or dense_grid.reference(loaded.law.in_reduced(), at)
         profiled, drawn = (
             np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, dense_grid.ALPHA, dense_grid.XI)
         )
-        spreads, rounding = _rounding(one.law.in_reduced(), found, exact, at, profiled, drawn)
+        spreads, rounding = _rounding(loaded.law.in_reduced(), found, exact, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:
         spreads[OWN] = own
-    jump = _jump(one.law, at.alpha)
+    jump = _jump(loaded.law, at.alpha)
     inside = dense_grid.counted(found, at, profiled, drawn, jump)
     everywhere = np.ones(at.shape, bool)
     outside = dense_grid.counted(found, at, everywhere, everywhere, jump).less(inside)
-    measured = _measured(shader, one, model)
+    measured = _measured(shader, loaded, model)
     limits = _limits(model, rounding, measured, spreads)
-    limits += [bad_numbers(inside), *validity.promised_by_profile(one, folder)]
-    return LawCheck(one, model, rounding, measured, inside, outside, tuple(limits), spreads)
+    limits += [bad_numbers(inside), *validity.promised_by_profile(loaded, folder)]
+    return LawCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), spreads)
 
 
 def _rounding(
@@ -186,7 +190,7 @@ def _rounding(
     means = np.sum(np.where(used, profile, 0.0), axis=1) / np.maximum(np.sum(used, axis=1), 1)
     worst = (means, np.where(profiled, cdf, 0.0), np.where(drawn, sample, 0.0))
     rounding = {name: float(np.max(values)) for name, values in zip(bounds.PROFILE_MEASURES, worst, strict=True)}
-    return {name: one for name, one in spreads.items() if one is not None}, rounding
+    return {name: spread for name, spread in spreads.items() if spread is not None}, rounding
 
 
 def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> Floats:
@@ -197,14 +201,14 @@ def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> 
     return np.abs(mine - right)
 
 
-def _measured(shader: ShaderLaw, one: LoadedLaw, model: ModelError) -> dict[str, float]:
-    """The errors of the GPU's own numbers against the exact half space, of what the model error is known of."""
+def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[str, float]:
+    """Return the errors of the GPU's numbers against the exact half space, for the measures with a model error."""
     found: dict[str, float] = {}
-    if not one.setting.is_solved:
+    if not loaded.setting.is_solved:
         return found
     if model.get("rel") is not None:
         quality = profile_quality(shader, ALBEDOS)  # type: ignore[arg-type]  # it asks for no more than there is
-        found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
+        found |= {measure: MEASURES[measure].worst(getattr(quality, measure)) for measure in ("rel", "ks")}
     if model.get("inversion_error") is not None:
         found["inversion_error"] = float(np.max(inversion_error(shader, ALBEDOS)))
     return found

@@ -83,9 +83,12 @@ def law_costs(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Fold
 
 
 def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: ProfileLaw) -> dict[str, Cost]:
-    """The costs of each law's text, by `emit.source`: constants do not change them.
+    """Return the costs of each law's shader source, by `emit.source`: constants do not change them.
 
-    yardstick  the law that is counted as 1
+    Args:
+        context: context to measure in.
+        laws: laws to measure.
+        yardstick: law that is counted as 1.
     """
     texts = {emit.source(law): timed_text(law) for law in (yardstick, *laws)}
     return text_costs(context, texts, emit.source(yardstick))
@@ -100,9 +103,13 @@ def timed_text(law: ProfileLaw) -> TimedText:
 def text_costs(
     context: moderngl.Context, texts: Mapping[str, TimedText], yardstick: str, works: Iterable[str] = WORKS
 ) -> dict[str, Cost]:
-    """The costs of each text, by its name.
+    """Return the costs of each text, by its name.
 
-    yardstick  the name of the text that is counted as 1;  works  names of `WORKS`: "material" is for laws only
+    Args:
+        context: context to measure in.
+        texts: timed texts, by name.
+        yardstick: name of the text that is counted as 1.
+        works: names of `WORKS`: "material" is for laws only.
     """
     timed: dict[str, dict[str, tuple[Floats, Floats]]] = {name: {} for name in texts}
     with ExitStack() as held:

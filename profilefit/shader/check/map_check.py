@@ -32,11 +32,11 @@ class MapCheck(ShaderCheck):
     places: dict[str, str]
 
 
-def check_map(context: moderngl.Context, one: LoadedLaw, folder: Folder, text: str = "") -> MapCheck:
+def check_map(context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text: str = "") -> MapCheck:
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
-    model = bounds.of_map(one, folder)
-    of_reflectance, of_alpha = validity.of_map(one, folder)
-    shader, law = ShaderMap(context, one.law, text), one.law.in_reduced()
+    model = bounds.of_map(loaded, folder)
+    of_reflectance, of_alpha = validity.of_map(loaded, folder)
+    shader, law = ShaderMap(context, loaded.law, text), loaded.law.in_reduced()
     alpha, reflectance = shader.alpha(REFLECTANCE), shader.reflectance(ALPHA)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
         errors = {
@@ -56,8 +56,8 @@ def check_map(context: moderngl.Context, one: LoadedLaw, folder: Folder, text: s
         limits.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places[name]))
         if name in measured:
             limits.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
-    limits += [bad_numbers(inside), *validity.promised_by_map(one)]
-    return MapCheck(one, model, rounding, measured, inside, outside, tuple(limits), places)
+    limits += [bad_numbers(inside), *validity.promised_by_map(loaded)]
+    return MapCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), places)
 
 
 def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:

@@ -183,15 +183,15 @@ def _free(held: tuple[Any, ...]) -> None:
 
 
 def half_extension(context: moderngl.Context) -> str:
-    """The extension by which this driver computes in half precision, "" if it has none."""
+    """Return the extension by which this driver computes in half precision, "" if it has none."""
     return next((name for name in HALF if name in context.extensions), "")
 
 
 def no_half(context: moderngl.Context) -> str:
-    """The line that says that there is no arithmetic in half precision."""
+    """Return the line that reports that there is no arithmetic in half precision."""
     return f"float16 arithmetic: not offered by {renderer(context)}"
 
 
 def in_half(text: str) -> str:
-    """A law's text with every float, and every number, of half precision."""
+    """Return a shader source with every float and every number in half precision."""
     return re.sub(r"\bfloat\b", HALF_TYPE, NUMBER.sub(lambda found: f"{HALF_TYPE}({found.group()})", text))

@@ -36,15 +36,15 @@ class Validity:
     xi: Range = EVERYWHERE
 
 
-def of_profile(one: LoadedLaw, folder: Folder) -> Validity:
+def of_profile(loaded: LoadedLaw, folder: Folder) -> Validity:
     """Return a law's own range; a fitted inverse may hold for the albedos of its record only, and for some of xi.
 
     A record that is of the profile alone, or of the inverse alone, states nothing of the other.
     """
-    entry: Entry = one.law.entry
-    if not (entry.as_fitted and one.records):
+    entry: Entry = loaded.law.entry
+    if not (entry.as_fitted and loaded.records):
         return Validity(entry.alpha, entry.alpha)
-    contents = [Records.of(folder).content(name) for name in one.records]
+    contents = [Records.of(folder).content(name) for name in loaded.records]
     inverse = next((content for content in contents if content["pipeline"] == "inverse"), None)
     whole = inverse is None or len(contents) > 1
     return Validity(entry.alpha if whole else None, _fitted(inverse) if inverse else None, entry.xi)
@@ -64,26 +64,26 @@ def masks(valid: Validity, alpha: Floats, xi: Floats) -> tuple[Mask, Mask]:
     return profiled[:, None, None], drawn[:, None, None] & valid.xi.holds(xi)[:, None]
 
 
-def of_map(one: LoadedLaw, folder: Folder) -> tuple[Range, Range]:
+def of_map(loaded: LoadedLaw, folder: Folder) -> tuple[Range, Range]:
     """Reflectances A and albedos alpha of a map: by its own statement, and of its record where it holds no further."""
-    law: AlbedoLaw = one.law
-    if not (law.entry.as_fitted and one.records):
+    law: AlbedoLaw = loaded.law
+    if not (law.entry.as_fitted and loaded.records):
         return law.reflectances, law.albedos
-    fitted = _fitted(Records.of(folder).content(one.records[0]))
+    fitted = _fitted(Records.of(folder).content(loaded.records[0]))
     low, high = np.asarray(exact.reflectance([fitted.low, fitted.high], setting=law.setting))
     return Range(float(low), float(high)), Range(fitted.low, min(fitted.high, law.albedos.high), open_high=True)
 
 
-def promised_by_profile(one: LoadedLaw, folder: Folder) -> list[Bound]:
+def promised_by_profile(loaded: LoadedLaw, folder: Folder) -> list[Bound]:
     """Return what Liang et al. say of (17), (21) and of alpha = 0; none of other laws, nor of regenerated constants."""
-    if not isinstance(one.law, Liang) or one.records:
+    if not isinstance(loaded.law, Liang) or loaded.records:
         return []
     regenerated = [law.law for law in profile_laws(folder) if law.records and isinstance(law.law, Liang)]
     least = max(float(np.max(np.abs(energy_ratio(law) - 1.0))) for law in regenerated[:1]) if regenerated else 0.0
-    ratio = energy_ratio(one.law)
+    ratio = energy_ratio(loaded.law)
     worst = int(np.argmax(np.abs(ratio - 1.0)))
-    drawn = np.asarray(one.law.sampler.unclipped(SHARES, 0.5))
-    empty = np.isnan(one.law.profile(1.0, 0.0)) or np.isnan(one.law.cdf(1.0, 0.0))
+    drawn = np.asarray(loaded.law.sampler.unclipped(SHARES, 0.5))
+    empty = np.isnan(loaded.law.profile(1.0, 0.0)) or np.isnan(loaded.law.cdf(1.0, 0.0))
     return [
         Bound(
             f"energy by (17), |cdf(r_max) - 1|; cdf(r_max) is {ratio.min():.3g} to {ratio.max():.3g}",
@@ -95,17 +95,17 @@ def promised_by_profile(one: LoadedLaw, folder: Folder) -> list[Bound]:
             "share of radii min(g, r_max) (21) that are negative; the source takes |g|",
             float(np.mean(drawn < 0)),
             0.0,
-            f"ξ < {one.law.eps:g}",
+            f"ξ < {loaded.law.eps:g}",
         ),
         Bound("the law is 0/0 (1 if so); the source takes 1e-6 for α", float(empty), 0.0, "α 0"),
     ]
 
 
-def promised_by_map(one: LoadedLaw) -> list[Bound]:
+def promised_by_map(loaded: LoadedLaw) -> list[Bound]:
     """Return what they say of (8): one alpha for each A, and alpha(1) = 1."""
-    if not isinstance(one.law, LiangAlbedo) or one.records:
+    if not isinstance(loaded.law, LiangAlbedo) or loaded.records:
         return []
-    fold, white = one.law.fold, float(one.law.alpha(1.0))
+    fold, white = loaded.law.fold, float(loaded.law.alpha(1.0))
     return [
         Bound(f"map (8) at A = 1, |α - 1|; α is {white:.5f}", abs(white - 1.0), ULP, "A 1"),
         Bound(f"map (8), share of [0, 1] beyond its fold at A = {fold:.4f}", 1.0 - fold, 0.0),

@@ -125,6 +125,7 @@ class Density:
 
 @lru_cache(maxsize=256)
 def density(law: ProfileLaw, alpha: float) -> Density:
+    """Tabulate ln(2 pi x R_d / A) of a law over ln x, at one albedo."""
     return Density(np.log(np.maximum(LawTarget(law).density(np.exp(TABLE), alpha), FAINT)))
 
 

@@ -138,7 +138,9 @@ def judged(
     """Return the class of every cell: not judged without a reference, where the error is NaN or the bound infinite.
 
     Args:
-        value, reference, error: of the quantity, in any one shape.
+        value: computed values, of any shape.
+        reference: reference values, in the shape and unit of `value`.
+        error: errors of the values, in their shape.
         bound: largest error that counts as right, in the unit of `error`.
         inside: where the law says that it holds.
         dtype: format of `value`.
@@ -187,10 +189,21 @@ def judged_cells(
     """Return cells with their classes, in the format of their arithmetic.
 
     Args:
-        subject, own, quantity, arithmetic, axes, value, reference, error, bound, unjudged, advice: as in `Cells`.
-        inside: where the law says that it holds; broadcast to the axes, as are value, reference and error.
+        subject: label of the law, map or function.
+        own: whether it is one of this project's own, held to have no red cell.
+        quantity: what is computed.
+        arithmetic: in which numbers, by what text.
+        axes: arguments of the cells.
+        value: computed values, broadcast to the axes.
+        reference: reference values, broadcast to the axes.
+        error: errors of the values, broadcast to the axes; NaN where nothing is known.
+        bound: largest error that counts as right, in the unit of `error`.
+        inside: where the law says that it holds; broadcast to the axes.
         judge: where errors count, by default everywhere; cells elsewhere are outside.
-        dim, wrong_way: as in `judged`.
+        dim: where the reference is too small for the format to reach it.
+        wrong_way: where a value went the wrong way from its neighbour.
+        unjudged: why cells are not judged, "" for no reason.
+        advice: remedy where cells are red, by default the one of `ADVICE`.
     """
     shape = tuple(axis.values.size for axis in axes)
     value, reference, error, inside = (np.broadcast_to(one, shape) for one in (value, reference, error, inside))
@@ -234,6 +247,7 @@ def absolute(value: Floats, reference: Floats) -> Floats:
 
 
 def cell_count(fields: list[Cells]) -> int:
+    """Return the number of all cells."""
     return sum(math.prod(one.shape) for one in fields)
 
 

@@ -116,6 +116,7 @@ def trimmed_fits(start: Liang) -> Iterator[FitCase]:
 
 
 def even_rings(alpha: tuple[float, ...], last: float) -> Rings:
+    """Return exact rings of equal width from 0 to last [mfp] at each albedo."""
     profiles = Profiles.from_exact(alpha, np.linspace(0.0, last, RINGS + 1))
     ones = np.ones_like(profiles.energy)
     return Rings(

@@ -203,6 +203,7 @@ def standardised(result: FittedConstants, limit: FittedConstants) -> float:
 
 
 def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Point:
+    """Return the point of one fit method at a number of photons, over all its trials."""
     rows = np.array([(t.fit_seconds, t.light_seconds, t.rms, t.worst, t.standardised) for t in trials])
     of_fit, light, rms, worst, away = rows.T
     facts: dict[str, float | int | str] = {
@@ -218,6 +219,7 @@ def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Po
 
 
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
+    """Return notes on fits that did not converge, and on the time of first fits."""
     failed = [
         f"{sum(not t.converged for t in group)} of {len(group)} did not converge: {name}, {photons:.0e} photons"
         for (name, photons), group in trials.items()

@@ -163,6 +163,7 @@ def _row(contender: Contender, counted: dict[str, FunctionCounts], rates: Rates,
 
 
 def points_of(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
+    """Return one point per law: error against the time of one part."""
     return tuple(
         Point(
             part,

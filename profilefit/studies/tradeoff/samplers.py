@@ -199,6 +199,7 @@ def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
 def error_ratios(
     way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
 ) -> tuple[float, float]:
+    """Return the mean square error and the variance of a gather at an edge, over those of another."""
     points = random_points(SAMPLES, trials, seed=block + 1)
     places = PLACES * law.similar(alpha, 1.0)[1]
     mine, best = (edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
@@ -207,6 +208,7 @@ def error_ratios(
 
 
 def points_of(way: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
+    """Return a sampler's points in the panels of noise and of bias."""
     square, variance = way.noise
     worst = square[np.argmax(np.median(square, axis=1))]
     middle = np.exp(np.log(square).mean(axis=0))

@@ -117,8 +117,16 @@ STACK_AXES = "time, one core [s]", AXES[1]
 
 @dataclass(frozen=True)
 class TruthSizes:
-    """Photons of a run of the scalar tracer, of `simulate` and of `simulate_orders`; turns; numbers of nodes; and
-    whether the exact solution's own estimate of its error is given, for which it compiles anew."""
+    """Sizes of a comparison of ways to compute ring energies.
+
+    Attributes:
+        scalar: photons of the runs of the scalar tracer.
+        simulate: photons of the runs of `simulate`.
+        orders: photons of the runs of `simulate_orders`.
+        turns: number of timed turns.
+        rules: names in `RULES` of the exact solution's numbers of nodes.
+        estimate: whether the exact solution's own estimate of its error is given, for which it compiles anew.
+    """
 
     scalar: tuple[int, ...] = (10_000, 100_000, 300_000)
     simulate: tuple[int, ...] = (100_000, 1_000_000, 3_000_000)
@@ -241,6 +249,8 @@ def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
 
 
 def scalar_tracer(trace: Callable, photons: int) -> Method:
+    """Return the method that runs the scalar tracer at each albedo."""
+
     def run(seed: int) -> RingEnergies:
         rows = []
         for i, alpha in enumerate(ALPHAS):
@@ -268,6 +278,7 @@ def _simulated(case: Annuli, photons: int) -> Method:
 
 
 def by_orders(case: Annuli, photons: int) -> Method:
+    """Return the method that traces photons by scattering order, and weights the orders for every albedo."""
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
