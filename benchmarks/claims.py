@@ -28,7 +28,7 @@ from rich.console import Console
 from mcml_sim.cli.screen import show
 from mcml_sim.files.text_file import as_json
 from mcml_sim.files.whole_file import write_whole
-from profilefit.recipes.evidence import made, require_apart, stale
+from profilefit.recipes.evidence import measurement_origin, require_apart, stale
 from profilefit.report.tables.claims_table import EXACT, FILE, Claim, claim_tables, read_claims
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -445,7 +445,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not {promise[0] for promise in run.promises} & {*options.only}:
             continue
         command = f"{run.command} {run.quick}" if options.quick and run.quick else run.command
-        origin, load = made("make claims", FITS), f"{os.getloadavg()[0]:.1f}"
+        origin, load = measurement_origin("make claims", FITS), f"{os.getloadavg()[0]:.1f}"
         new = [one for one in claimed(run, command, numbers(command), origin["date"], load) if one.name in options.only]
         found |= {one.name: one for one in new}
         rows = [asdict(found[name]) for name in names if name in found]

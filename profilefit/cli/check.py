@@ -62,7 +62,7 @@ def check(
         from mcml_sim.cli.screen import notes, print_json, typed
         from mcml_sim.files.text_file import as_json as json_text
         from mcml_sim.files.whole_file import write_whole
-        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.recipes.evidence import measurement_origin, require_apart
         from profilefit.report.tables.check_tables import content
         from profilefit.shader.check.chosen import checked, chosen, scope
 
@@ -73,7 +73,7 @@ def check(
     found = checked(those, folder, precision is FloatFormat.HALF, quiet)
     if out is not None or as_json:
         whole = content(found.laws, found.maps, found.costs, found.halves, found.device)
-        body = {"made": made(typed(), folder), "of": scope(names, constants), **whole}
+        body = {"made": measurement_origin(typed(), folder), "of": scope(names, constants), **whole}
     if out is not None:
         write_whole(out / "check.json", json_text(body))
         notes(quiet).print(f"wrote {out / 'check.json'}", markup=False)

@@ -167,8 +167,8 @@ def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Qualities:
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables import law_tables
 
-    def track(found: Iterator[Any], title: str, total: int) -> Iterator[Any]:
-        return tracked(found, f"measuring {title}", "laws", total, quiet)
+    def track(laws: Iterator[Any], title: str, total: int) -> Iterator[Any]:
+        return tracked(laws, f"measuring {title}", "laws", total, quiet)
 
     return law_tables.measured(folder, names or None, track=track)
 

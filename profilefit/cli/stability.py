@@ -53,7 +53,7 @@ def stability(
         from mcml_sim.files.text_file import as_json as json_text
         from mcml_sim.files.whole_file import write_whole
         from mcml_sim.runs.progress import tracked
-        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.recipes.evidence import measurement_origin, require_apart
         from profilefit.report.tables.stability_tables import content
         from profilefit.studies.stability.atlas import jobs, run
 
@@ -63,7 +63,11 @@ def stability(
         require_apart(out, folder, "stability.json", "stability.csv")
     parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
     if out is not None or as_json:
-        body = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}
+        body = {
+            "made": measurement_origin(typed(), folder),
+            "of": names or ("quick" if quick else "all"),
+            **content(parts),
+        }
     if out is not None:
         _write(parts, out)
         write_whole(out / "stability.json", json_text(body))

@@ -51,7 +51,7 @@ def tradeoff(
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes, print_json, screen, show, typed
         from mcml_sim.runs.progress import tracked
-        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.recipes.evidence import measurement_origin, require_apart
         from profilefit.report.tables.tradeoff_tables import as_numbers, tradeoff_tables
         from profilefit.studies.tradeoff import stopwatch
         from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
@@ -60,7 +60,7 @@ def tradeoff(
     folder = records_folder(fits, quiet)
     require_apart(out, folder, "tradeoff.json", *(f"tradeoff-{name}.csv" for name in names))
     file, said = out / "tradeoff.json", notes(quiet)
-    origin = {"made": made(typed(), folder)}
+    origin = {"made": measurement_origin(typed(), folder)}
     if file.exists() and not is_comparable(read(file), origin):
         said.print(f"{file} is of other records, another version or machine: written afresh", markup=False)
 

@@ -21,7 +21,7 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import LOCAL
 
 
-def made(command: str, folder: Path) -> dict[str, Any]:
+def measurement_origin(command: str, folder: Path) -> dict[str, Any]:
     """Describe a measurement made just now, by `command`, with the constants of the records in `folder`.
 
     command, version [of profilefit], date [UTC, ISO 8601], machine {processor, cores}, and sha256 [of the records]

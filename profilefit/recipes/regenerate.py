@@ -108,17 +108,21 @@ def reproduction(path: Path, name: str) -> Reproduction | None:
 
 
 def compared(
-    name: str, shipped: Mapping[str, Any], made: Mapping[str, Any], chains: Mapping[str, Any], again: Mapping[str, Any]
+    name: str,
+    shipped: Mapping[str, Any],
+    other: Mapping[str, Any],
+    chains: Mapping[str, Any],
+    others: Mapping[str, Any],
 ) -> Reproduction:
     """Compare two records' contents; `chains` and `again` hold the draws of each kind of posterior, (k, p)."""
     if "constants" not in shipped:
-        return _of_readings(name, shipped, made)
+        return _of_readings(name, shipped, other)
     constants = shipped["constants"]
     moved, relative, worst, problems = 0.0, 0.0, "", []
-    if missing := constants.keys() ^ made["constants"].keys():
+    if missing := constants.keys() ^ other["constants"].keys():
         problems.append(f"{min(missing)} is in one record only")
-    for key in constants.keys() & made["constants"].keys():
-        before, after = constants[key]["regenerated"], made["constants"][key]["regenerated"]
+    for key in constants.keys() & other["constants"].keys():
+        before, after = constants[key]["regenerated"], other["constants"][key]["regenerated"]
         error, by = stated_error(constants[key]), abs(after - before)
         relative = max(relative, by / (abs(before) or 1.0))
         if not error and by > EQUAL * abs(before):
@@ -127,11 +131,11 @@ def compared(
             moved, worst = by / error, key
     if moved > MOST_MOVED:
         problems.append(f"{worst} moved by {moved:.2g} of its stated error")
-    if shipped["fit"]["result"] != made["fit"]["result"]:
-        problems.append(f"the fit {made['fit']['result']!r} in place of {shipped['fit']['result']!r}")
-    if lost := sorted(chains.keys() ^ again.keys()):
+    if shipped["fit"]["result"] != other["fit"]["result"]:
+        problems.append(f"the fit {other['fit']['result']!r} in place of {shipped['fit']['result']!r}")
+    if lost := sorted(chains.keys() ^ others.keys()):
         problems.append(f"the chain of {lost[0]} is in one record only")
-    intervals, end = max(_moves(shipped, made, chains, again), default=(0.0, ""))
+    intervals, end = max(_moves(shipped, other, chains, others), default=(0.0, ""))
     if intervals > 1.0:
         problems.append(f"the interval of {end} moved by {intervals:.2g} of what its chain allows")
     return Reproduction(name, len(constants), moved, relative, intervals, "; ".join(problems))

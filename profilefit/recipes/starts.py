@@ -168,27 +168,27 @@ def spread_out(constants: Floats, count: int, seed: int) -> Floats:
     return np.where(constants == 0, normal, constants * np.exp(normal))
 
 
-def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
+def summarised(own: Solution, others: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
     """Group the solutions by where they ended, and say whether one is better than the recipe's own."""
-    converged = [one for one in (own, *found) if one.converged]
+    converged = [one for one in (own, *others) if one.converged]
     best = min(converged, key=lambda one: one.cost, default=None)
     if best is None:
         result = NONE_CONVERGED
     else:
         result = OWN_IS_BEST if own.converged and _as_cheap(own, best) else OWN_IS_BEATEN
         best = own if result == OWN_IS_BEST else best
-    groups = _groups(found)
-    unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *found)), ROUNDING)
+    groups = _groups(others)
+    unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *others)), ROUNDING)
     outcomes = [
         Outcome(len(g), _cost(g[0]) / unit, g[0].result, dict(zip(names, map(float, g[0].parameters), strict=True)))
         for g in groups
     ]
-    reached = sum(_same(one, best) for one in found) if best is not None else 0
+    reached = sum(_same(one, best) for one in others) if best is not None else 0
     return RandomStarts(
-        len(found),
+        len(others),
         seed,
         rule,
-        reached / len(found),
+        reached / len(others),
         result,
         tuple(outcomes[:MOST_OUTCOMES]),
         sum(outcome.count for outcome in outcomes[MOST_OUTCOMES:]),

@@ -101,7 +101,7 @@ class Tables:
             raise self.bad(where, key, words, value)
         return text
 
-    def made(self, where: str, make: Callable[[], T]) -> T:
+    def build(self, where: str, make: Callable[[], T]) -> T:
         """Return what `make` makes; where it refuses, the message says in which file and table."""
         try:
             return make()

@@ -201,8 +201,8 @@ def literal(value: float) -> str:
 
 
 def _repeated(text: str, count: int) -> str:
-    def each(found: re.Match[str]) -> str:
-        first, body = int(found.group(1)), found.group(2)
+    def each(block: re.Match[str]) -> str:
+        first, body = int(block.group(1)), block.group(2)
         return "".join(body.replace("@i", str(i)).replace("@h", str(i - 1)) for i in range(first, count + 1))
 
     return BLOCK.sub(each, text).replace("@n", str(count))

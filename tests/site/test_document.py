@@ -46,7 +46,7 @@ def measured(tmp_path_factory, records):
     """What the other commands write, in small."""
     folder = tmp_path_factory.mktemp("evidence")
     for name, content in MEASURED.items():
-        made = evidence.made(f"profilefit {name} --out {folder}", records)
+        made = evidence.measurement_origin(f"profilefit {name} --out {folder}", records)
         (folder / f"{name}.json").write_text(json.dumps({"made": made, **content}), encoding="utf-8")
     return folder
 

@@ -108,11 +108,11 @@ def read_setup(path: Path) -> Setup:
     if not optics.falling > 1.0:
         raise read.bad("optics", "falling", "a number > 1, or its light is endless", optics.falling)
     setting = Setting(n=read.number("medium", "n", of, 1.4), g=_within(read, "medium", "g", of, 0.8, 0.0, 1.0))
-    read.made("medium", lambda: require_solved(setting))
+    read.build("medium", lambda: require_solved(setting))
     mu_s = read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST)
     mu_a = read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST)
     longest = 1.0 / min(map(sum, zip(mu_s, mu_a, strict=True)))
-    read.made("medium", lambda: simulated.require_resolved(longest, optics, _far(shown)))
+    read.build("medium", lambda: simulated.require_resolved(longest, optics, _far(shown)))
     return Setup(
         mu_s, mu_a,
         setting, read.whole("medium", "photons", of, 0, 0, MOST_PHOTONS), optics, shown,

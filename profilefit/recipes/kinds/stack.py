@@ -379,9 +379,9 @@ def _channel(illumination: str, medium: Medium, starts: Sequence[Floats], tracin
         "quality": [quality(interface, tracing) for interface in fitted],
         "starts": [
             {
-                "count": len(interface.found),
-                "as_good": sum(each.cost <= 1.01 * interface.best.cost for each in interface.found),
-                "results": sorted({each.result.partition(" in ")[0] for each in interface.found}),
+                "count": len(interface.solutions),
+                "as_good": sum(each.cost <= 1.01 * interface.best.cost for each in interface.solutions),
+                "results": sorted({each.result.partition(" in ")[0] for each in interface.solutions}),
             }
             for interface in fitted
         ],

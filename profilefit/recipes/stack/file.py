@@ -171,7 +171,7 @@ def stack_of(tables: Tables, content: Any, unit: str = UNIT) -> LayerStack:
         raise tables.bad("", "layers", "tables [[layers]]", content)
     rows = [_layer(tables, number, layer, unit) for number, layer in enumerate(content, start=1)]
     red, green, blue = (
-        tables.made("layers", partial(Medium, colour)) for colour in zip(*(row.colours for row in rows), strict=True)
+        tables.build("layers", partial(Medium, colour)) for colour in zip(*(row.colours for row in rows), strict=True)
     )
     return LayerStack(
         unit, (red, green, blue), tuple(row.name for row in rows), tuple(row.source for row in rows), rows[0].map
@@ -196,7 +196,7 @@ def _layer(tables: Tables, number: int, table: Table, unit: str) -> _LayerTable:
         d = image.mean
     else:
         d = tables.number(where, "thickness", table, math.inf)
-    layers = tuple(tables.made(where, partial(Layer, n, a, s, g, d)) for a, s in zip(mu_a, mu_s, strict=True))
+    layers = tuple(tables.build(where, partial(Layer, n, a, s, g, d)) for a, s in zip(mu_a, mu_s, strict=True))
     return _LayerTable(
         layers,
         tables.text(where, "name", table, name),
@@ -297,7 +297,7 @@ def _bytes(tables: Tables, where: str, path: Path, refused: Refusal) -> bytes:
         raise refused(", which is no regular file")
     if not 0 < status.st_size <= LARGEST_FILE * 2**20:  # of no bytes are the files of /proc, some of which never end
         raise refused(f" of {status.st_size} bytes", f"a file of at most {LARGEST_FILE} MiB")
-    return tables.made(where, lambda: read_whole(path, LARGEST_FILE * 2**20))
+    return tables.build(where, lambda: read_whole(path, LARGEST_FILE * 2**20))
 
 
 def _is_grey(image: ImageFile) -> bool:

@@ -56,7 +56,7 @@ class Interface(NamedTuple):
     """Light that one interface of a stack was fitted to, and the fit.
 
     law        of the stack below the surface of its upper layer;  thicknesses  (m,) of that layer, fitted at [length]
-    best       the optimum taken, in unbounded parameters;  found  those of every start
+    best       the optimum taken, in unbounded parameters;  solutions  those of every start
     lights     of each thickness radii [length], R_d, weights and A, or traced rings
     is_below   whether layers lie above it
     """
@@ -67,7 +67,7 @@ class Interface(NamedTuple):
     thicknesses: Floats
     lights: list[RingData]
     best: Solution
-    found: tuple[Solution, ...]
+    solutions: tuple[Solution, ...]
 
     @property
     def is_traced(self) -> bool:
@@ -147,7 +147,7 @@ def rings_of(medium: Medium, d: float, illumination: str, number: int, tracing: 
     return tracing.rings(medium.with_first(d), illumination, edges, photons.STACK_PHOTONS, 100 + number)
 
 
-def errors(one: Interface) -> dict[str, dict[str, float | None]]:
+def errors(interface: Interface) -> dict[str, dict[str, float | None]]:
     """Return the errors of an interface's constants, by their names in records; None where there can be none.
 
     statistical     that of the photons, by the sandwich formula; none where light is exact
@@ -156,31 +156,38 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     misfit          s^2 (J^T J)^-1, as if residuals were independent
     jackknife       refits without one thickness after the other
     """
-    top, below, thickness = one.law.top, one.law.below, one.law.thickness
+    top, below, thickness = interface.law.top, interface.law.below, interface.law.thickness
 
     def refitted(d: Floats, lights: list[RingData]) -> Floats:
-        return _vector(_law_of(_solved(one.best.parameters, top, below, d, lights).parameters, top, below, thickness))
+        return _vector(
+            _law_of(_solved(interface.best.parameters, top, below, d, lights).parameters, top, below, thickness)
+        )
 
-    own, fewer = _vector(one.law), None
-    if not one.is_traced:
+    own, fewer = _vector(interface.law), None
+    if not interface.is_traced:
         coarse: list[RingData] = []
-        coarse += [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
-        fewer = refitted(one.thicknesses, coarse)
-    count = len(one.thicknesses)
-    left_out = np.array([refitted(one.thicknesses, _without(one.lights, i)) for i in range(count)])
+        coarse += [
+            light_of(interface.medium, d, interface.law.setting.illumination, NODES.fewer)
+            for d in interface.thicknesses
+        ]
+        fewer = refitted(interface.thicknesses, coarse)
+    count = len(interface.thicknesses)
+    left_out = np.array([refitted(interface.thicknesses, _without(interface.lights, i)) for i in range(count)])
     jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
     with jax.enable_x64(True):
-        slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(jnp.asarray(one.best.parameters))
-    slopes, inverse = np.asarray(slopes), one.best.covariance
+        slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(
+            jnp.asarray(interface.best.parameters)
+        )
+    slopes, inverse = np.asarray(slopes), interface.best.covariance
 
     def spread(covariance: Floats) -> Floats:
         return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
 
     found: dict[str, Floats | None] = {
-        "statistical_error": spread(inverse @ _noise(one) @ inverse) if one.is_traced else None,
+        "statistical_error": spread(inverse @ _noise(interface) @ inverse) if interface.is_traced else None,
         "discretisation_error": None if fewer is None else np.abs(fewer - own),
         "model_error": None,
-        "misfit_error": spread(one.best.variance * inverse),
+        "misfit_error": spread(interface.best.variance * inverse),
         "jackknife_error": jackknife,
     }
     return {
@@ -226,7 +233,7 @@ def require_exact(tables: Tables, stack: LayerStack, what: str) -> None:
     what  is in that unit, too
     """
     for medium in stack.media:
-        tables.made("layers", lambda medium=medium: require(medium))  # type: ignore[misc]
+        tables.build("layers", lambda medium=medium: require(medium))  # type: ignore[misc]
         if any(layer.g > 0 for layer in medium.layers):
             raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
     if stack.unit != "mm":

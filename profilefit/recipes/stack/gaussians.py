@@ -161,7 +161,7 @@ def joint(lights: Sequence[SumLight], count: int) -> JointSum:
 
     Given the variances, the weights are a problem of least squares with one optimum, which says which of them are 0.
     """
-    variances, _ = made(fitted(lights, count).parameters, len(lights))
+    variances, _ = shared_sum(fitted(lights, count).parameters, len(lights))
     weights = _weights(lights, variances)
     for _ in range(TURNS):
         offset, slopes = _places(weights)
@@ -176,13 +176,13 @@ def joint(lights: Sequence[SumLight], count: int) -> JointSum:
     return JointSum(variances, own, slopes, judged(best, tuple(names[i] for i in np.argmax(slopes != 0, axis=0))))
 
 
-def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+def refitted(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
     """Refit: ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
 
     NaN where that fit does not converge.
     """
-    offset, slopes = _places(found.weights)
-    best = _settled(found.best.parameters, lights, offset, slopes)
+    offset, slopes = _places(sums.weights)
+    best = _settled(sums.best.parameters, lights, offset, slopes)
     return offset + slopes @ best.parameters if best.converged else np.full(len(offset), np.nan)
 
 
@@ -204,13 +204,13 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
     return best
 
 
-def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
     """Return the Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
-    variances, count = found.variances, found.variances.size
-    values, jacobian = _off(variances, found.weights, lights)
+    variances, count = sums.variances, sums.variances.size
+    values, jacobian = _off(variances, sums.weights, lights)
     whole, end = jacobian.T @ jacobian, 0
     levels = np.arange(count)
-    for number, (own, light) in enumerate(zip(found.weights, lights, strict=True)):
+    for number, (own, light) in enumerate(zip(sums.weights, lights, strict=True)):
         begin, end = end, end + light.energy.size
         pull = values[begin:end] * light.weight * light.whole / light.energy
         _, bent, more = (pull @ part for part in _shares(light.edges, variances))
@@ -218,7 +218,7 @@ def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
         whole[levels, levels] += more * own
         whole[levels, places] += bent
         whole[places, levels] += bent
-    slopes = found.slopes
+    slopes = sums.slopes
     curved: Floats = slopes.T @ whole @ slopes
     return curved
 
@@ -290,7 +290,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
-def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
+def shared_sum(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
     """Return variances (N,) and weights (lights, N) of unbounded parameters."""
     level, weights, _ = _of(parameters, lights)
     return np.exp(level), weights
@@ -332,7 +332,7 @@ def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
 
 
 def errors(
-    found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], fewer: Sequence[SumLight] | None
+    sums: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], fewer: Sequence[SumLight] | None
 ) -> dict[str, Floats | None]:
     """Return the errors (N + m N,) of variances [length^2] and weights [-], by the names that records have for them.
 
@@ -348,25 +348,25 @@ def errors(
     What was not fitted has NaN in each, and so has all where the fit failed.
     """
     is_traced = fewer is None
-    if not found.best.converged:
-        none = np.full(len(found.slopes), np.nan)
+    if not sums.best.converged:
+        none = np.full(len(sums.slopes), np.nan)
         return {name: None if name == NOT_OF[is_traced] else none for name in ERRORS}
-    own = np.concatenate([np.log(found.variances), found.weights.ravel()])
-    gain = _gain(found, lights)
+    own = np.concatenate([np.log(sums.variances), sums.weights.ravel()])
+    gain = _gain(sums, lights)
     noise = np.concatenate([light.noise for light in lights])
 
     def spread(covariance: Floats) -> Floats:
-        return np.sqrt(np.diag(found.slopes @ covariance @ found.slopes.T))
+        return np.sqrt(np.diag(sums.slopes @ covariance @ sums.slopes.T))
 
     by_name: dict[str, Floats | None] = {
         "statistical_error": spread((gain * noise**2) @ gain.T) if is_traced else None,
-        "discretisation_error": None if fewer is None else np.abs(refitted(found, fewer) - own),
-        "model_error": spread(_model(found, lights, media, gain)),
-        "misfit_error": spread(misfit_covariance(found.best)),
-        "jackknife_error": _jackknife(found, lights),
+        "discretisation_error": None if fewer is None else np.abs(refitted(sums, fewer) - own),
+        "model_error": spread(_model(sums, lights, media, gain)),
+        "misfit_error": spread(misfit_covariance(sums.best)),
+        "jackknife_error": _jackknife(sums, lights),
     }
     # From those of ln v to those of v.
-    unit = np.where(found.free, np.append(found.variances, np.ones(found.weights.size)), np.nan)
+    unit = np.where(sums.free, np.append(sums.variances, np.ones(sums.weights.size)), np.nan)
     return {name: None if one is None else one * unit for name, one in by_name.items()}
 
 

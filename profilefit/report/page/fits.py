@@ -42,10 +42,10 @@ def provenance(source: Source, page: str) -> Iterator[str]:
     yield paragraph(f"SHA-256 over all records of the folder: {digest(source.folder)}", "dim")
     yield paragraph("To make all of it again (measurements with the records have their own commands, beside them):")
     shown = shlex.join(["profilefit", "report", *(source.names or ()), "--fits", "fits", "--html", page])
-    yield command("\n".join([*again(contents, bool(source.names)), shown]))
+    yield command("\n".join([*remake_lines(contents, bool(source.names)), shown]))
 
 
-def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
+def remake_lines(contents: Mapping[str, Content], named: bool = True) -> list[str]:
     """Return the commands that make these records again, a line for each preset, seed and number of photons."""
     groups: dict[str, list[str]] = {}
     for name, one in contents.items():
@@ -134,6 +134,6 @@ def record_part(source: Source, name: str, figures: bool = True) -> str:
     drawings = "\n".join(drawn(plan, source) for plan in plans_of if plan.name != corner)
     draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
     commands = [draw] if any(plan.name == corner for plan in plans_of) else []
-    command_again = command("\n".join([*again({name: content}), *commands]))
+    command_again = command("\n".join([*remake_lines({name: content}), *commands]))
     title = element("b", escape(name)) + " " + element("span", escape(content["title"]), class_="dim")
     return details(title, element("div", tables + drawings + command_again, class_="record"), f"record-{name}")

@@ -73,76 +73,82 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
     return Group(*parts)
 
 
-def atlas_line(need: AtlasNeed) -> str:
+def atlas_line(answer: AtlasNeed) -> str:
     """Return whether a heart's scene needs an atlas."""
-    error, hidden = (significant(100 * one) for one in (need.error, need.hidden))
+    error, hidden = (significant(100 * one) for one in (answer.error, answer.hidden))
     misses = f"the screen by itself is wrong by {error} % of the light, by {hidden} % for what it does not see"
-    is_coarse = need.is_broken and need.verdict == "no atlas"
+    is_coarse = answer.is_broken and answer.verdict == "no atlas"
     advice = "; finer pixels would mend it" if is_coarse else ""
-    return f"{need.verdict}: {misses} (requested: {_percent(need.tolerance)} %){advice}"
+    return f"{answer.verdict}: {misses} (requested: {_percent(answer.tolerance)} %){advice}"
 
 
-def atlas_content(need: AtlasNeed) -> dict[str, Any]:
+def atlas_content(answer: AtlasNeed) -> dict[str, Any]:
     """Return the answer as data."""
-    return {"verdict": need.verdict, "error": need.error, "hidden": need.hidden, "tolerance": need.tolerance}
+    return {"verdict": answer.verdict, "error": answer.error, "hidden": answer.hidden, "tolerance": answer.tolerance}
 
 
-def sea_lines(need: SeaNeed) -> list[str]:
+def sea_lines(answer: SeaNeed) -> list[str]:
     """Return what a scene under the sea needs, a line each for terms, splat and steps, with the numbers."""
-    off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in need.haze.items())
-    folds = "light folds" if need.focus >= 1.0 else "no light folds"
-    ways = {"sunlight": (need.light_steps, need.light), "views": (need.view_steps, need.view)}
+    off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in answer.haze.items())
+    folds = "light folds" if answer.focus >= 1.0 else "no light folds"
+    ways = {"sunlight": (answer.light_steps, answer.light), "views": (answer.view_steps, answer.view)}
     steps = ", ".join(
         f"{name} {number or 'none, Newton alone'} (S {significant(steep)})" for name, (number, steep) in ways.items()
     )
     return [
-        f"terms: {need.terms}; off the broadened haze at worst: {off} (requested: {_percent(need.tolerance)} %)",
-        f"splat: {need.splat}; {folds} before the floor (F {significant(need.focus)})",
+        f"terms: {answer.terms}; off the broadened haze at worst: {off} (requested: {_percent(answer.tolerance)} %)",
+        f"splat: {answer.splat}; {folds} before the floor (F {significant(answer.focus)})",
         f"steps to a hit: {steps}",
     ]
 
 
-def sea_content(need: SeaNeed) -> dict[str, Any]:
+def sea_content(answer: SeaNeed) -> dict[str, Any]:
     """Return the answer as data."""
     return {
-        "terms": need.terms,
-        "haze": dict(need.haze),
-        "tolerance": need.tolerance,
-        "splat": need.splat,
-        "focus": need.focus,
-        "steps": {"light": need.light_steps, "view": need.view_steps},
-        "steepness": {"light": need.light, "view": need.view},
+        "terms": answer.terms,
+        "haze": dict(answer.haze),
+        "tolerance": answer.tolerance,
+        "splat": answer.splat,
+        "focus": answer.focus,
+        "steps": {"light": answer.light_steps, "view": answer.view_steps},
+        "steepness": {"light": answer.light, "view": answer.view},
     }
 
 
-def fur_lines(need: FurNeed) -> list[str]:
+def fur_lines(answer: FurNeed) -> list[str]:
     """Return how many layers fur needs, a line an angle, and the answer."""
     lines = []
-    for angle, layers in need.layers.items():
+    for angle, layers in answer.layers.items():
         counts = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
-        best = need.cheapest(angle)
+        best = answer.cheapest(angle)
         lines.append(f"{angle} degrees: {counts}; cheapest: {'none' if best is None else _plain(best.name)}")
-    requested = f"(requested: {_percent(need.tolerance)} % of the length)"
-    if need.way is None:
-        return [*lines, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {requested}"]
-    return [*lines, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {requested}"]
+    requested = f"(requested: {_percent(answer.tolerance)} % of the length)"
+    if answer.way is None:
+        return [
+            *lines,
+            f"no way is within the tolerance at {answer.angle} degrees, by {answer.most} layers {requested}",
+        ]
+    return [
+        *lines,
+        f"{_plain(answer.way.name)}, {answer.count} layers: the cheapest to {answer.angle} degrees {requested}",
+    ]
 
 
-def fur_content(need: FurNeed) -> dict[str, Any]:
+def fur_content(answer: FurNeed) -> dict[str, Any]:
     """Return the answer as data."""
     return {
-        "way": None if need.way is None else need.way.name,
-        "layers": need.count,
-        "angle": need.angle,
-        "tolerance": need.tolerance,
-        "most": need.most,
+        "way": None if answer.way is None else answer.way.name,
+        "layers": answer.count,
+        "angle": answer.angle,
+        "tolerance": answer.tolerance,
+        "most": answer.most,
         "by_angle": [
             {
                 "angle": angle,
                 "layers": dict(layers),
-                "cheapest": None if (best := need.cheapest(angle)) is None else best.name,
+                "cheapest": None if (best := answer.cheapest(angle)) is None else best.name,
             }
-            for angle, layers in need.layers.items()
+            for angle, layers in answer.layers.items()
         ],
     }
 

@@ -135,16 +135,16 @@ def _advice_table(result: MediumPosterior) -> RenderableType:
     return column_table("Most informative additional measurement", columns, caption, left)
 
 
-def described(one: Candidate, unit: str) -> str:
+def described(candidate: Candidate, unit: str) -> str:
     """Return a candidate in words."""
-    if one.kind == "point":
-        where = f"at r = {0.5 * (one.inner + one.outer):.3g} {unit}"
-        if one.outer > one.inner:
-            where = f"over the annulus from {one.inner:.3g} to {one.outer:.3g} {unit}"
-        return f"a value {where}, to {100 * one.error / one.value:.2g} %"
-    if one.kind == "reflectance":
+    if candidate.kind == "point":
+        where = f"at r = {0.5 * (candidate.inner + candidate.outer):.3g} {unit}"
+        if candidate.outer > candidate.inner:
+            where = f"over the annulus from {candidate.inner:.3g} to {candidate.outer:.3g} {unit}"
+        return f"a value {where}, to {100 * candidate.error / candidate.value:.2g} %"
+    if candidate.kind == "reflectance":
         return f"the total reflectance A, to {100 * REFERENCE_ERROR:g} %"
-    if one.kind == "scale":
+    if candidate.kind == "scale":
         return f"the scale, by a reference standard, to {100 * REFERENCE_ERROR:g} %"
     return f"the whole profile, {REPEATS} times"
 

@@ -75,10 +75,10 @@ def stack_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
     """Return the tables of these records of stacks for Markdown, by the names of their marks; none without records."""
     tables = {"stack-errors": _errors, "stack-constants": _constants} if paths else {}
 
-    def made(rows_of: Callable[[Stacks], Rows]) -> str:
+    def section(rows_of: Callable[[Stacks], Rows]) -> str:
         return markdown_table(*rows_of({name: read(path) for name, path in paths.items()}))
 
-    return {name: partial(made, rows_of) for name, rows_of in tables.items()}
+    return {name: partial(section, rows_of) for name, rows_of in tables.items()}
 
 
 def _table(title: str, table: Rows, caption: str) -> RenderableType:

@@ -43,7 +43,7 @@ def sum_tables(record: SumRecord) -> list[RenderableType]:
 def sum_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
     """Return the table of these records of sums for Markdown, by the name of its mark; none where there is none."""
 
-    def made() -> str:
+    def section() -> str:
         rows = [
             (name, light, *(significant(max(one["rel"])) for one in by_count), significant(max(of_six["alone"])))
             for name, record in ((name, load(path)) for name, path in paths.items())
@@ -53,7 +53,7 @@ def sum_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
         ]
         return markdown_table(("stack", "light", *map(str, COUNTS), f"{DEFAULT} each its own"), rows)
 
-    return {"stack-gaussians": made} if paths else {}
+    return {"stack-gaussians": section} if paths else {}
 
 
 def published(record: SumRecord) -> dict[str, list[dict[str, float]]]:

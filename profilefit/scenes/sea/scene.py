@@ -211,8 +211,8 @@ def _toward(tables: Tables, lit: Table, default: Rgb) -> Rgb:
 def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
     named: Any = water.get("phase", PHASE)
     if isinstance(named, str):
-        return tables.made("water", lambda: lobes_of(named))
-    tables.made("water", lambda: checked_lobes(named))
+        return tables.build("water", lambda: lobes_of(named))
+    tables.build("water", lambda: checked_lobes(named))
     return tuple((float(weight), float(g)) for weight, g in named)
 
 

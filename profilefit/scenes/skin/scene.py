@@ -153,9 +153,9 @@ def _technique(tables: Tables, named: Table, setting: Setting) -> tuple[str, Tec
     constants = tables.text("technique", "constants", named, "regenerated")
     light = tables.text("technique", "illumination", named, "diffuse", ILLUMINATIONS)
     try:
-        one = tables.made("technique", lambda: catalogue.load(law, constants, replace(setting, illumination=light)))
+        one = tables.build("technique", lambda: catalogue.load(law, constants, replace(setting, illumination=light)))
     except SettingError as error:
         if setting.n == 1.0:
             raise
         raise SettingError(f"{error}: write n = 1 at the top of the file, or name another law") from None
-    return f"{law}, {constants}", tables.made("technique", lambda: technique(one)), light
+    return f"{law}, {constants}", tables.build("technique", lambda: technique(one)), light

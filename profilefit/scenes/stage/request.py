@@ -149,7 +149,7 @@ def view(
     irradiance = tables.three("light", "irradiance", lamp, defaults.light.irradiance, 0.0, MOST_LIGHT)
     return {
         "file": tables.file,
-        "sampling": tables.made("technique", lambda: Sampling(named.get("samples", defaults.samples))),
+        "sampling": tables.build("technique", lambda: Sampling(named.get("samples", defaults.samples))),
         "chart": _chart(tables, named),
         "camera": camera(tables, seen),
         "light": Light(direction, irradiance),

@@ -128,7 +128,7 @@ class _Reader(Tables):
             "pixel": self.range(CHOOSE, "pixel", own, *LENGTHS) if "pixel" in own else (side, side),
             "radius": self.number(CHOOSE, "radius", own, math.inf),
             "tolerance": self.number("technique", "tolerance", named, TOLERANCE, most=1.0),
-            "within": self.made(CHOOSE, lambda: Within(mfp, pixels)),
+            "within": self.build(CHOOSE, lambda: Within(mfp, pixels)),
             "budget": Budget(
                 self.number(CHOOSE, "ms", own) if "ms" in own else None,
                 self.text(CHOOSE, "gpu", own, YARDSTICK, tuple(GPUS)),

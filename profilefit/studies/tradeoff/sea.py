@@ -62,13 +62,13 @@ def request() -> SeaRequest:
     return read(str(path), read_toml(path))
 
 
-def view(found: SeaRender, sizes: SeaSizes = FULL, track: Track = silent) -> Panel:
+def view(render: SeaRender, sizes: SeaSizes = FULL, track: Track = silent) -> Panel:
     """Return a picture by each law of the water's light, over pieces of a ray."""
-    errors = {(kind, one): found.judge.rmse(found.picture(kind, one)) for kind in KINDS for one in sizes.samples}
+    errors = {(kind, one): render.judge.rmse(render.picture(kind, one)) for kind in KINDS for one in sizes.samples}
     times: dict[tuple[str, int], list[float]] = {each: [] for each in errors}
     for _ in track(range(sizes.turns), "views"):
         for each in times:
-            times[each].append(found.time(*each))
+            times[each].append(render.time(*each))
     points = tuple(
         Point("view", kind, str(one), WithSpread.of(times[kind, one]), WithSpread.exactly(off), facts={"pieces": one})
         for (kind, one), off in errors.items()

@@ -19,7 +19,7 @@ def rings_of(law: MediumGaussians) -> SumLight:
 
 
 def sum_of(light: SumLight, best) -> MediumGaussians:
-    variances, (weights,) = gaussians.made(best.parameters)
+    variances, (weights,) = gaussians.shared_sum(best.parameters)
     return MediumGaussians(Setting(), light.whole, tuple(variances), tuple(weights))
 
 
@@ -27,7 +27,7 @@ def test_a_sum_is_found_again():
     known = MediumGaussians(Setting(), 0.4, (0.02, 0.5, 6.0), (0.3, 0.5, 0.2))
     light = rings_of(known)
     best = gaussians.fitted([light], 3)
-    variances, (weights,) = gaussians.made(best.parameters)
+    variances, (weights,) = gaussians.shared_sum(best.parameters)
     np.testing.assert_allclose(variances, known.variance, rtol=1e-4)
     np.testing.assert_allclose(weights, known.weight, rtol=1e-4)
     assert gaussians.fitted([light], 2).cost > 1e4 * best.cost  # two are not three

@@ -9,7 +9,7 @@ import pytest
 from mcml_sim import __version__
 from profilefit.errors import InputError, OutputError
 from profilefit.recipes import folder
-from profilefit.recipes.evidence import digest, made, processor, require_apart, stale
+from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
 
 FITS = folder.fits_folder()
 
@@ -25,7 +25,7 @@ def records(tmp_path) -> Path:
 
 
 def test_it_tells_command_version_date_machine_and_records(records):
-    told = made("profilefit check hazard", records)
+    told = measurement_origin("profilefit check hazard", records)
     assert list(told) == ["command", "version", "date", "machine", "sha256"]
     assert (told["command"], told["version"]) == ("profilefit check hazard", __version__)
     assert abs(datetime.now(UTC) - datetime.fromisoformat(told["date"])) < timedelta(minutes=1)
@@ -35,7 +35,7 @@ def test_it_tells_command_version_date_machine_and_records(records):
 
 
 def test_it_is_stale_once_a_record_changes_comes_or_goes_or_changes_its_name(records, tmp_path):
-    told = made("", records)
+    told = measurement_origin("", records)
     assert not stale(told, records)
     shutil.copytree(records, tmp_path / "copy")
     assert not stale(told, tmp_path / "copy"), "where they lie does not matter"
@@ -54,7 +54,7 @@ def test_it_is_stale_once_a_record_changes_comes_or_goes_or_changes_its_name(rec
 
 
 def test_it_is_stale_in_another_version_and_where_it_tells_nothing(records):
-    assert stale({**made("", records), "version": "0.0.1"}, records)
+    assert stale({**measurement_origin("", records), "version": "0.0.1"}, records)
     assert stale({}, records)
 
 
