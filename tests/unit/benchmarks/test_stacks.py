@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks import stacks
-from profilefit.scenes.layers import paper
+from benchmarks import stacks, zhao
 from profilefit.scenes.layers.law import single_scattering
 
 
@@ -29,14 +28,14 @@ def test_misprints_cost_and_corrections_converge():
 
     def error(corrections, samples):
         sums = [
-            paper.single_sum(medium, 0.7, 0.5, 1.0, samples, 6.0 * medium.layers[0].mfp, corrections)
+            zhao.single_sum(medium, 0.7, 0.5, 1.0, samples, 6.0 * medium.layers[0].mfp, corrections)
             for medium in media
         ]
         return float(np.sqrt(np.mean((np.array(sums) / exact - 1) ** 2)))
 
-    corrected = error(paper.CORRECTED, 16)
-    assert corrected < 0.1 < error(paper.CORRECTED, 4)
-    assert error(paper.PRINTED, 16) > 10
-    misprints = [name for name in paper.Corrections.switches() if name != "dipole_sign"]
-    errors = [error(replace(paper.CORRECTED, **{name: False}), 16) for name in misprints]
+    corrected = error(zhao.CORRECTED, 16)
+    assert corrected < 0.1 < error(zhao.CORRECTED, 4)
+    assert error(zhao.PRINTED, 16) > 10
+    misprints = [name for name in zhao.Corrections.switches() if name != "dipole_sign"]
+    errors = [error(replace(zhao.CORRECTED, **{name: False}), 16) for name in misprints]
     assert sum(one > 2 * corrected for one in errors) == 4  # all but those of the phase function, unseen at g = 0
