@@ -238,7 +238,6 @@ def sample(
     max_steps: int,
     kept: int,
     pilot: int = 0,
-    moves: Moves | None = None,
 ) -> Walk:
     """Sample a density by walkers in the straight coordinates of a ridge.
 
@@ -252,7 +251,6 @@ def sample(
         kept: how many draws to keep at most.
         pilot: steps of a first chain, whose spread makes the proposals of the one that counts: for a density that is
             like the ridge's only near its top.
-        moves: emcee's, with their weights; by default `default_moves` of the ridge or the pilot.
     """
 
     def straight_density(straight: Floats) -> Floats:
@@ -261,13 +259,13 @@ def sample(
 
     centre, covariance = along.moments
     start = np.random.default_rng(seed).multivariate_normal(centre, covariance, walkers)
-    if pilot and not moves:
+    if pilot:
         near = default_moves(centre, covariance)
         first = walk(straight_density, start, centre, seed, min(pilot, max_steps), pilot * walkers, near)
         start, seed = first.samples[-walkers:], seed + 1
         centre, covariance = first.samples.mean(axis=0), np.atleast_2d(np.cov(first.samples.T))
-    chosen, look = (moves, FIRST_LOOK) if moves else (default_moves(centre, covariance), LAPLACE_LOOK)
-    walked = walk(straight_density, start, centre, seed, max_steps, kept, chosen, look)
+    chosen = default_moves(centre, covariance)
+    walked = walk(straight_density, start, centre, seed, max_steps, kept, chosen, LAPLACE_LOOK)
     samples, volume = along.bent(walked.samples)
     return replace(walked, samples=samples, log_density=walked.log_density - volume)
 
@@ -357,9 +355,7 @@ class Posterior(Walk):
         return from_dict(groups, attrs=named, check_conventions=False)  # it warns of more chains than draws
 
 
-def posterior(
-    fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int = 20_000, moves: Moves | None = None
-) -> Posterior:
+def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int = 20_000) -> Posterior:
     """Sample the constants of a fit.
 
     Args:
@@ -368,7 +364,6 @@ def posterior(
         seed: of the walkers.
         max_steps: the longest that a chain may get. One that is not 50 autocorrelation times long then is returned with
             that result, not refused.
-        moves: emcee's, with their weights; by default `default_moves`, after a pilot.
     """
     require_own_process()
     if kind not in ("statistical", "misfit"):
@@ -391,7 +386,7 @@ def posterior(
             return np.concatenate([np.asarray(density(jnp.asarray(part))) for part in full])[: len(points)] + volume
 
     along = Ridge.normal(fit.solution.parameters, covariance)
-    chain = sample(log_density, along, walkers, seed, max_steps, KEPT, PILOT, moves)
+    chain = sample(log_density, along, walkers, seed, max_steps, KEPT, PILOT)
     return Posterior(**vars(chain), kind=kind, law=type(fit.law).__name__, objective=fit.objective, names=fit.free)
 
 

@@ -179,9 +179,6 @@ class LoadedLaw:
         return setting
 
 
-Named = LoadedLaw  # its former name, for code outside of this package
-
-
 def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
     """List profile laws with their constants; only those of the records `names`, where such are named.
 

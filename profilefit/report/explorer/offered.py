@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import Named, profile_laws
+from profilefit.recipes.catalogue import LoadedLaw, profile_laws
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.law_file import export
 
@@ -68,16 +68,16 @@ def first(laws: list[Offered]) -> str:
     return next((name for name in FIRST if name in there), there[0])
 
 
-def address(named: Named) -> str:
+def address(named: LoadedLaw) -> str:
     """Return the id of a law: its label, without what the address of a page may not hold."""
     return re.sub(r"[^\w.]+", "-", named.label)
 
 
-def _text(named: Named, records: Records) -> str:
+def _text(named: LoadedLaw, records: Records) -> str:
     return export(named, records, "glsl-es", PREFIX)
 
 
-def _refracting(named: Named, records: Records) -> Refracting | None:
+def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
     """Return the text of the record of the same law and light that holds for every index, if the folder has one."""
     of = profile_laws(records, matched=False) if named.records else []
     same = (one for one in of if one.name == named.name and one.setting == replace(named.setting, n=one.setting.n))
@@ -90,12 +90,12 @@ def _refracting(named: Named, records: Records) -> Refracting | None:
     return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])
 
 
-def _place(named: Named) -> int:
+def _place(named: LoadedLaw) -> int:
     kind = named.name.partition(":")[0]
     return ORDER.index(kind) if kind in ORDER else len(ORDER)
 
 
-def _label(named: Named) -> str:
+def _label(named: LoadedLaw) -> str:
     title = named.law.entry.title
     if not named.records:
         return f"{title}, {named.constants}" if named.constants else title

@@ -12,7 +12,7 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.measured.photo.workflow import Photo
-from profilefit.recipes.catalogue import Named, find
+from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.folder import fits_folder
 from profilefit.report.drawing import inline
 from profilefit.report.figures.photo_figures import RINGS, SPOT
@@ -35,7 +35,7 @@ SHADER = (
 )
 
 
-def diffuse_law(setting: Setting) -> Named:
+def diffuse_law(setting: Setting) -> LoadedLaw:
     """Return the law for diffuse light at a medium's n and g; SettingError where there is none."""
     try:
         return find("hazard-diffuse", fits_folder(), None, setting.n, setting.g)
@@ -43,7 +43,7 @@ def diffuse_law(setting: Setting) -> Named:
         raise SettingError(f"{error}; without --out the medium alone is measured") from None
 
 
-def medium_text(photo: Photo, law: Named) -> str:
+def medium_text(photo: Photo, law: LoadedLaw) -> str:
     """Return GLSL of a law for diffuse light, and after it albedo and mean free path by colour."""
     fits = list(photo.fits.values())
     values = {

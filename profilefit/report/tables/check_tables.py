@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
@@ -183,7 +183,7 @@ def _called(check: LawCheck | MapCheck) -> str:
     return f"map {name}" if isinstance(check, MapCheck) and not check.of.records else name
 
 
-def _at_index(named: Named) -> str:
+def _at_index(named: LoadedLaw) -> str:
     where = f", n = {named.setting.n:g}" if named.setting.n != 1.0 else ""
     return named.label + where + (f", g = {named.setting.g:g}" if named.setting.g else "")
 
@@ -212,5 +212,5 @@ def _result(check: LawCheck | MapCheck) -> str:
     return FAIL if check.broken else PASS
 
 
-def _setting(named: Named) -> tuple[str, str, str]:
+def _setting(named: LoadedLaw) -> tuple[str, str, str]:
     return named.setting.illumination, f"{named.setting.n:g}", f"{named.setting.g:g}"

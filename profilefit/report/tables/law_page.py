@@ -18,7 +18,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Text
-from profilefit.recipes.catalogue import Named, albedo_laws, all_profiles
+from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, all_profiles
 from profilefit.recipes.record import SPANS, Folder, Records, record_name, record_setting
 from profilefit.report.records import (
     SETS,
@@ -53,7 +53,7 @@ class Page:
 
     name: str
     title: str
-    members: tuple[Named, ...]
+    members: tuple[LoadedLaw, ...]
 
     @property
     def law_classes(self) -> tuple[type, ...]:
@@ -117,14 +117,14 @@ def _contents(folder: Folder) -> Mapping[str, Content]:
     return Records.of(folder).contents()
 
 
-def _grouped(members: Iterable[Named], key: Any) -> dict[str, list[Named]]:
-    groups: dict[str, list[Named]] = {}
+def _grouped(members: Iterable[LoadedLaw], key: Any) -> dict[str, list[LoadedLaw]]:
+    groups: dict[str, list[LoadedLaw]] = {}
     for one in members:
         groups.setdefault(key(one), []).append(one)
     return groups
 
 
-def _spans(named: Named) -> bool:
+def _spans(named: LoadedLaw) -> bool:
     """Return whether its constants hold for every index of a range."""
     n = named.law.entry.n
     return bool(named.records) and n.low < n.high
@@ -136,7 +136,7 @@ def _constructor(kind: type) -> str:
     return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
 
 
-def _row(page: Page, named: Named, contents: Mapping[str, Content]) -> Sequence[str]:
+def _row(page: Page, named: LoadedLaw, contents: Mapping[str, Content]) -> Sequence[str]:
     worst = _worst(named, contents)
     return (
         f"[{named.name}]({page.name}.md)",
@@ -148,12 +148,12 @@ def _row(page: Page, named: Named, contents: Mapping[str, Content]) -> Sequence[
     )
 
 
-def _surface(named: Named) -> str:
+def _surface(named: LoadedLaw) -> str:
     """Return n, or the indices that its constants span."""
     return str(named.law.entry.n) if _spans(named) else f"{named.setting.n:g}"
 
 
-def _worst(named: Named, contents: Mapping[str, Content]) -> dict[str, float]:
+def _worst(named: LoadedLaw, contents: Mapping[str, Content]) -> dict[str, float]:
     """Return the largest error of each measure, from its own records or one that measured the printed set."""
     if named.records:
         every = [contents[name] for name in named.records]  # where constants span indices, of every index
@@ -163,7 +163,7 @@ def _worst(named: Named, contents: Mapping[str, Content]) -> dict[str, float]:
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
 
 
-def _measured_sets(named: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
+def _measured_sets(named: LoadedLaw, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
     """Yield each record of the same law and light that measured this printed set, and the measures."""
     pipelines = ("albedo",) if isinstance(named.law, AlbedoLaw) else ("profile", "as-published", "inverse")
     which = named.constants if named.constants in SETS else SETS[0]  # records call the printed set of their light so
@@ -173,7 +173,7 @@ def _measured_sets(named: Named, contents: Mapping[str, Content]) -> Iterator[tu
             yield content, content["quality"][which]
 
 
-def _loading(named: Named) -> str:
+def _loading(named: LoadedLaw) -> str:
     """Return the lines by which Python and the shell get this law."""
     call = "albedo_law" if isinstance(named.law, AlbedoLaw) else "load"
     lines = [f"Light: {named.setting.illumination}, n = {named.setting.n:g}, g = {named.setting.g:g}."]
@@ -187,7 +187,7 @@ def _loading(named: Named) -> str:
     return "\n".join([*lines, "", "```", command, "```"] if command else lines)
 
 
-def _arguments(named: Named) -> list[str]:
+def _arguments(named: LoadedLaw) -> list[str]:
     """Return the arguments of `load` or `albedo_law`: name, and constants, record's path or setting."""
     name = f'"{named.name}"'
     if not named.records:
@@ -204,7 +204,7 @@ def _setting(setting: Setting) -> str:
     return f"Setting({', '.join(parts)})"
 
 
-def _export(named: Named) -> str:
+def _export(named: LoadedLaw) -> str:
     """Return the command that writes this law's shader source; none where it has none."""
     if not named.law.entry.has_text:
         return ""
@@ -230,7 +230,7 @@ def _shader(page: Page) -> str:
     return f"In a shader: {', '.join(files)}; names begin with {', '.join(prefixes)}."
 
 
-def _printed(named: Named, folder: Folder) -> str:
+def _printed(named: LoadedLaw, folder: Folder) -> str:
     """Return a printed set: its source, its constants and the errors that a record found for it."""
     own = named.law.entry.printed, named.constants
     printed = next((s for s in published.SETS if not named.records and (s.law, s.name) == own), None)

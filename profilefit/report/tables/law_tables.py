@@ -22,7 +22,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.laws.base import Sampler
-from profilefit.recipes.catalogue import Named, Names, albedo_laws, profile_laws, sampled_laws
+from profilefit.recipes.catalogue import LoadedLaw, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records
@@ -55,7 +55,7 @@ class MeasuredSampler:
                  one radius, the one meant
     """
 
-    of: Named
+    of: LoadedLaw
     name: str
     quality: SamplerQuality
     exact_error: Floats
@@ -68,24 +68,24 @@ def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Mea
 
 
 def for_each(
-    measure: Callable[[Named], Measured], laws: Sequence[Named], track: Track = untracked, title: str = ""
+    measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track = untracked, title: str = ""
 ) -> list[Measured]:
     """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(track(pool.map(measure, laws), title, len(laws)))
 
 
-def measured_profile(named: Named, alpha: ArrayLike = ALBEDOS) -> Quality:
+def measured_profile(named: LoadedLaw, alpha: ArrayLike = ALBEDOS) -> Quality:
     """Return the measures of a profile law at `alpha` (m,)."""
     return profile_quality(named.law, alpha)
 
 
-def measured_map(named: Named) -> AlbedoQuality:
+def measured_map(named: LoadedLaw) -> AlbedoQuality:
     """Return the measures of an A -> alpha map."""
     return albedo_quality(named.law)
 
 
-def measured_samplers(named: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
+def measured_samplers(named: LoadedLaw, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
     """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if named.law.entry.has_text else SLOW_ALBEDOS)
     samplers = []
@@ -160,8 +160,8 @@ NOTHING = "None of these records holds a law that can be measured against the ex
 class Qualities:
     """Measures of the laws of a folder, in the order in which they are shown."""
 
-    profiles: list[tuple[Named, Quality]]
-    maps: list[tuple[Named, AlbedoQuality]]
+    profiles: list[tuple[LoadedLaw, Quality]]
+    maps: list[tuple[LoadedLaw, AlbedoQuality]]
     samplers: list[MeasuredSampler]
 
 
@@ -219,7 +219,7 @@ def content(qualities: Qualities) -> dict[str, Any]:
     }
 
 
-def _whose(named: Named) -> dict[str, Any]:
+def _whose(named: LoadedLaw) -> dict[str, Any]:
     return {"law": named.name, "constants": named.constants, "records": list(named.records), "setting": named.setting}
 
 
@@ -242,7 +242,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder), **claims}
 
 
-def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
+def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
     """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
     header = (
         "law",
@@ -270,7 +270,7 @@ def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
     return markdown_table(header, rows)
 
 
-def _home(named: Named) -> tuple[str, str, str, str]:
+def _home(named: LoadedLaw) -> tuple[str, str, str, str]:
     """Return law, constants, light, n."""
     return named.name, named.constants or "none", named.setting.illumination, f"{named.setting.n:g}"
 
@@ -293,7 +293,7 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
 
 
-def _map_table(measured: Sequence[tuple[Named, AlbedoQuality]]) -> RenderableType:
+def _map_table(measured: Sequence[tuple[LoadedLaw, AlbedoQuality]]) -> RenderableType:
     maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
     columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
     columns["n"] = [f"{one.setting.n:g}" for one in maps]

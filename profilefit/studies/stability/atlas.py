@@ -12,7 +12,7 @@ from profilefit.errors import InputError
 from profilefit.laws import MAPS
 from profilefit.laws.entry import EVERYWHERE
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check import validity
 from profilefit.studies.stability import (
@@ -83,7 +83,7 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
     albedos = catalogue.albedo_laws(records, matched=False)
 
-    def chosen(named: Named, label: str) -> bool:
+    def chosen(named: LoadedLaw, label: str) -> bool:
         return bool({label, named.name, *named.records} & set(requested)) if requested else not quick or label in QUICK
 
     todo: list[Job] = []
@@ -120,7 +120,7 @@ def run(todo: list[Job]) -> Iterator[Findings]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _of_law(named: Named, folder: Records, quick: bool, more: tuple[str, ...]) -> Findings:
+def _of_law(named: LoadedLaw, folder: Records, quick: bool, more: tuple[str, ...]) -> Findings:
     limits = law_cells.limits_of(named, folder)
     arithmetics = QUICK_ARITHMETICS if quick else law_cells.COMPUTED
     text = map_cells.in_reduced(named)
@@ -131,7 +131,7 @@ def _of_law(named: Named, folder: Records, quick: bool, more: tuple[str, ...]) -
     return _findings(named.label, cells)
 
 
-def _of_map(named: Named, folder: Records, quick: bool) -> Findings:
+def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Findings:
     text = map_cells.in_reduced(named)
     cells = [*map_cells.cells_of(named, folder), *misuse.of_map(text)]
     if named.label in DERIVED_MAPS and not quick:

@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability.cells import Cells, judged_cells
 from profilefit.studies.stability.layout import (
@@ -62,7 +62,7 @@ MAPS: dict[str, Function] = {
 }
 
 
-def of_law(named: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
+def of_law(named: LoadedLaw, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
     """Yield the derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
     alpha = ArgumentAxis("α", "-", np.array(ALPHA))
     for name in names:
@@ -76,7 +76,7 @@ def of_law(named: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells
             yield _cells(named.label, named.law.entry.own, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
 
 
-def of_map(named: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
+def of_map(named: LoadedLaw, spans: tuple[Range, Range]) -> Iterator[Cells]:
     """Yield the derivatives of both directions of a map."""
     ways = ((ALPHA_OF, "A", REFLECTANCE), (REFLECTANCE_OF, "α", ALPHA))
     for (name, symbol, values), span in zip(ways, spans, strict=True):

@@ -22,7 +22,7 @@ from profilefit.fitting import quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
@@ -83,7 +83,7 @@ OF_MODELS = {
 }
 
 
-def advice_of(named: Named, arithmetic: str) -> str:
+def advice_of(named: LoadedLaw, arithmetic: str) -> str:
     """Return what helps where a law is red; that of the arithmetic, an empty text, where it is no law's own."""
     if arithmetic == MODEL:
         return OF_MODELS.get(named.name.partition(":")[0], "")
@@ -103,7 +103,7 @@ class Limits:
         return max(own, HALF_BOUND) if dtype is np.float16 else own
 
 
-def limits_of(named: Named, folder: Folder) -> Limits:
+def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
     """Return a tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
     model = MEASURED.get(named.name) or bounds.of_profile(named, folder).values
     rel, ks = model.get("rel"), model.get("ks")
@@ -113,13 +113,13 @@ def limits_of(named: Named, folder: Folder) -> Limits:
     return Limits(known, validity.of_profile(named, folder))
 
 
-def cells_of(named: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
+def cells_of(named: LoadedLaw, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
     """Yield all quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
         yield from computed(named, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
-def computed(named: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
+def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
     """Yield all quantities of a law in one arithmetic on a grid."""
     nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else dense_grid.LEAST_X
     stored = arithmetic == STORED16
@@ -317,7 +317,7 @@ INVERSE, ENERGY = "g, not clipped (19)", "energy (17)"
 ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
 
 
-def model_cells(named: Named, limits: Limits) -> Iterator[Cells]:
+def model_cells(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
     """Yield R_d, cdf and radii against the exact profile of a law's setting; and what only Liang et al.'s laws have."""
     if named.setting.is_solved:
         yield from _against_exact(named, limits)
@@ -326,7 +326,7 @@ def model_cells(named: Named, limits: Limits) -> Iterator[Cells]:
         yield own_energy(named, limits)
 
 
-def _against_exact(named: Named, limits: Limits) -> Iterator[Cells]:
+def _against_exact(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
     alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
     law, setting = named.law.in_reduced(), named.setting
@@ -357,7 +357,7 @@ def _holds(span: validity.Range | None, alpha: Floats) -> Mask:
     return span.holds(alpha) if span else np.zeros(alpha.shape, bool)
 
 
-def unclipped(named: Named, limits: Limits) -> Cells:
+def unclipped(named: LoadedLaw, limits: Limits) -> Cells:
     """Return g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
     axes = (
         ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
@@ -384,7 +384,7 @@ def unclipped(named: Named, limits: Limits) -> Cells:
     return replace(cells, reference=value)
 
 
-def own_energy(named: Named, limits: Limits) -> Cells:
+def own_energy(named: LoadedLaw, limits: Limits) -> Cells:
     """Return cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
     alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
     with np.errstate(all="ignore"):

@@ -16,7 +16,7 @@ from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
@@ -59,7 +59,7 @@ OF_MAPS = (
 UNSTATED = "no record states the error of this direction"
 
 
-def cells_of(named: Named, folder: Folder) -> Iterator[Cells]:
+def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
     text, model, spans = in_reduced(named), bounds.of_map(named, folder), validity.of_map(named, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
@@ -71,12 +71,12 @@ def cells_of(named: Named, folder: Folder) -> Iterator[Cells]:
         yield from _against_exact(named, *spans, model)
 
 
-def in_reduced(named: Named) -> Named:
+def in_reduced(named: LoadedLaw) -> LoadedLaw:
     """Return a law as a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
     return replace(named, law=named.law.in_reduced())
 
 
-def _computed(named: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
+def _computed(named: LoadedLaw, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
     dtype = DTYPES[arithmetic]
     axis = layout.reflectance(dtype) if name == ALPHA_OF else layout.alpha(dtype)
     value, reference = _value(named.law, name, arithmetic, axis), _reference(named.law, name, axis)
@@ -85,7 +85,7 @@ def _computed(named: Named, name: str, arithmetic: str, limit: float, span: Rang
 
 
 def _cells(
-    named: Named,
+    named: LoadedLaw,
     name: str,
     arithmetic: str,
     axis: ArgumentAxis,
@@ -104,7 +104,7 @@ def _cells(
     )  # fmt: skip
 
 
-def map_label(named: Named) -> str:
+def map_label(named: LoadedLaw) -> str:
     """Return the label of a map, apart from the law of its name."""
     return named.label if named.records else f"map {named.label}"
 
@@ -124,7 +124,7 @@ def _reference(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
     return np.asarray(RoundedText(law, EXTENDED).call(WAYS[name][1], axis.values), float)
 
 
-def _kept_in_half(named: Named, span: Range) -> Iterator[Cells]:
+def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
     """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
     axis = layout.alpha(np.float32)
     text, reference = RoundedText(named.law, np.float32), _reference(named.law, REFLECTANCE_OF, axis)
@@ -135,7 +135,9 @@ def _kept_in_half(named: Named, span: Range) -> Iterator[Cells]:
         yield _cells(named, name, STORED16, axis, value, reference, HALF_BOUND, span)
 
 
-def _against_exact(named: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
+def _against_exact(
+    named: LoadedLaw, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError
+) -> Iterator[Cells]:
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = ArgumentAxis("α", "-", 1.0 - root**2)

@@ -11,7 +11,7 @@ from mcml_sim import exact
 from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.recipes.catalogue import Named
+from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability.cells import Cells, RoundedText, Verdict
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
@@ -40,7 +40,7 @@ ORDINARY = {"r": 1.0, "xi": 0.5, "alpha": 0.5, "mfp": 1.0}
 CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in Python does: a shader refuses nothing"
 
 
-def of_law(named: Named) -> Iterator[Cells]:
+def of_law(named: LoadedLaw) -> Iterator[Cells]:
     """Yield each function of a profile law, in Python and by its shader source."""
     law: ProfileLaw = named.law
     functions = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
@@ -51,7 +51,7 @@ def of_law(named: Named) -> Iterator[Cells]:
         yield _clamped(named.label, law.entry.own, name, cases, text)
 
 
-def of_map(named: Named) -> Iterator[Cells]:
+def of_map(named: LoadedLaw) -> Iterator[Cells]:
     """Yield both directions of a map."""
     law: AlbedoLaw = named.law
     for name, symbol, key, call in (

@@ -28,8 +28,7 @@ def test_misprints_cost_and_corrections_converge():
 
     def error(corrections, samples):
         sums = [
-            zhao.single_sum(medium, 0.7, 0.5, 1.0, samples, 6.0 * medium.layers[0].mfp, corrections)
-            for medium in media
+            zhao.single_sum(medium, 0.7, 0.5, 1.0, samples, 6.0 * medium.layers[0].mfp, corrections) for medium in media
         ]
         return float(np.sqrt(np.mean((np.array(sums) / exact - 1) ** 2)))
 
