@@ -136,7 +136,7 @@ def photo(
 
 def _figures(answer: Photo, out: Path) -> int:
     with interruptible(__name__):
-        from profilefit.report.figures.photo_figures import rings_figure, spot_figure
+        from profilefit.report.figures.fit_figures import rings_figure, spot_figure
 
     return len([*spot_figure(answer, out), *rings_figure(answer, out)])
 

@@ -15,7 +15,7 @@ from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.folder import fits_folder
 from profilefit.report.drawing import inline
-from profilefit.report.figures.photo_figures import RINGS, SPOT
+from profilefit.report.figures.fit_figures import RINGS, SPOT
 from profilefit.report.page.document import document
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.tables.photo_tables import photo_lines, photo_tables
