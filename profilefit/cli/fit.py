@@ -226,7 +226,7 @@ def _fit_phase(
         from profilefit.recipes.kinds.phase import content, fits_of, request
         from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.phases.fit import ALL_ANGLES
-        from profilefit.report.tables.phase_table import phase_tables, premise_lines
+        from profilefit.report.kinds import phase_tables, premise_lines
 
     accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}
     options.require_left_out(context, (name for name in context.params if name not in accepted), f"--kind is {PHASE}")

@@ -74,22 +74,16 @@ def measures(content: Content, measure: str) -> bool:
     return measure in (content.get("quality") or {}).get("regenerated", {})
 
 
-def index_words(content: Content) -> str:
-    """Return the refractive index that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
-    span = content.get("indices")
-    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['n']:g}"
+def index_words(content: Content, name: str = "n") -> str:
+    """Return the n, or g, that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
+    span = content.get(SPANS[name])
+    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting'][name]:g}"
 
 
 def at_index(content: Content) -> str:
     """Return for a title the index, and g, at which a record that spans several is reported; nothing for others."""
     spanned = [name for name, span in SPANS.items() if content.get(span)]
     return "".join(f", {name} = {content['setting'][name]:g}" for name in spanned)
-
-
-def cosine_words(content: Content) -> str:
-    """Return the mean cosine that a record is of, or those that its constants span: "0", "(0, 0.95]"."""
-    span = content.get("cosines")
-    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['g']:g}"
 
 
 def by_index(content: Content) -> Mapping[str, list[float]]:

@@ -16,8 +16,8 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS
 from profilefit.recipes.kinds.gaussians import COUNTS, SumRecord, load
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, VERMILION, canvas, legend_below, plain_log, save, styled
+from profilefit.report.kinds import published
 from profilefit.report.records import Source
-from profilefit.report.tables.sum_table import published
 
 NAME = "gaussians-of-stacks"
 LOOKS = {"red": (VERMILION, "o"), "green": (GREEN, "s"), "blue": (BLUE, "^")}  # never by colour alone

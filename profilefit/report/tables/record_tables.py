@@ -5,7 +5,9 @@ Cells are `Text`, so that units in brackets are no markup. Every table fits 80 c
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from math import inf, log
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -13,14 +15,14 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
-from profilefit.recipes.kinds.stack import PIPELINE as STACK
+from profilefit.recipes.paper.table1 import NORMALIZED_DIFFUSION
+from profilefit.recipes.record import SPANS
 from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
     TOTAL,
     Content,
     at_index,
     converged,
-    cosine_words,
     index_words,
     known_errors,
     largest_error,
@@ -35,9 +37,7 @@ from profilefit.report.tables.cells import (
     significant,
     to_error,
 )
-from profilefit.report.tables.evidence_tables import evidence_tables
 from profilefit.report.tables.quality_tables import quality_tables, spark_table
-from profilefit.report.tables.stack_table import stack_tables
 from profilefit.report.tables.summary_tables import summary, truth
 
 __all__ = ["constants_table", "record_tables", "summary"]
@@ -55,26 +55,25 @@ DERIVED = {
     "reflectance": ("A", "Total reflectance"),
 }
 TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
+LIMITS = ("energy_limit", "source_limit")  # of a profile, that weigh in its fit
 KINDS = {"statistical": "photon noise", "misfit": "misfit as noise"}
 
 
 def record_tables(content: Content) -> list[RenderableType]:
     """Return everything about one record: where it comes from, constants, the state of fit and chains, quality."""
     if content["pipeline"] == "evidence":
-        return _spaced([_title(content), *evidence_tables(content)])
-    if content["pipeline"] == STACK:
-        return _spaced([_title(content), *stack_tables(content)])
-    parts = [_title(content), constants_table(content), intervals_table(content)]
+        return spaced([title_of(content), *evidence_tables(content)])
+    parts = [title_of(content), constants_table(content), _intervals_table(content)]
     if "derived" in content:
-        parts.append(derived_table(content["derived"], at_index(content)))
+        parts.append(_derived_table(content["derived"], at_index(content)))
     parts.append(fit_facts(content))
     if "stages" in content:
         parts += stage_tables(content["stages"])
-    parts += [*spark_table(content), *quality_tables(content)]
-    return _spaced(parts)
+    return spaced([*parts, *spark_table(content), *quality_tables(content)])
 
 
-def _spaced(parts: list[RenderableType]) -> list[RenderableType]:
+def spaced(parts: Sequence[RenderableType]) -> list[RenderableType]:
+    """Return the parts with a blank line below each."""
     return [Padding(part, (0, 0, 1, 0)) for part in parts]
 
 
@@ -83,12 +82,13 @@ def constants_table(content: Content) -> RenderableType:
     constants = content["constants"]
     rows = list(constants.values())
     columns: dict[str, list[str]] = {}
-    if any(row.get("published") is not None for row in rows):
-        columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")])
+    published = [row.get("published") for row in rows]
+    if any(v is not None for v in published):
+        columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in published])
     columns["\nregenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
     known = known_errors(constants)
     for place, (key, word) in enumerate(known.items()):
-        texts = on_the_point([significant(value) for value in _each(rows, key)])
+        texts = on_the_point([significant(row.get(key)) for row in rows])
         if place == 0:
             texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
         columns[f"±\n{word}"] = texts
@@ -104,7 +104,7 @@ def constants_table(content: Content) -> RenderableType:
     return column_table(title, {"": list(constants), **columns}, caption)
 
 
-def intervals_table(content: Content) -> RenderableType:
+def _intervals_table(content: Content) -> RenderableType:
     """Return the 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
     chains = content["posterior"]
     if not chains:
@@ -117,7 +117,7 @@ def intervals_table(content: Content) -> RenderableType:
     return row_table("Credible intervals (emcee)", ("", "from", "68 %", "95 %"), rows, left=("", "from"))
 
 
-def derived_table(derived: Content, surface: str = "") -> RenderableType:
+def _derived_table(derived: Content, surface: str = "") -> RenderableType:
     """Return A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
     errors = derived["statistical"], derived["model"]
     both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
@@ -210,17 +210,14 @@ def stage_tables(stages: Content) -> list[RenderableType]:
     return [row_table(title, header, rows, aligned=header[1:]), _facts("", states)]
 
 
-def _title(content: Content) -> RenderableType:
-    head = Text.assemble((content["name"], "bold"), "  ", content["title"])
-    return Group(head, Padding(_facts("", _provenance(content)), (0, 0, 0, 2)))
-
-
-def _provenance(content: Content) -> list[Line]:
-    setting = content["setting"]
+def title_of(content: Content) -> RenderableType:
+    """Return name and title of a record, and below them what it was fitted to, and how."""
+    setting, protocol = content["setting"], content.get("protocol") or {}
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
-    surface = f"every n in {index_words(content)}" if content.get("indices") else f"n = {setting['n']:g}"
-    g = f"every g in {cosine_words(content)}" if content.get("cosines") else f"g = {setting['g']:g}"
-    light = f"{setting['illumination']}{beam}, {surface}, {g}"
+    light = f"{setting['illumination']}{beam}"
+    for name, span in SPANS.items():
+        is_in = f"every {name} in" if content.get(span) else f"{name} ="
+        light += f", {is_in} {index_words(content, name)}"
     if content.get("indices"):
         light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
     lines: list[Line] = [
@@ -228,41 +225,29 @@ def _provenance(content: Content) -> list[Line]:
         ("setting", light),
         ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
-    protocol = content.get("protocol") or {}
-    if protocol.get("albedos"):
-        a = protocol["albedos"]
+    if a := protocol.get("albedos"):
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
-    if protocol.get("indices"):
-        lines.append(("indices", ", ".join(f"{n:g}" for n in protocol["indices"])))
-    if protocol.get("cosines"):
-        lines.append(("g", ", ".join(f"{g:g}" for g in protocol["cosines"]) + "; albedos and radii are reduced"))
-    if protocol.get("rings"):
-        lines.append(("bins", _rings(protocol["rings"])))
-    if protocol.get("weighting"):
-        lines.append(("weighting", _weighting(protocol["weighting"])))
-    if protocol.get("held"):
-        lines.append(("held", ", ".join(protocol["held"])))
-    if content.get("note"):
-        lines.append(("note", content["note"]))
-    return lines
-
-
-def _rings(rings: Content) -> str:
-    if rings.get("dr"):
-        text = f"even, {rings['dr']:g} wide, to {rings['last']:g}"
-    else:
-        text = f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
-    trim = rings.get("trim", "none")
-    return text if trim == "none" else f"{text}; trimmed by (6) on {trim}, ε = {rings['epsilon']:g}"
-
-
-def _weighting(weighting: Content) -> str:
-    extras = [
-        f"{key.replace('_', ' ')} × {weighting[key]:g}" for key in ("energy_limit", "source_limit") if weighting[key]
-    ]
-    if weighting.get("shares"):
-        extras.append(f"{weighting['shares']} shares up to {weighting['last_share']:g}")
-    return "; ".join([f"objective {weighting['objective']}", *extras])
+    if indices := protocol.get("indices"):
+        lines.append(("indices", ", ".join(f"{n:g}" for n in indices)))
+    if cosines := protocol.get("cosines"):
+        lines.append(("g", ", ".join(f"{g:g}" for g in cosines) + "; albedos and radii are reduced"))
+    if rings := protocol.get("rings"):
+        even = f"even, {rings['dr']:g} wide, to {rings['last']:g}" if rings.get("dr") else ""
+        text = even or f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
+        if (trim := rings.get("trim", "none")) != "none":
+            text += f"; trimmed by (6) on {trim}, ε = {rings['epsilon']:g}"
+        lines.append(("bins", text))
+    if weighting := protocol.get("weighting"):
+        extras = [f"{key.replace('_', ' ')} × {weighting[key]:g}" for key in LIMITS if weighting[key]]
+        if weighting.get("shares"):
+            extras.append(f"{weighting['shares']} shares up to {weighting['last_share']:g}")
+        lines.append(("weighting", "; ".join([f"objective {weighting['objective']}", *extras])))
+    if held := protocol.get("held"):
+        lines.append(("held", ", ".join(held)))
+    if note := content.get("note"):
+        lines.append(("note", note))
+    head = Text.assemble((content["name"], "bold"), "  ", content["title"])
+    return Group(head, Padding(_facts("", lines), (0, 0, 0, 2)))
 
 
 def _verdict(result: str) -> Text:
@@ -280,5 +265,88 @@ def _facts(title: str, lines: Iterable[Line]) -> RenderableType:
     return table
 
 
-def _each(rows: list[Content], key: str) -> list[float | None]:
-    return [row.get(key) for row in rows]
+BEST = 3  # readings shown of each equation, nearest to print first
+
+
+def evidence_tables(content: Content) -> list[RenderableType]:
+    """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
+    parts = [_readings(equation, readings) for equation, readings in _by(content["readings"], "equation").items()]
+    if content["table1"]:
+        parts.append(_table1(content["table1"]))
+    if halves := content.get("halves"):
+        columns = {
+            "material": [f"{row.get('material', ABSENT)}, {row.get('model', '')}" for row in halves],
+            "off": [_share(row.get("off")) for row in halves],
+        }
+        title = "Table 1 as printed: mean of its halves over its whole, less 1"
+        parts.append(column_table(title, columns, left=("material",)))
+    return parts or [Text("This record holds no readings.")]
+
+
+def _readings(equation: str, readings: list[Content]) -> RenderableType:
+    best = sorted(readings, key=lambda one: inf if one["curve_distance"] is None else one["curve_distance"])[:BEST]
+    columns = {
+        "verdict": [one["verdict"] for one in best],
+        "curve": [_share(one["curve_distance"]) for one in best],
+        "constants": [_share(one["constant_distance"]) for one in best],
+        "reading, its constants, its evidence": [_summary(one) for one in best],
+    }
+    more = len(readings) - len(best)
+    caption = f"and {more} more in the record, further from print" if more else ""
+    title = f"{equation}: rms distance of the curve and largest distance of a constant from print"
+    return column_table(title, columns, caption, left=("verdict",), fold=("reading, its constants, its evidence",))
+
+
+def _summary(reading: Content) -> str:
+    printed = reading["published"]
+    pairs = ", ".join(
+        f"{name} {value:.4g}" + (f" (printed {printed[name]:g})" if name in printed else "")
+        for name, value in reading["constants"].items()
+    )
+    return "\n".join(part for part in (reading["choices"], pairs, reading.get("evidence")) if part)
+
+
+def _table1(rows: list[Content]) -> RenderableType:
+    """Return every model of each material, at the channel and range that the other law's printed error points to."""
+    shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
+    ranges = [f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT for row in shown]
+    columns = {
+        "material": [
+            f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {size}"
+            for row, size in zip(shown, ranges, strict=True)
+        ],
+        "model": [row.get("model", ABSENT) for row in shown],
+    }
+    for place, part in enumerate(("near half", "far half", "all")):
+        columns[part] = [significant(ratio[place], 3) if place < len(ratio) else ABSENT for ratio in map(_ratio, shown)]
+    caption = (
+        f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
+        "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
+    )
+    return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model",))
+
+
+def _at_its_range(rows: list[Content]) -> list[Content]:
+    known = [row for row in rows if row.get("model") == NORMALIZED_DIFFUSION]
+    if not known:
+        return rows
+    best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf)
+    return [
+        row for row in rows if all(row.get(key) == best.get(key) for key in ("channel", "range_choice", "range_mm"))
+    ]
+
+
+def _ratio(row: Content) -> list[float]:
+    return list(row.get("mse_over_printed", ()))
+
+
+def _share(value: float | None) -> str:
+    return ABSENT if value is None else f"{100 * value:.1f} %"
+
+
+def _by(rows: Iterable[Content], key: str) -> dict[Any, list[Content]]:
+    """Return rows by the values of a key, in order."""
+    groups: dict[Any, list[Content]] = {}
+    for row in rows:
+        groups.setdefault(row.get(key, ABSENT), []).append(row)
+    return groups

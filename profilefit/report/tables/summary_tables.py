@@ -14,7 +14,6 @@ from profilefit.recipes.regenerate import Reproduction
 from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
 from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant, span, spark
-from profilefit.report.tables.evidence_tables import evidence_line
 from profilefit.report.tables.quality_tables import values_of, worst_measures
 
 SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
@@ -36,14 +35,14 @@ CAPTION = (
 def summary(records: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
-    kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    shown = [make(group) for make, group in kinds.items() if group]
+    groups = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
+    shown = [part for make, group in groups.items() if group for part in (make(group), Text())]
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
         if "fit" in content and not converged(content)
     ]
-    return Group(*_spaced(shown), *failures, Text(CAPTION, style="dim"))
+    return Group(*shown, *failures, Text(CAPTION, style="dim"))
 
 
 def outcome(path: Path) -> dict[str, Any]:
@@ -63,7 +62,8 @@ def reproduced(
     """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
     rows = []
     for name, spent in seconds.items():
-        one, result = reproductions.get(name), _result(record.read(paths[name])) if name in paths else ""
+        one, content = reproductions.get(name), record.read(paths[name]) if name in paths else {"fit": {"result": ""}}
+        result = content["fit"]["result"] if "fit" in content else f"{len(content.get('readings', []))} readings"
         numbers = (one.moved, one.relative, one.intervals) if one else ()
         cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
         rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
@@ -77,16 +77,16 @@ def verdict(reproductions: Sequence[Reproduction]) -> str:
     return f"{count} of {len(reproductions)} records reproduced; largest move {moved:.1g} of a stated error"
 
 
-def _result(content: Content) -> str:
-    return str(content["fit"]["result"]) if "fit" in content else f"{len(content.get('readings', []))} readings"
+def photons_text(content: Content) -> str:
+    """Return how many photons a record was fitted to; – where its light is exact."""
+    photons = (content.get("truth") or {}).get("photons")
+    return ABSENT if photons is None else f"{photons:.3g}".replace("e+0", "e")
 
 
 def truth(content: Content) -> str:
     """Return what a record was fitted to: the exact solution, or so many photons."""
-    source = content.get("truth") or {}
-    if source.get("photons") is None:
-        return str(source.get("kind", ABSENT))
-    return f"{source['photons']:.3g}".replace("e+0", "e") + " photons"
+    text = photons_text(content)
+    return f"{text} photons" if text != ABSENT else str((content.get("truth") or {}).get("kind", ABSENT))
 
 
 def _laws(records: Records) -> RenderableType:
@@ -118,22 +118,23 @@ def _maps(records: Records) -> RenderableType:
 
 
 def _readings(records: Records) -> RenderableType:
-    columns = {"record": list(records), "found": [evidence_line(one).replace("\n", ", ") for one in records.values()]}
+    lines = []
+    for content in records.values():
+        verdicts = [(one["equation"], one["verdict"]) for one in content["readings"]]
+        good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
+        lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
+    columns = {"record": list(records), "found": lines}
     return column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found"))
 
 
 def _first(records: Records) -> dict[str, list[str]]:
     return {
         "record": list(records),
-        "n": [_indices(content) for content in records.values()],
+        "n": [
+            f"≤ {span[1]:g}" if (span := one.get("indices")) else f"{one['setting']['n']:g}" for one in records.values()
+        ],
         "photons": [truth(content).removesuffix(" photons") for content in records.values()],
     }
-
-
-def _indices(content: Content) -> str:
-    """Return n, or the largest where the constants hold for every n above 1 up to it."""
-    span = content.get("indices")
-    return f"≤ {span[1]:g}" if span else f"{content['setting']['n']:g}"
 
 
 def _course(content: Content, measure: str, last: bool = False) -> str:
@@ -143,10 +144,6 @@ def _course(content: Content, measure: str, last: bool = False) -> str:
     if not converged(content):
         shown.append(FAILED)
     return shown[-1] if last else " → ".join(shown)
-
-
-def _spaced(tables: list[RenderableType]) -> list[RenderableType]:
-    return [part for table in tables for part in (table, Text())]
 
 
 def _kind(content: Content) -> Callable[[Records], RenderableType]:

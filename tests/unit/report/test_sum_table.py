@@ -17,7 +17,7 @@ from profilefit.recipes.stack.gaussians import constant_names
 from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source, largest_error
-from profilefit.report.tables.sum_table import published, sum_sections, sum_tables
+from profilefit.report.kinds import published, sum_sections, sum_tables
 from profilefit.scenes.skin.law import D_EON
 from tests.unit.report.test_tables import rendered
 
