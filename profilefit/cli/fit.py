@@ -255,7 +255,7 @@ def _fit_layers(
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.measured.layers import fit_layers
-        from profilefit.report.tables.layers_fit_tables import layers_content, layers_lines, layers_tables
+        from profilefit.report.tables.fit_tables import layers_content, layers_lines, layers_tables
 
     medium = _medium(file, measured.unit)
     if out is not None:

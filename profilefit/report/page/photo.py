@@ -18,7 +18,7 @@ from profilefit.report.drawing import inline
 from profilefit.report.figures.fit_figures import RINGS, SPOT
 from profilefit.report.page.document import document
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
-from profilefit.report.tables.photo_tables import photo_lines, photo_tables
+from profilefit.report.tables.fit_tables import photo_lines, photo_tables
 from profilefit.shader.law_file import export_medium
 
 MOST_DRAWING = 2**24  # bytes

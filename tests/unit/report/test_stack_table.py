@@ -9,9 +9,9 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds.stack import interfaces, read
 from profilefit.recipes.schema import ERRORS
+from profilefit.report.kinds import stack_tables
 from profilefit.report.records import largest_error
 from profilefit.report.tables.record_tables import record_tables
-from profilefit.report.kinds import stack_tables
 from tests.unit.report.test_tables import rendered
 
 CONTENTS = {name: read(path) for name, path in record.available(fits_folder() / STACKS).items()}
