@@ -276,7 +276,7 @@ def _fitted(content: Content) -> str:
 def _constants(content: Content) -> str:
     if not converged(content):
         return f"No constants: {content['fit']['result']}."
-    errors = known_errors(content["constants"])
+    errors = known_errors(content["constants"].values())
     has_printed = any(value.get("published") is not None for value in content["constants"].values())
     header = ["constant", "regenerated", *(f"± {word}" for word in errors.values())]
     rows = [[name, *_with_errors(value, list(errors))] for name, value in content["constants"].items()]

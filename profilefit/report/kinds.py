@@ -23,7 +23,7 @@ from profilefit.recipes.kinds import Kind, gaussians, phase, stack
 from profilefit.recipes.phases.fit import BANDS
 from profilefit.recipes.pipelines import read
 from profilefit.recipes.stack.gaussians import constant_names, quality
-from profilefit.report.records import Content, largest_error, numbered_errors
+from profilefit.report.records import Content, known_errors, largest_error
 from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.law_tables import markdown_sections
 from profilefit.report.tables.markdown import markdown_table, sections
@@ -89,7 +89,7 @@ def stack_tables(content: Content) -> list[RenderableType]:
     }
     for key in ("mu_a", "mu_s"):
         columns[f"{key} [1/{unit}]"] = [" ".join(f"{each:g}" for each in one[key]) for one in layers]
-    meaning = _meaning(numbered_errors(content["constants"].values()), OF_STACK)
+    meaning = _meaning(known_errors(content["constants"].values(), numbered=True), OF_STACK)
     tables = {
         "Errors at thicknesses of an interface's upper layer that were not fitted": (_stack_errors(of), OF_THICKNESS),
         "Constants of each colour and interface, none with a unit": (_stack_constants(of), meaning),
@@ -117,7 +117,7 @@ def _stack_errors(stacks: Mapping[str, Content]) -> Rows:
 
 
 def _stack_constants(stacks: Mapping[str, Content]) -> Rows:
-    known = numbered_errors(one for content in stacks.values() for one in content["constants"].values())
+    known = known_errors((one for of in stacks.values() for one in of["constants"].values()), numbered=True)
     rows = [
         (name, channel, str(number), constant, *_value_and_errors(of[f"{channel}.{number}.{constant}"], known))
         for name, content in stacks.items()
@@ -174,7 +174,7 @@ def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
     header, caption = ("light", "N", *CHANNELS, "rms", "ks", "alone"), OF_NUMBER + (PUBLISHED if others else "")
     light, unit = sums.content["setting"]["illumination"], sums.content["unit"]
     of = {name: sums.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
-    known = numbered_errors(of.values())
+    known = known_errors(of.values(), numbered=True)
     constants = [
         (name if "." in name else f"{name} [{unit}^2]", *_value_and_errors(one, known)) for name, one in of.items()
     ]
@@ -234,7 +234,7 @@ def phase_tables(content: Content) -> list[RenderableType]:
     title = f"{own}; mean cosine {data['mean_cosine']:.4f}, backscattered {data['backscattered']:.5f}"
     header = ("form", "moments", "rms", *OF_BANDS, "cosine", "back", "result")
     rows = [(*_measures(form, how, one), one["result"]) for form, how, one in _each(content)]
-    known = numbered_errors(content["constants"].values())
+    known = known_errors(content["constants"].values(), numbered=True)
     constants = [(*place, *_value_and_errors(one, known)) for place, one in _phase_constants(content)]
     names = ("form", "moments", "constant", "value", *known.values())
     meaning = _meaning(known, OF_PHASE)

@@ -53,15 +53,14 @@ def z_score(constant: Content) -> float | None:
     return (published - constant["regenerated"]) / error if error and published is not None else None
 
 
-def known_errors(constants: Content) -> dict[str, str]:
-    """Return those of `ERRORS` that a record's constants, by name, have."""
-    return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
-
-
-def numbered_errors(constants: Iterable[Content]) -> dict[str, str]:
-    """Return those of `ERRORS` that any constant has a number for: exact light has none of photons."""
+def known_errors(constants: Iterable[Content], numbered: bool = False) -> dict[str, str]:
+    """Return those of `ERRORS` that any constant has, or `numbered`, has a number for: exact light has no photons."""
     every = list(constants)
-    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in every)}
+    return {
+        key: word
+        for key, word in ERRORS.items()
+        if any(one.get(key) is not None if numbered else key in one for one in every)
+    }
 
 
 def measured_sets(content: Content) -> list[str]:
@@ -186,11 +185,7 @@ def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
 
 
 @cache
-def _exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int) -> tuple[Floats, Floats]:
-    r = np.geomspace(low, high, count)
-    return r, np.asarray(exact.profile(r, alpha, setting=setting))
-
-
 def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
     """Return radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
-    return _exact_profile(float(alpha), setting, float(low), float(high), count)
+    r = np.geomspace(low, high, count)
+    return r, np.asarray(exact.profile(r, alpha, setting=setting))

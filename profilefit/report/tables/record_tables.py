@@ -86,7 +86,7 @@ def constants_table(content: Content) -> RenderableType:
     if any(v is not None for v in published):
         columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in published])
     columns["\nregenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
-    known = known_errors(constants)
+    known = known_errors(constants.values())
     for place, (key, word) in enumerate(known.items()):
         texts = on_the_point([significant(row.get(key)) for row in rows])
         if place == 0:
