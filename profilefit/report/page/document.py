@@ -28,7 +28,7 @@ from profilefit.report.page.sections import (
     whole_figure,
 )
 from profilefit.report.records import Source
-from profilefit.report.tables.summary_tables import summary
+from profilefit.report.tables.record_tables import summary
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"

@@ -19,16 +19,22 @@ from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons
 from profilefit.report.drawing import address, checked, inline
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import PAPER, Plan, plans, record_plans
-from profilefit.report.figures.sum_figure import NAME as OF_SUMS
-from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
+from profilefit.report.figures.record_figures import (
+    OF_SUMS,
+    PAPER,
+    Plan,
+    plans,
+    record_plans,
+    sum_caption,
+    sum_figure,
+    sums_of,
+)
 from profilefit.report.kinds import stack_table, sum_tables
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Content, Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
-from profilefit.report.tables.record_tables import record_tables
-from profilefit.report.tables.summary_tables import photons_text
+from profilefit.report.tables.record_tables import photons_text, record_tables
 from profilefit.report.tables.tradeoff_tables import with_spread
 from profilefit.studies.stability.cells import Verdict
 

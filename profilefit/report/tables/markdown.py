@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -116,13 +116,13 @@ def sections(records: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
     paper = {name: c for name, c in records.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
     tables = {
-        "short": _short_quality(records),
-        "quality": _profile_quality(paper),
+        "short": _short(records),
+        "quality": _quality(_measured(paper, "rel"), PROFILE_MEASURES),
         "constants": markdown_constants(paper),
         "hazard": _hazard(records),
         "readings": _readings(records),
-        "inversion": _inversion_quality(records),
-        "maps": _albedo_quality(records),
+        "inversion": _quality(_measured(records, "inversion_error"), ("inversion_error",)),
+        "maps": _maps(records),
     }
     return {name: text for name, text in tables.items() if text}
 
@@ -137,45 +137,31 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def _table_of(
-    records: Mapping[str, Content], needed: str, header: Iterable[str], cells: Callable[[Content], Iterable[str]]
-) -> str:
-    """Return a row for each set of constants that a measure is known of; nothing where there is none."""
-    rows = [(owner, which, *cells(values)) for owner, which, values in _measured(records, needed)]
-    return markdown_table(("record", "constants", *header), rows) if rows else ""
-
-
-def _profile_quality(records: Mapping[str, Content]) -> str:
-    header = (f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst"))
-    return _table_of(
-        records, "rel", header, lambda of: [t for key in PROFILE_MEASURES for t in _mean_and_worst(key, of.get(key))]
-    )
-
-
-def _short_quality(records: Mapping[str, Content]) -> str:
-    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
-    searchlight = {name: c for name, c in records.items() if _is_searchlight(c, spanning=True)}
-    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+def _quality(sets: Sequence[tuple[str, str, Content]], measures: Sequence[str], of: str = "record") -> str:
+    """Return a row for each set of constants: mean and worst over alpha of these measures; nothing without a set."""
+    header = (of, "constants", *(f"{key.replace('_', ' ')} {end}" for key in measures for end in ("mean", "worst")))
     rows = [
-        (
-            owner + at_index(records.get(owner, {})),
-            which,
-            *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])),
-        )
-        for owner, which, values in sorted(chosen, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+        (owner, which, *(text for key in measures for text in _mean_and_worst(key, values.get(key))))
+        for owner, which, values in sets
     ]
-    header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
 
 
-def _inversion_quality(records: Mapping[str, Content]) -> str:
-    key, header = "inversion_error", ("inversion error mean", "inversion error worst")
-    return _table_of(records, key, header, lambda of: _mean_and_worst(key, of[key]))
+def _short(records: Mapping[str, Content]) -> str:
+    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
+    searchlight = {name: c for name, c in records.items() if _is_searchlight(c, spanning=True)}
+    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+    return _quality([(one + at_index(records.get(one, {})), *rest) for one, *rest in chosen], ("rel", "ks"), "law")
 
 
-def _albedo_quality(records: Mapping[str, Content]) -> str:
-    header = (MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP)
-    return _table_of(records, "delta_A", header, lambda of: (albedo_number(name, of[name]) for name in OF_MAP))
+def _maps(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
+    rows = [
+        (owner, which, *(albedo_number(name, values[name]) for name in OF_MAP))
+        for owner, which, values in _measured(records, "delta_A")
+    ]
+    return markdown_table(header, rows) if rows else ""
 
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:

@@ -5,9 +5,10 @@ Cells are `Text`, so that units in brackets are no markup. Every table fits 80 c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf, log
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -15,10 +16,13 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.recipes import record
 from profilefit.recipes.paper.table1 import NORMALIZED_DIFFUSION
 from profilefit.recipes.record import SPANS
+from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
+    SETS,
     TOTAL,
     Content,
     at_index,
@@ -26,6 +30,7 @@ from profilefit.report.records import (
     index_words,
     known_errors,
     largest_error,
+    measures,
     z_score,
 )
 from profilefit.report.tables.cells import (
@@ -35,12 +40,14 @@ from profilefit.report.tables.cells import (
     on_the_point,
     row_table,
     significant,
+    span,
+    spark,
     to_error,
 )
-from profilefit.report.tables.quality_tables import quality_tables, spark_table
-from profilefit.report.tables.summary_tables import summary, truth
+from profilefit.report.tables.quality_tables import quality_tables, spark_table, values_of, worst_measures
 
-__all__ = ["constants_table", "record_tables", "summary"]
+if TYPE_CHECKING:
+    from profilefit.recipes.regenerate import Reproduction
 
 Line = tuple[str, RenderableType]
 MEANING_OF_ERROR = {
@@ -215,8 +222,8 @@ def title_of(content: Content) -> RenderableType:
     setting, protocol = content["setting"], content.get("protocol") or {}
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
     light = f"{setting['illumination']}{beam}"
-    for name, span in SPANS.items():
-        is_in = f"every {name} in" if content.get(span) else f"{name} ="
+    for name, ranges in SPANS.items():
+        is_in = f"every {name} in" if content.get(ranges) else f"{name} ="
         light += f", {is_in} {index_words(content, name)}"
     if content.get("indices"):
         light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
@@ -270,7 +277,7 @@ BEST = 3  # readings shown of each equation, nearest to print first
 
 def evidence_tables(content: Content) -> list[RenderableType]:
     """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
-    parts = [_readings(equation, readings) for equation, readings in _by(content["readings"], "equation").items()]
+    parts = [_readings_of(equation, readings) for equation, readings in _by(content["readings"], "equation").items()]
     if content["table1"]:
         parts.append(_table1(content["table1"]))
     if halves := content.get("halves"):
@@ -283,13 +290,13 @@ def evidence_tables(content: Content) -> list[RenderableType]:
     return parts or [Text("This record holds no readings.")]
 
 
-def _readings(equation: str, readings: list[Content]) -> RenderableType:
+def _readings_of(equation: str, readings: list[Content]) -> RenderableType:
     best = sorted(readings, key=lambda one: inf if one["curve_distance"] is None else one["curve_distance"])[:BEST]
     columns = {
         "verdict": [one["verdict"] for one in best],
         "curve": [_share(one["curve_distance"]) for one in best],
         "constants": [_share(one["constant_distance"]) for one in best],
-        "reading, its constants, its evidence": [_summary(one) for one in best],
+        "reading, its constants, its evidence": [_reading(one) for one in best],
     }
     more = len(readings) - len(best)
     caption = f"and {more} more in the record, further from print" if more else ""
@@ -297,7 +304,7 @@ def _readings(equation: str, readings: list[Content]) -> RenderableType:
     return column_table(title, columns, caption, left=("verdict",), fold=("reading, its constants, its evidence",))
 
 
-def _summary(reading: Content) -> str:
+def _reading(reading: Content) -> str:
     printed = reading["published"]
     pairs = ", ".join(
         f"{name} {value:.4g}" + (f" (printed {printed[name]:g})" if name in printed else "")
@@ -350,3 +357,144 @@ def _by(rows: Iterable[Content], key: str) -> dict[Any, list[Content]]:
     for row in rows:
         groups.setdefault(row.get(key, ABSENT), []).append(row)
     return groups
+
+
+# All records on one screen: a line each, what was fitted to what, and its worst error before and after.
+
+SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
+FAILED = "FAILED"
+Records = Mapping[str, Content]
+REPRODUCED = "Records made, and the largest moves of their constants from the shipped records"
+REPRODUCED_CAPTION = (
+    "moved: in units of the constant's stated error; at most 0.05 counts as reproduced. relative: as a "
+    "share of the constant. interval: largest move of an interval's end, in units of what the Monte Carlo error of the "
+    f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
+)
+CAPTION = (
+    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
+    "regenerated. "
+    "`profilefit report NAME` has constants, errors and quality by α."
+)
+
+
+def summary(records: Records) -> RenderableType:
+    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+    tables = (_laws, _inverses, _maps, _readings)
+    groups = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
+    shown = [part for make, group in groups.items() if group for part in (make(group), Text())]
+    failures = [
+        Text(f"{name}: {content['fit']['result']}", style="red")
+        for name, content in records.items()
+        if "fit" in content and not converged(content)
+    ]
+    return Group(*shown, *failures, Text(CAPTION, style="dim"))
+
+
+def outcome(path: Path) -> dict[str, Any]:
+    """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
+    content = record.read(path)
+    body: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
+    if "fit" not in content:
+        return {**body, "readings": len(content.get("readings", []))}
+    kept = ("published", "regenerated", *ERRORS)
+    constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
+    return {**body, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
+
+
+def reproduced(
+    seconds: Mapping[str, float], paths: Mapping[str, Path], reproductions: Mapping[str, Reproduction | None]
+) -> RenderableType:
+    """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
+    rows = []
+    for name, spent in seconds.items():
+        one, content = reproductions.get(name), record.read(paths[name]) if name in paths else {"fit": {"result": ""}}
+        result = content["fit"]["result"] if "fit" in content else f"{len(content.get('readings', []))} readings"
+        numbers = (one.moved, one.relative, one.intervals) if one else ()
+        cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
+        rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
+    headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
+    return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
+
+
+def verdict(reproductions: Sequence[Reproduction]) -> str:
+    """Return one line: how many records are reproduced, and the largest move of a constant."""
+    count, moved = sum(one.is_reproduced for one in reproductions), max(one.moved for one in reproductions)
+    return f"{count} of {len(reproductions)} records reproduced; largest move {moved:.1g} of a stated error"
+
+
+def photons_text(content: Content) -> str:
+    """Return how many photons a record was fitted to; – where its light is exact."""
+    photons = (content.get("truth") or {}).get("photons")
+    return ABSENT if photons is None else f"{photons:.3g}".replace("e+0", "e")
+
+
+def truth(content: Content) -> str:
+    """Return what a record was fitted to: the exact solution, or so many photons."""
+    text = photons_text(content)
+    return f"{text} photons" if text != ABSENT else str((content.get("truth") or {}).get("kind", ABSENT))
+
+
+def _laws(records: Records) -> RenderableType:
+    title = "Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)"
+    return _errors(title, records, "rel", ("ks",))
+
+
+def _inverses(records: Records) -> RenderableType:
+    return _errors("Inverse cdfs: max |cdf(r(ξ)) − ξ|", records, "inversion_error")
+
+
+def _errors(title: str, records: Records, measure: str, more: Sequence[str] = ()) -> RenderableType:
+    """Return a line a record: the worst of a measure, set by set, and how it goes over α."""
+    rows = {name: values_of(content["quality"]["regenerated"], measure) or [] for name, content in records.items()}
+    ends = span(rows.values())
+    header = measure.replace("inversion_error", "error")
+    columns = _first(records)
+    columns[header] = [_course(content, measure) for content in records.values()]
+    columns |= {key: [_course(content, key).rpartition(" → ")[2] for content in records.values()] for key in more}
+    columns["over α"] = [spark(row, ends, SPARK) for row in rows.values()]
+    return column_table(title, columns, left=("record", "over α"))
+
+
+def _maps(records: Records) -> RenderableType:
+    columns = _first(records)
+    columns["max error of A"] = [_course(content, "delta_A") for content in records.values()]
+    columns["of √(1 − α)"] = [_course(content, "largest_s") for content in records.values()]
+    return column_table("Maps between A and α", columns, left=("record",))
+
+
+def _readings(records: Records) -> RenderableType:
+    lines = []
+    for content in records.values():
+        verdicts = [(one["equation"], one["verdict"]) for one in content["readings"]]
+        good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
+        lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
+    columns = {"record": list(records), "found": lines}
+    return column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found"))
+
+
+def _first(records: Records) -> dict[str, list[str]]:
+    spans = [content.get("indices") for content in records.values()]
+    numbers = [f"{content['setting']['n']:g}" for content in records.values()]
+    return {
+        "record": list(records),
+        "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
+        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
+    }
+
+
+def _course(content: Content, measure: str) -> str:
+    """Return the worst error of each set in turn; a failed fit has no law to measure."""
+    worst = worst_measures(content).get(measure, {})
+    shown = [significant(worst[name]) for name in SETS if name in worst]
+    if not converged(content):
+        shown.append(FAILED)
+    return " → ".join(shown)
+
+
+def _kind(content: Content) -> Callable[[Records], RenderableType]:
+    """Return the table that a record stands in."""
+    if content["pipeline"] == "evidence":
+        return _readings
+    if measures(content, "delta_A"):
+        return _maps
+    return _laws if measures(content, "rel") else _inverses

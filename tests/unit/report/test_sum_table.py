@@ -14,7 +14,7 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.stack.gaussians import constant_names
-from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
+from profilefit.report.figures.record_figures import sum_caption, sum_figure, sums_of
 from profilefit.report.kinds import published, sum_sections, sum_tables
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source, largest_error
