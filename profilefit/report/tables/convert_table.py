@@ -110,11 +110,16 @@ def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
 
 def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     rows = [_typed(engine, medium, unit, n) for engine in ENGINES]
+    in_unit = []
+    for engine in ENGINES:
+        field = engine.unit or (f"{unit} scene" if unit else "scene unit")
+        scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
+        in_unit.append(f"{'1/' if engine.power < 0 else ''}{field}{scale}")
     columns = {
         "": [engine.title for engine in ENGINES],
         "colour": [_colours(row["colour"]) for row in rows],
         "length": [" ".join(_cell(value, DIGITS - 1) for value in row["length"]) for row in rows],
-        "in": [_where(engine, unit) for engine in ENGINES],
+        "in": in_unit,
         "renders A": [_colours(row["renders"], COLOUR_PLACES - 1, "") for row in rows],
     }
     caption = [
@@ -130,12 +135,6 @@ def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     if not unit:
         caption += ["No unit was given: convert lengths from yours to the one of the row."]
     return column_table("What to type", columns, "\n".join(caption), ("", "in"))
-
-
-def _where(engine: Engine, unit: str) -> str:
-    field = engine.unit or (f"{unit} scene" if unit else "scene unit")
-    scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
-    return f"{'1/' if engine.power < 0 else ''}{field}{scale}"
 
 
 def _described(engine: Engine) -> str:

@@ -5,7 +5,7 @@ Cells are `Text`, so that units in brackets are no markup. Every table fits 80 c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -377,17 +377,57 @@ CAPTION = (
 )
 
 
+# Measure that a kind of records has, by which one knows them -> title, and measures by their headers.
+SUMMARIES = {
+    "rel": ("Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)", {"rel": "rel"}),
+    "inversion_error": ("Inverse cdfs: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
+    "delta_A": ("Maps between A and α", {"max error of A": "delta_A", "of √(1 − α)": "largest_s"}),
+}
+
+
 def summary(records: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
-    tables = (_laws, _inverses, _maps, _readings)
-    groups = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    shown = [part for make, group in groups.items() if group for part in (make(group), Text())]
+    groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
+    readings = {name: content for name, content in records.items() if content["pipeline"] == "evidence"}
+    for name, content in records.items():
+        if name not in readings:
+            is_of = (measure for measure in ("delta_A", "rel") if measures(content, measure))
+            groups[next(is_of, "inversion_error")][name] = content
+    shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
+    if readings:
+        lines = []
+        for content in readings.values():
+            verdicts = [(one["equation"], one["verdict"]) for one in content["readings"]]
+            good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
+            lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
+        columns = {"record": list(readings), "found": lines}
+        shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
         if "fit" in content and not converged(content)
     ]
-    return Group(*shown, *failures, Text(CAPTION, style="dim"))
+    parts = [part for table in shown for part in (table, Text())]
+    return Group(*parts, *failures, Text(CAPTION, style="dim"))
+
+
+def _summary_table(measure: str, records: Records) -> RenderableType:
+    """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
+    title, headers = SUMMARIES[measure]
+    spans = [content.get("indices") for content in records.values()]
+    numbers = [f"{content['setting']['n']:g}" for content in records.values()]
+    columns = {
+        "record": list(records),
+        "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
+        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
+        **{header: [_course(content, key) for content in records.values()] for header, key in headers.items()},
+    }
+    if measure == "rel":
+        columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in records.values()]
+    if measure != "delta_A":
+        rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in records.values()]
+        columns["over α"] = [spark(row, span(rows), SPARK) for row in rows]
+    return column_table(title, columns, left=("record", "over α"))
 
 
 def outcome(path: Path) -> dict[str, Any]:
@@ -434,54 +474,6 @@ def truth(content: Content) -> str:
     return f"{text} photons" if text != ABSENT else str((content.get("truth") or {}).get("kind", ABSENT))
 
 
-def _laws(records: Records) -> RenderableType:
-    title = "Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)"
-    return _errors(title, records, "rel", ("ks",))
-
-
-def _inverses(records: Records) -> RenderableType:
-    return _errors("Inverse cdfs: max |cdf(r(ξ)) − ξ|", records, "inversion_error")
-
-
-def _errors(title: str, records: Records, measure: str, more: Sequence[str] = ()) -> RenderableType:
-    """Return a line a record: the worst of a measure, set by set, and how it goes over α."""
-    rows = {name: values_of(content["quality"]["regenerated"], measure) or [] for name, content in records.items()}
-    ends = span(rows.values())
-    header = measure.replace("inversion_error", "error")
-    columns = _first(records)
-    columns[header] = [_course(content, measure) for content in records.values()]
-    columns |= {key: [_course(content, key).rpartition(" → ")[2] for content in records.values()] for key in more}
-    columns["over α"] = [spark(row, ends, SPARK) for row in rows.values()]
-    return column_table(title, columns, left=("record", "over α"))
-
-
-def _maps(records: Records) -> RenderableType:
-    columns = _first(records)
-    columns["max error of A"] = [_course(content, "delta_A") for content in records.values()]
-    columns["of √(1 − α)"] = [_course(content, "largest_s") for content in records.values()]
-    return column_table("Maps between A and α", columns, left=("record",))
-
-
-def _readings(records: Records) -> RenderableType:
-    lines = []
-    for content in records.values():
-        verdicts = [(one["equation"], one["verdict"]) for one in content["readings"]]
-        good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
-        lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
-    columns = {"record": list(records), "found": lines}
-    return column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found"))
-
-
-def _first(records: Records) -> dict[str, list[str]]:
-    spans = [content.get("indices") for content in records.values()]
-    numbers = [f"{content['setting']['n']:g}" for content in records.values()]
-    return {
-        "record": list(records),
-        "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
-        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
-    }
-
-
 def _course(content: Content, measure: str) -> str:
     """Return the worst error of each set in turn; a failed fit has no law to measure."""
     worst = worst_measures(content).get(measure, {})
@@ -489,12 +481,3 @@ def _course(content: Content, measure: str) -> str:
     if not converged(content):
         shown.append(FAILED)
     return " → ".join(shown)
-
-
-def _kind(content: Content) -> Callable[[Records], RenderableType]:
-    """Return the table that a record stands in."""
-    if content["pipeline"] == "evidence":
-        return _readings
-    if measures(content, "delta_A"):
-        return _maps
-    return _laws if measures(content, "rel") else _inverses

@@ -64,7 +64,7 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
         groups.setdefault((not region.verdict.is_red, region.advice), []).append(region)
     rows = sorted(groups.items(), key=lambda item: (item[0][0], -len({one.subject for one in item[1]})))
     columns = {
-        "of": [_among(list(dict.fromkeys(one.subject for one in group))) for _, group in rows],
+        "of": [_among({one.subject for one in group}) for _, group in rows],
         "cells": [str(sum(one.count for one in group)) for _, group in rows],
         "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
         "what helps": [advice or BARE for (_, advice), _ in rows],
@@ -74,10 +74,9 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
     return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
 
 
-def _among(distinct: Sequence[str]) -> str:
-    if len(distinct) > 1:
-        return f"{len(distinct)} of them"
-    return distinct[0] if len(distinct[0]) <= LONGEST_NAME else distinct[0][: LONGEST_NAME - 1].rstrip() + "…"
+def _among(subjects: set[str]) -> str:
+    name = next(iter(subjects)) if len(subjects) == 1 else f"{len(subjects)} of them"
+    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def region_table(part: Findings, most: int = 20) -> RenderableType:
