@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache, cached_property
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import jax
@@ -16,7 +16,7 @@ from mcml_sim import exact
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
@@ -136,17 +136,17 @@ class Fitted:
 class Source(Records):
     """Records with their arrays and the laws that they make."""
 
-    @cached_property
-    def _fitted(self) -> dict[str, Fitted]:
-        return {}
+    _fitted: dict[str, Fitted] = field(default_factory=dict, repr=False, compare=False)
 
     def fitted(self, name: str) -> Fitted | None:
         """Return a record and its law; None if the folder has none of that name. RecordError if it is damaged."""
         if name not in self.paths:
             return None
         if name not in self._fitted:
-            content = self.content(name)
-            self._fitted[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
+            content, path = self.content(name), self.paths[name]
+            load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
+            of = content["law"], str(path), record_setting(content), self
+            self._fitted[name] = Fitted(content, record.read_arrays(path), load(*of))
         return self._fitted[name]
 
     def needed(self, name: str) -> Fitted:
@@ -164,11 +164,6 @@ class Source(Records):
     def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
         """Return a profile law with printed constants, normalised as the records here are."""
         return catalogue.load(law, constants, setting, self)
-
-    def _law(self, name: str, content: dict[str, Any]) -> ProfileLaw | AlbedoLaw:
-        setting, path = record_setting(content), str(self.paths[name])
-        load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
-        return load(content["law"], path, setting, self)
 
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,7 +69,6 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     data = fit.errors(fit.statistical) if result.identified else {}
     law = fit.errors(fit.of_law) if fit.rel is not None and result.identified else {}
     moving = result.identified
-    truth = known_medium(fit.data)
     ends = {name: any(result.ends(name)) for name in result.moving}
     marks = {name: (EDGE if ends[name] else ABSENT) if name in ends else HELD for name in names}
     columns = {
@@ -86,10 +85,12 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
     whole = bool(result.whole_draws)
-    columns["95 %"] = [
-        _ends(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
-        for name in names
-    ]
+    columns["95 %"] = []
+    for name in names:
+        within = result.whole_interval(name) if whole else result.interval(name)
+        low, high = within or (None, None)
+        is_wide = low is not None and high is not None and 0 < WIDE * low < high
+        columns["95 %"].append(ANYTHING if is_wide else interval(within, 1.0 if name in SHARES else None))
     caption += "; 95 %: interval by " + (
         "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
     )
@@ -100,26 +101,19 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     columns["unit"] = [unit_of(name, fit.data.unit) for name in names]
     if fit.spec.law.setting.g:
         caption += "; alpha is the reduced albedo, l = 1 / (mu_s' + mu_a)"
-    if truth:
+    if truth := known_medium(fit.data):
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
         caption += "; of file: its layer that scatters most, with scattering reduced by 1 - g"
     return column_table(title, columns, caption, left=("", "unit"))
-
-
-def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
-    """Return an interval, or in words that it says nothing."""
-    low, high = ends or (None, None)
-    wide = low is not None and high is not None and low > 0 and high > WIDE * low
-    return ANYTHING if wide else interval(ends, most)
 
 
 def _correlation_table(result: MediumPosterior) -> RenderableType:
     names = result.identified
     joint = correlation(result.fit.gradients, result.fit.statistical, names)
     columns = {"": list(names)}
-    for at, name in enumerate(names):
+    for at, name in enumerate(names[:-1]):
         columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
-    return column_table("Correlations", {k: v for k, v in columns.items() if k != names[-1]})
+    return column_table("Correlations", columns)
 
 
 def _advice_table(result: MediumPosterior) -> RenderableType:
