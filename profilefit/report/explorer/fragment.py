@@ -202,15 +202,13 @@ def _profiles(profile: Axes, cdf: Axes, law: ProfileLaw) -> None:
 
 
 def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
-    """Draw a line (channels, n) of the law for each channel, the exact one dashed on it."""
+    """Draw a line (channels, n) of the law for each channel, the exact one dashed on it, and its initial on both.
+
+    The initial stands where the line is farthest from the others.
+    """
     for name, colour, by_law, true in zip(CHANNELS, COLOURS, law, truth, strict=True):
         ax.plot(x, by_law, color=colour, linewidth=2.2, label=name)
         ax.plot(x, true, color=BLACK, linestyle="--", linewidth=0.9)
-    _letters(ax, x, law)
-
-
-def _letters(ax: Axes, x: Floats, law: Floats) -> None:
-    """Draw the initial of each channel on its line, where it is farthest from the others."""
     ends = x.size // 12  # beside the frame
     for c, name in enumerate(CHANNELS):
         apart = np.min(np.abs(np.delete(law, c, axis=0) - law[c]), axis=0)

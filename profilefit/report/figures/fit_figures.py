@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
@@ -81,7 +79,18 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
     grid = corner_grid(figure, samples, BINS)
     for row in range(size):
         for column in range(row + 1):
-            _dressed(grid[row, column], row, column)
+            ax = grid[row, column]  # few numbers, none with an offset that the reader must add
+            ax.grid(False)
+            for axis in (ax.xaxis, ax.yaxis)[: 1 + (column < row)]:
+                axis.set_major_locator(MaxNLocator(3, prune="both"))
+                axis.set_major_formatter(ScalarFormatter(useOffset=False))
+            for text in ax.get_xticklabels():
+                text.set_rotation(45)
+            ax.tick_params(labelsize=7, length=2, pad=2)
+            if 0 < column != row:
+                ax.set_yticklabels([])
+            if row < size - 1:
+                ax.set_xticklabels([])
     for at, one in enumerate(names):
         if (best := result.value(one)) is not None:
             mark(grid, at, best, color=BLACK)
@@ -105,22 +114,6 @@ def shown(result: MediumPosterior) -> tuple[str, ...]:
     if len(free) == 1:
         return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
     return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)
-
-
-def _dressed(ax: Axes, row: int, column: int) -> None:
-    """Write few numbers, none with an offset that the reader must add."""
-    ax.grid(False)
-    axes: list[Any] = [ax.xaxis] if row == column else [ax.xaxis, ax.yaxis]
-    for axis in axes:
-        axis.set_major_locator(MaxNLocator(3, prune="both"))
-        axis.set_major_formatter(ScalarFormatter(useOffset=False))
-    for text in ax.get_xticklabels():
-        text.set_rotation(45)
-    ax.tick_params(labelsize=7, length=2, pad=2)
-    if column > 0 and row != column:
-        ax.set_yticklabels([])
-    if row < ax.get_subplotspec().get_gridspec().nrows - 1:  # type: ignore[union-attr]
-        ax.set_xticklabels([])
 
 
 COLOURS = {"red": VERMILION, "green": GREEN, "blue": BLUE, "grey": GREY}

@@ -184,8 +184,12 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     at = data.arrays.get("alpha")
     fitted = albedo_values(Albedos(**data.content["protocol"]["albedos"])) if at is None else at
     points = fitted, data.arrays["reflectance"], data.arrays["reflectance_error"]
-    for part in ("map", "fold"):
-        _map(panels[part], points, curves, exact_map)
+    even = np.linspace(0.0, 1.0, 1001)
+    for ax in (panels["map"], panels["fold"]):
+        ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
+        draw_curves(ax, even, curves, lambda law: law.alpha(even))
+        ax.errorbar(points[1], points[0], xerr=points[2], label=PHOTONS, **DATA)
+        ax.set_ylabel("single-scattering albedo α [-]")
     panels["map"].set(xlim=(0, 1), ylim=(0, 1.02), title="the whole map")
     panels["fold"].set(xlim=(0.7, 1.0), ylim=(0.97, 1.002), title="its end, enlarged")
     _map_errors(panels["error"], panels["ratio"], points, curves, exact_map)
@@ -194,15 +198,6 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
         ax.set_xlabel("total reflectance A [-]")
     legend_below(figure, list(panels.values()))
     return save(figure, out, name)
-
-
-def _map(ax: Axes, points: Points, curves: list[DrawnLaw], exact_map: Points) -> None:
-    even = np.linspace(0.0, 1.0, 1001)
-    ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    draw_curves(ax, even, curves, lambda law: law.alpha(even))
-    alpha, measured, error = points
-    ax.errorbar(measured, alpha, xerr=error, label=PHOTONS, **DATA)
-    ax.set_ylabel("single-scattering albedo α [-]")
 
 
 def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw], exact_map: Points) -> None:

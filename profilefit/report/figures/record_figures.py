@@ -273,8 +273,11 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
     A row of panels for each light, one for all surfaces that refract. `names` are the records, all of them if None.
     """
     contents = {one: source.content(one) for one in names or source.paths if measures(source.content(one), "rel")}
-    rows = {kind: [c for c in contents.items() if _kind(c[1]["setting"]) == kind] for kind in KINDS}
-    shown = {kind: list(_lines(group)) for kind, group in rows.items() if group}
+    groups: dict[str, list[tuple[str, Content]]] = {kind: [] for kind in KINDS}
+    for one, content in contents.items():
+        light, n, g = (content["setting"][key] for key in ("illumination", "n", "g"))
+        groups[light if (n, g) == (1, 0) else "refracting"].append((one, content))
+    shown = {kind: list(_lines(group)) for kind, group in groups.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
     for row, (kind, lines) in zip(grid, shown.items(), strict=True):
@@ -304,10 +307,6 @@ def _panel(ax: Axes, key: str, lines: list[Line]) -> None:
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)
-
-
-def _kind(setting: Content) -> str:
-    return str(setting["illumination"]) if setting["n"] == 1 and setting["g"] == 0 else "refracting"
 
 
 def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:

@@ -33,15 +33,7 @@ SHORT = {
     Verdict.NOT_FINITE: "NaN/Inf",
     Verdict.RAISES: "raises",
 }
-# One character a class, as in the figure.
-SIGNS = {
-    Verdict.NOT_JUDGED: "?",
-    Verdict.INACCURATE: "≈",
-    Verdict.NOT_MONOTONE: "↕",
-    Verdict.NEGATIVE: "−",
-    Verdict.NOT_FINITE: "×",
-    Verdict.RAISES: "!",
-}
+SIGNS = dict(zip(SHORT, "?≈↕−×!", strict=True))  # one character a class, as in the figure
 LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
 BARE = "no reference there: only NaN, sign and order are looked at"
 LONGEST_NAME = 18  # characters: a line of 100 holds it beside the advice
