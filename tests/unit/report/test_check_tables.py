@@ -42,21 +42,9 @@ def shown(parts):
 def test_a_line_a_law_says_whether_it_passes():
     text = shown(check_tables.check_tables([law(GOOD), law(GOOD, BAD)], [mapped(GOOD)], "a device"))
     rows = [line.split() for line in text.splitlines() if "-refracting" in line]
-    assert rows[0] == [
-        "hazard-refracting",
-        "1.4",
-        "0.049",
-        "1.0e-06",
-        "0.0096",
-        "2.0e-07",
-        "4.0e-07",
-        "2.0e-07",
-        "0",
-        "0",
-        "pass",
-    ]
+    assert " ".join(rows[0]) == "hazard-refracting 1.4 0.049 1.0e-06 0.0096 2.0e-07 4.0e-07 2.0e-07 0 0 pass"
     assert rows[1][-1] == "FAIL"
-    assert rows[2] == ["albedo-rational-refracting", "1.4", "0.00040", "1.0e-07", "–", "2.0e-07", "0", "7", "pass"]
+    assert " ".join(rows[2]) == "albedo-rational-refracting 1.4 0.00040 1.0e-07 – 2.0e-07 0 7 pass"
     assert "a device" in text
 
 

@@ -34,20 +34,11 @@ LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6, 0.003)
 
 @pytest.fixture(scope="module")
 def choice():
-    return chosen(
-        SCENE,
-        [
-            Predicted(NOTHING, Milliseconds(2.0, 1.0, 2.5), Error(0.1, 0.1, 0.0, 0.001, 0.0, 0, CURVED)),
-            Predicted(
-                Option("separable", 17), Milliseconds(3.0, 3.0, 3.5), Error(0.012, 0.01, 0.006, 0.001, 0.0, 1, CURVED)
-            ),
-            Predicted(
-                Option("sampled", 64, name="hazard-diffuse"),
-                Milliseconds(5.0, 4.0, 8.0),
-                Error(0.008, 0.0, 0.0, 0.001, 0.008, 2, CURVED),
-            ),
-        ],
-    )
+    errors = [(0.1, 0.1, 0.0, 0.001, 0.0, 0), (0.012, 0.01, 0.006, 0.001, 0.0, 1), (0.008, 0.0, 0.0, 0.001, 0.008, 2)]
+    costs = [Milliseconds(2.0, 1.0, 2.5), Milliseconds(3.0, 3.0, 3.5), Milliseconds(5.0, 4.0, 8.0)]
+    options = (NOTHING, Option("separable", 17), SAMPLED)
+    every = zip(options, costs, errors, strict=True)
+    return chosen(SCENE, [Predicted(option, cost, Error(*error, CURVED)) for option, cost, error in every])
 
 
 def printed(part):
