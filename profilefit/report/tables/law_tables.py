@@ -223,12 +223,8 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
         qualities = for_each(lambda one: profile_quality(one.law, ALBEDOS), profiles)
         return markdown_laws(list(zip(profiles, qualities, strict=True)))
 
-    def samplers() -> str:
-        of = for_each(measured_samplers, sampled_laws(folder, matched=False))
-        return markdown_samplers(list(chain.from_iterable(of)))
-
     check, claims = (lambda: markdown_check(folder)), (lambda: markdown_claims(folder / EVIDENCE))
-    return {"laws": laws, "samplers": samplers, "check": check, "claims": claims}
+    return {"laws": laws, "check": check, "claims": claims}
 
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
@@ -242,13 +238,6 @@ def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
         )
         for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
     ]
-    return markdown_table(header, rows)
-
-
-def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
-    """Return a line a sampler, each measure at its worst albedo."""
-    header = (*HOME, "sampler", *_sampler_headers())
-    rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
     return markdown_table(header, rows)
 
 

@@ -21,7 +21,6 @@ from profilefit.report.tables.law_tables import (
     every_law,
     for_each,
     markdown_laws,
-    markdown_samplers,
     measured,
     measured_samplers,
     sampler_tables,
@@ -140,8 +139,6 @@ def test_markdown_has_a_line_a_law(folder):
     assert home == ("burley", "burley-whole", "searchlight", "1", "4")
     assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)
     assert float(cells["ks worst"]) == pytest.approx(quality.ks.max(), rel=0.06)
-    table = markdown_samplers(measured_samplers(laws[0], [0.9])).splitlines()
-    assert [line.split("|")[5].strip() for line in table[2:]] == ["exact", "xie", "unreal"]
 
 
 def test_maps_under_their_own_light(folder):
