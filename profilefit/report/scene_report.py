@@ -100,12 +100,8 @@ def content(drawn: RenderResult, device: str) -> dict[str, Any]:
 
 
 def _point(point: ChartPoint) -> dict[str, Any]:
-    return {
-        "technique": point.label,
-        "samples": point.samples,
-        "rmse": point.rmse,
-        "milliseconds": _spread(point.milliseconds),
-    }
+    times = _spread(point.milliseconds)
+    return {"technique": point.label, "samples": point.samples, "rmse": point.rmse, "milliseconds": times}
 
 
 def _spread(times: Sequence[float]) -> dict[str, float]:

@@ -63,10 +63,7 @@ NEAREST = 0.01  # [mfp], as in quality.NEAREST
 ENERGY_WITHIN = 0.995  # as in quality.ENERGY_WITHIN: where `rel` stops looking
 PHOTONS = "photons, ± 1 standard error"
 TRUTH_BAND = "95 % of photon noise and model discrepancy together"
-PRINTED_LAWS = {
-    "published": ("(7) as printed", PUBLISHED),
-    "corrected": ("(7) as printed but b0 = 0.0641", CORRECTED),
-}
+PRINTED_LAWS = {"published": ("(7) as printed", PUBLISHED), "corrected": ("(7) as printed but b0 = 0.0641", CORRECTED)}
 RECORDED_LAWS = {
     "liang-as-published": ("(7) regenerated, the paper's protocol", AS_PUBLISHED),
     "liang-whole": ("(7) regenerated, whole profile", WHOLE),

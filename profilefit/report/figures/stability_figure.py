@@ -35,11 +35,7 @@ ROWS = (
     *("liang, published", "liang-whole", "burley, published", "burley_diffuse_mfp, published", "dipole"),
     *("better_dipole", "beam_diffusion", "gaussians-6", "hazard", "quantile"),
 )
-TICKS = {
-    "α": (0.0, 0.1, 0.5, 0.9, 1.0),
-    "r/l": (0.0, 0.01, 1.0, 100.0, np.inf),
-    "ξ": (0.0, 0.01, 0.5, 0.99),
-}
+TICKS = {"α": (0.0, 0.1, 0.5, 0.9, 1.0), "r/l": (0.0, 0.01, 1.0, 100.0, np.inf), "ξ": (0.0, 0.01, 0.5, 0.99)}
 TITLES = dict(zip(QUANTITIES, ("profile R$_d$", "cdf", "radius drawn", "density of radii"), strict=True))
 USUAL = (1e-3, 1e3)  # l of a panel: the worst over those
 ROW_HEIGHT, MARGIN = 0.95, 1.25  # inch

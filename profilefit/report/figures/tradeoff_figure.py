@@ -157,7 +157,7 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, panel in zip(all_axes, part.panels, strict=True):
-        occupied = [box for point in panel.points for box in _boxes(axes, point)] + list(_steps(axes, panel))
+        occupied = list(_occupied(axes, panel))
         first = {point.method: point for point in reversed(panel.points)}
         texts = [text_of(point, first[point.method] is point) for point in panel.points]
         labels = [Label(text, *xy) for text, *xy in zip(texts, *_xy(panel.points), strict=True)]
@@ -202,18 +202,13 @@ def text_of(point: Point, first: bool) -> str:
     return f"{method}: {effort}" if first and effort else effort or method
 
 
-def _boxes(axes: Axes, point: Point) -> list[Bbox]:
-    """Return the boxes of a point's bars, which no label should hide."""
-    x, y = point.cost, point.error
-    top = y.high if point.worst is None else point.worst.value
-    return [
-        box_of(axes, [(x.low, y.value), (x.high, y.value)], 1.5),
-        box_of(axes, [(x.value, y.low), (x.value, top)], 2.0),
-    ]
-
-
-def _steps(axes: Axes, panel: Panel) -> Iterator[Bbox]:
-    """Yield boxes along the line of the front."""
+def _occupied(axes: Axes, panel: Panel) -> Iterator[Bbox]:
+    """Yield the boxes of points' bars and along the line of the front, which no label should hide."""
+    for point in panel.points:
+        cost, error = point.cost, point.error
+        top = error.high if point.worst is None else point.worst.value
+        yield box_of(axes, [(cost.low, error.value), (cost.high, error.value)], 1.5)
+        yield box_of(axes, [(cost.value, error.low), (cost.value, top)], 2.0)
     best = [panel.points[i] for i in front(panel.points)]
     for (x, y), (next_x, next_y) in pairwise(zip(*_xy(best), strict=True)):
         yield box_of(axes, [(x, y), (next_x, y)], 0.7)

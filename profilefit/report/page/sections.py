@@ -226,10 +226,7 @@ OF_LAYERS = {
     "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
     "own-data.png": "What rings can know of tissue, by place and error; n and g given or open.",
 }
-GROUPS = {
-    "laws": ("Laws in float32", OF_PROFILE),
-    "maps": ("Maps in float32", OF_MAP[:2]),
-}
+GROUPS = {"laws": ("Laws in float32", OF_PROFILE), "maps": ("Maps in float32", OF_MAP[:2])}
 MEANING = (
     "model: the record's error against the exact half space or photons, worst albedo; float32: what rounding adds; "
     "bad: NaN, Inf, negative or not monotone, in and out of where the law holds"

@@ -140,7 +140,6 @@ SCALES: Mapping[str, tuple[float, str]] = {
     "mse": (BILLIONTHS, " [1e-9 / mfp²]"),
     "r2": (1.0, ""),
 }
-HOME = ("law", "constants", "light", "n")
 MAP_HEADERS = ("map", "light", "n", "δA", "δα", "√(1-α)", "rises", "α(1)", "fold", "α(0)")
 NOTHING = "None of these records holds a law that can be measured against the exact half space."
 
@@ -229,20 +228,23 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
     """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    header = (*HOME, "number", *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")))
+    header = (
+        "law",
+        "constants",
+        "light",
+        "n",
+        "number",
+        *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")),
+    )
     rows = [
         (
-            *_home(one),
+            *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
             str(len(one.law.constant_names())),
             *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
         )
         for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
     ]
     return markdown_table(header, rows)
-
-
-def _home(named: LoadedLaw) -> tuple[str, str, str, str]:
-    return named.name, named.constants or "none", named.setting.illumination, f"{named.setting.n:g}"
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
@@ -277,18 +279,12 @@ def _map_table(measured: Sequence[tuple[LoadedLaw, AlbedoQuality]]) -> Renderabl
 
 
 def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
-    rows = [(_sampler_label(one), *_sampler_cells(one)) for one in samplers]
+    rows = [
+        (_sampler_label(s), *map(_worst, (s.exact_error, *(getattr(s.quality, name) for name in COLUMNS.values()))))
+        for s in samplers
+    ]
     caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
-    header = ("law: sampler", *_sampler_headers("\n"))
-    return row_table(f"Samplers, {setting}", header, rows, caption, fold=("law: sampler",))
-
-
-def _sampler_headers(space: str = " ") -> list[str]:
-    return ["exact", *(header.replace("\n", space) for header in COLUMNS)]
-
-
-def _sampler_cells(sampler: MeasuredSampler) -> list[str]:
-    return [_worst(sampler.exact_error), *(_worst(getattr(sampler.quality, name)) for name in COLUMNS.values())]
+    return row_table(f"Samplers, {setting}", ("law: sampler", "exact", *COLUMNS), rows, caption, fold=("law: sampler",))
 
 
 def _sampler_label(sampler: MeasuredSampler) -> str:
