@@ -179,15 +179,6 @@ def still() -> str:
     law = catalogue.load(LAW, setting=SETTING)
     figure = canvas(3.2)
     profile, cdf, edge = figure.subplots(1, 3)
-    _profiles(profile, cdf, law)
-    _edge(edge, law)
-    figure.suptitle(TITLE, fontsize=9.0)
-    file = io.StringIO()
-    figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
-    return inline(file.getvalue(), "explorer-still", TITLE, VARIABLES)
-
-
-def _profiles(profile: Axes, cdf: Axes, law: ProfileLaw) -> None:
     alpha, mfp = (np.array(one)[:, None] for one in (BY_NAME[MATERIAL].alpha, BY_NAME[MATERIAL].mfp))
     r = np.geomspace(0.01, 30.0, 120)
     _pairs(profile, r, r * law.profile(r, alpha, mfp), r * np.asarray(exact.profile(r, alpha, mfp, SETTING)))
@@ -199,6 +190,11 @@ def _profiles(profile: Axes, cdf: Axes, law: ProfileLaw) -> None:
         ax.set(xlabel="r [mm]", xscale="log")
         ax.set_xticks(DECADES, [f"{value:g}" for value in DECADES])
         ax.xaxis.set_minor_locator(NullLocator())
+    _edge(edge, law, alpha, mfp)
+    figure.suptitle(TITLE, fontsize=9.0)
+    file = io.StringIO()
+    figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
+    return inline(file.getvalue(), "explorer-still", TITLE, VARIABLES)
 
 
 def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
@@ -217,14 +213,12 @@ def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
         ax.text(x[at], law[c, at], name[0].upper(), ha="center", va="center", weight="bold", size=8.0, bbox=behind)
 
 
-def _edge(ax: Axes, law: ProfileLaw) -> None:
+def _edge(ax: Axes, law: ProfileLaw, alpha: Floats, mfp: Floats) -> None:
     """Draw radiance beside the edge, over the strip of colours that it makes."""
-    material = BY_NAME[MATERIAL]
-    alpha, mfp = np.array(material.alpha), np.array(material.mfp)
     x = np.linspace(-REACH, REACH, 121)
-    reflectance = np.asarray(exact.reflectance(alpha, SETTING))[:, None]
-    by_law = reflectance * step_response(x, alpha[:, None], mfp[:, None], law=law)
-    _pairs(ax, x, by_law, reflectance * step_response(x, alpha[:, None], mfp[:, None], SETTING))
+    reflectance = np.asarray(exact.reflectance(alpha, SETTING))
+    by_law = reflectance * step_response(x, alpha, mfp, law=law)
+    _pairs(ax, x, by_law, reflectance * step_response(x, alpha, mfp, SETTING))
     strip = srgb_codes(by_law.T)[None].astype(np.uint8)
     ax.imshow(strip, extent=(-REACH, REACH, 0.88, 1.0), aspect="auto", zorder=3)
     ax.set(xlabel="from the edge of the light [mm]", ylabel="radiance [white = 1]", xlim=(-REACH, REACH), ylim=(0, 1))

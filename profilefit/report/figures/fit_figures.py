@@ -70,9 +70,11 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
 @styled
 def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner") -> list[Path]:
     """Draw the posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
-    names = shown(result)
-    if not names:
+    if result.walk is None:
         return []
+    free = result.fit.spec.free  # no two that say the same, where one coordinate alone was free
+    names = [name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving]
+    names = names if len(free) > 1 else [("alpha", "l", "scale")[free[0]]]
     samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)
     figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
@@ -104,16 +106,6 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
     figure.subplots_adjust(left=0.14, right=0.98, bottom=0.12, top=0.94, wspace=0.08, hspace=0.08)
     figure.suptitle("39 % and 86 % of the posterior, by the statistical error alone; lines: best fit", fontsize=9)
     return save(figure, out, name)
-
-
-def shown(result: MediumPosterior) -> tuple[str, ...]:
-    """Return the quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
-    if result.walk is None:
-        return ()
-    free = result.fit.spec.free
-    if len(free) == 1:
-        return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
-    return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)
 
 
 COLOURS = {"red": VERMILION, "green": GREEN, "blue": BLUE, "grey": GREY}

@@ -60,18 +60,13 @@ class MeasuredSampler:
     exact_error: Floats
 
 
-def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
-    """Yield the items, without any progress shown."""
-    del title, total
-    return items
-
-
 def for_each(
-    measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track = untracked, title: str = ""
+    measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track | None = None, title: str = ""
 ) -> list[Measured]:
     """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(track(pool.map(measure, laws), title, len(laws)))
+        results = pool.map(measure, laws)
+        return list(track(results, title, len(laws)) if track else results)
 
 
 def measured_samplers(named: LoadedLaw, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
@@ -158,7 +153,7 @@ def measured(
     names: Names = None,
     alpha: Floats = ALBEDOS,
     sampled_alpha: Sequence[float] | None = None,
-    track: Track = untracked,
+    track: Track | None = None,
 ) -> Qualities:
     """Measure profiles by setting, then maps, then samplers.
 

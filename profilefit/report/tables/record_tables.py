@@ -155,26 +155,21 @@ def fit_facts(content: Content) -> RenderableType:
         facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
         lines.append((f"chain, {KINDS.get(kind, kind)}", _verdict(chain["result"])))
         lines.append(("", f"{facts}, {chain['steps']} steps of {chain['walkers']} walkers"))
-    if off := content.get("discrepancy"):
-        lines += _discrepancy(off)
+    if (off := content.get("discrepancy")) and off["amplitude"] is None:
+        lines.append(("discrepancy", _verdict(off["result"])))
+    elif off:  # the Gaussian process that the residuals are taken for
+        amplitude = to_error(off["amplitude"], off["amplitude_error"])
+        reach = f"correlation length {significant(off['length_s'])} in √(1 − α)"
+        if off["length_r"] is not None:
+            reach += f", {significant(off['length_r'])} in ln r"
+        size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
+        lines += [("discrepancy", size), ("", f"{reach}; {off['result']}")]
     if left := content.get("left_out"):
         facts = (
             f"{left['rings']} radial bins and {left['albedos']} albedos left out: too few photons for a standard error"
         )
         lines.append(("data", facts))
     return _facts("Fit", lines + _second_opinions(content))
-
-
-def _discrepancy(off: Content) -> list[Line]:
-    """Return the Gaussian process that the residuals are taken for."""
-    if off["amplitude"] is None:
-        return [("discrepancy", _verdict(off["result"]))]
-    amplitude = to_error(off["amplitude"], off["amplitude_error"])
-    reach = f"correlation length {significant(off['length_s'])} in √(1 − α)"
-    if off["length_r"] is not None:
-        reach += f", {significant(off['length_r'])} in ln r"
-    size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
-    return [("discrepancy", size), ("", f"{reach}; {off['result']}")]
 
 
 def _second_opinions(content: Content) -> list[Line]:
