@@ -70,11 +70,11 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
 @styled
 def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner") -> list[Path]:
     """Draw the posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
-    if result.walk is None:
+    if result.walk is None or not result.moving:
         return []
     free = result.fit.spec.free  # no two that say the same, where one coordinate alone was free
     names = [name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving]
-    names = names if len(free) > 1 else [("alpha", "l", "scale")[free[0]]]
+    names = names if len(free) != 1 else [("alpha", "l", "scale")[free[0]]]
     samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)
     figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
