@@ -1,13 +1,11 @@
 """Every law that loads, once, under its own light; and the tables that say how good each is."""
 
-import io
 import json
 import shutil
 from dataclasses import fields
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
@@ -25,6 +23,7 @@ from profilefit.report.tables.law_tables import (
     measured_samplers,
     sampler_tables,
 )
+from tests.unit.report.test_tables import rendered
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])
@@ -39,10 +38,7 @@ def folder(tmp_path):
 
 
 def printed(parts, width=100) -> list[str]:
-    console = Console(width=width, file=io.StringIO(), highlight=False, color_system=None)
-    for part in parts:
-        console.print(part)
-    return console.file.getvalue().splitlines()
+    return rendered(parts, width).splitlines()
 
 
 def test_every_law_is_there_once():

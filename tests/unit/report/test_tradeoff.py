@@ -7,7 +7,6 @@ import re
 import matplotlib
 import numpy as np
 import pytest
-from rich.console import Console
 
 from profilefit.errors import InputError
 from profilefit.report.figures import tradeoff_figure as figure
@@ -16,6 +15,7 @@ from profilefit.report.figures.tradeoff_figure import Label, box_of, place_label
 from profilefit.report.tables import tradeoff_tables
 from profilefit.studies.tradeoff import parts, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
+from tests.unit.report.test_tables import rendered
 
 NUMBERS = {"a": (1.0, 0.5), "b": (2.0, 0.1), "normalized diffusion": (2.1, 0.11), "slow": (40.0, 0.8)}
 POINTS = tuple(
@@ -80,10 +80,7 @@ def test_figure_and_table(tmp_path):
     written = figure.tradeoff_figure(PART, "a chip", tmp_path)
     assert [path.name for path in written] == ["tradeoff-demo.png", "tradeoff-demo.svg"]
     assert all(path.stat().st_size > 5000 for path in written)
-    console = Console(width=100, file=io.StringIO())
-    for table in tradeoff_tables.tradeoff_tables(PART):
-        console.print(table)
-    lines = console.file.getvalue().splitlines()
+    lines = rendered(tradeoff_tables.tradeoff_tables(PART), 100).splitlines()
     assert lines[0] == "demo, R_d of p"
     assert any(line.split()[:1] == ["slow"] and not line.rstrip().endswith("front") for line in lines)
     assert lines[-1].strip() == "left out: three"
