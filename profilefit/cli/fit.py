@@ -226,7 +226,7 @@ def _fit_phase(
         from profilefit.recipes.kinds.phase import content, fits_of, request
         from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.phases.fit import ALL_ANGLES
-        from profilefit.report.tables.phase_table import phase_tables, premise_lines
+        from profilefit.report.kinds import phase_tables, premise_lines
 
     accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}
     options.require_left_out(context, (name for name in context.params if name not in accepted), f"--kind is {PHASE}")
@@ -255,7 +255,7 @@ def _fit_layers(
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.measured.layers import fit_layers
-        from profilefit.report.tables.layers_fit_tables import layers_content, layers_lines, layers_tables
+        from profilefit.report.tables.fit_tables import layers_content, layers_lines, layers_tables
 
     medium = _medium(file, measured.unit)
     if out is not None:

@@ -88,7 +88,7 @@ def photo(
         from profilefit.measured.photo.medium import Beliefs
         from profilefit.measured.photo.workflow import photo as measured
         from profilefit.report.page.photo import diffuse_law, medium_text, photo_page
-        from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
+        from profilefit.report.tables.fit_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
         used = {"simulate", "out", "as_json", "quiet", "shots"}
@@ -136,7 +136,7 @@ def photo(
 
 def _figures(answer: Photo, out: Path) -> int:
     with interruptible(__name__):
-        from profilefit.report.figures.photo_figures import rings_figure, spot_figure
+        from profilefit.report.figures.fit_figures import rings_figure, spot_figure
 
     return len([*spot_figure(answer, out), *rings_figure(answer, out)])
 
@@ -147,7 +147,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.measured.photo.setup import fisher_bounds, read_setup, room, written
-        from profilefit.report.tables.photo_tables import setup_tables
+        from profilefit.report.tables.fit_tables import setup_tables
 
     if shots:
         raise InputError("SHOT must be left out where photographs are simulated")

@@ -76,7 +76,7 @@ def regenerate(
         from profilefit.recipes.regenerate import reproduction, requests_of
         from profilefit.recipes.run import RecipeRun
         from profilefit.recipes.workers import cores
-        from profilefit.report.tables.summary_tables import outcome, reproduced, verdict
+        from profilefit.report.tables.record_tables import outcome, reproduced, verdict
 
     if not 0 <= seed <= MAX_SEED:
         raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")

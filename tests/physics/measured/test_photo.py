@@ -22,7 +22,7 @@ from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
 from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.report.tables.photo_tables import photo_lines
+from profilefit.report.tables.fit_tables import photo_lines
 from tests.fixtures import slow
 
 SETTING = bench.SETTING

@@ -1,5 +1,6 @@
-"""Tables and the figure of sums of Gaussians say what their records say; published ones stand beside those of skin."""
+"""Tables of stacks and of sums of Gaussians say what their records say; published sums stand beside those of skin."""
 
+import copy
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -13,34 +14,104 @@ import pytest
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
+from profilefit.recipes.kinds.stack import interfaces, read
+from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
-from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
+from profilefit.report.figures.record_figures import sum_caption, sum_figure, sums_of
+from profilefit.report.kinds import TABLES, published, stack_tables, sum_sections, sum_tables
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source, largest_error
-from profilefit.report.tables.sum_table import published, sum_sections, sum_tables
 from profilefit.scenes.skin.law import D_EON
 from tests.unit.report.test_tables import rendered
 
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "guide" / "layered.md"
+CONTENTS = {name: read(path) for name, path in record.available(fits_folder() / STACKS).items()}
 FOUND = sums_of(fits_folder())
 
 
-def rows(found, table):
+def stack_rows(content, table):
+    """Of one of the tables: the cells of its headers, and of every line below up to the caption."""
+    lines = rendered([stack_tables(content)[table]], 400).splitlines()[1:-1]
+    return lines[0].split(), [line.split() for line in lines[1:]]
+
+
+def sum_rows(found, table):
     """Of one of the tables: the cells of every line below its headers, up to the caption."""
     return [line.split() for line in rendered([sum_tables(found)[table]], 400).splitlines()[2:-1]]
 
 
+@pytest.mark.parametrize("kind", ["stack", "gaussians"])
 @pytest.mark.parametrize("name", FOUND)
-def test_a_narrow_screen_loses_and_breaks_nothing(name):
-    parts = sum_tables(FOUND[name])
+def test_a_narrow_screen_loses_and_breaks_nothing(kind, name):
+    parts = TABLES[kind].tables(CONTENTS[name], FOUND[name].path)
     narrow = rendered(parts, 80)
     assert max(map(len, narrow.splitlines())) <= 80
     assert Counter(narrow.split()) == Counter(rendered(parts, 400).split())
 
 
+@pytest.mark.parametrize("name", CONTENTS)
+def test_every_constant_has_a_row_with_its_errors(name):
+    content = CONTENTS[name]
+    header, found = stack_rows(content, 2)
+    known = [key for key in ERRORS if content["constants"]["red.1.w"][key] is not None]
+    assert header == ["channel", "interface", "constant", "regenerated", *(w for k in known for w in ("±", ERRORS[k]))]
+    assert sorted(".".join(row[:3]) for row in found) == sorted(content["constants"])
+    assert [row[0] for row in found] == sorted((row[0] for row in found), key=["red", "green", "blue"].index)
+    for channel, number, constant, value, *errors in found:
+        one = content["constants"][f"{channel}.{number}.{constant}"]
+        # Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200.
+        assert abs(float(value) - one["regenerated"]) <= max(0.05 * largest_error(one), 0.005 * abs(one["regenerated"]))
+        assert list(map(float, errors)) == pytest.approx([one[key] for key in known], rel=0.05)
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_errors_at_each_thickness_and_the_worst(name):
+    content = CONTENTS[name]
+    _, (*found, worst) = stack_rows(content, 1)
+    shown = iter(found)
+    for channel, number in interfaces(content):
+        quality = content["interfaces"][channel]["quality"][number - 1]
+        for d, *values in zip(*(quality[key] for key in ("thickness", "rel", "ks", "delta_A")), strict=True):
+            at, of, thickness, unit, *cells = next(shown)
+            assert (at, of, unit) == (channel, str(number), content["unit"])
+            assert float(thickness) == pytest.approx(d, rel=0.005)
+            assert list(map(float, cells)) == pytest.approx(values, rel=0.05)
+    assert next(shown, None) is None
+    assert worst[0] == "worst"
+    rel, ks, of_a = (max(abs(float(row[column])) for row in found) for column in (4, 5, 6))
+    assert list(map(float, worst[1:])) == [rel, ks, of_a]
+
+
+def test_layers_and_fits_are_shown():
+    content = CONTENTS["skin"]
+    layers = rendered([stack_tables(content)[0]], 100).splitlines()
+    assert len(layers) == 2 + 3
+    assert layers[2].split() == ["epidermis", "0.25", "mm", "1.4", "0", "0.21", "0.21", "0.5", "4.8", "6", "6.5"]
+    assert "infinite" in layers[4]
+    _, fits = stack_rows(content, 3)
+    for (channel, number), row in zip(interfaces(content), fits, strict=True):
+        one = content["interfaces"][channel]
+        assert row[:2] == [channel, str(number)]
+        assert one["fit"][number - 1]["result"] in " ".join(row)
+        starts = one["starts"][number - 1]
+        assert row[-3:] == [str(starts["as_good"]), "of", str(starts["count"])]
+
+
+def test_errors_that_do_not_apply_have_no_column():
+    """Exact light has no photons, traced light no nodes."""
+    content = copy.deepcopy(CONTENTS["heart"])
+    assert stack_rows(content, 2)[0][4:] == ["±", "dr", "±", "misfit", "±", "jackknife"]
+    for one in content["constants"].values():
+        one["statistical_error"], one["discretisation_error"] = 1e-3, None
+    assert stack_rows(content, 2)[0][4:] == ["±", "photons", "±", "misfit", "±", "jackknife"]
+    text = rendered(stack_tables(content), 400)
+    assert "photons: noise of the simulation" in text
+    assert "nodes" not in text
+
+
 @pytest.mark.parametrize("name", FOUND)
 def test_errors_over_their_number(name):
-    shown = [row for row in rows(FOUND[name], 0) if row[1] != "published"]
+    shown = [row for row in sum_rows(FOUND[name], 0) if row[1] != "published"]
     assert [row[:2] for row in shown] == [[light, str(count)] for light in ILLUMINATIONS for count in range(1, 9)]
     for light, count, *cells in shown:
         one = FOUND[name].content["sums"][light]["by_count"][int(count) - 1]
@@ -50,7 +121,7 @@ def test_errors_over_their_number(name):
 
 def test_six_constants_with_their_errors():
     found = FOUND["heart"]
-    shown = rows(found, 1)[: 4 * 6]
+    shown = sum_rows(found, 1)[: 4 * 6]
     names = [row[0] for row in shown]
     assert names == constant_names(6)
     for name, *cells in shown:
@@ -65,7 +136,7 @@ def test_six_constants_with_their_errors():
     # What least squares holds at 0 has no errors, and is told so.
     held = {name: one for name, one in FOUND["marble-on-potato"].content["constants"].items() if not one["free"]}
     assert "diffuse.6.blue.w6" in held
-    (row,) = [row for row in rows(FOUND["marble-on-potato"], 1) if row[0] == "blue.w6"]
+    (row,) = [row for row in sum_rows(FOUND["marble-on-potato"], 1) if row[0] == "blue.w6"]
     assert row[1:] == ["0.00", "–", "–", "–", "–"]
 
 
@@ -83,7 +154,7 @@ def test_the_published_gaussians_stand_beside_those_of_skin():
             # Six fitted ones are nearer, in all that is measured.
             six = found.content["sums"][light]["by_count"][5]
             assert all(of[light][channel][key] > 2.0 * six[key][channel] for key in ("rel", "rms", "ks"))
-    (row,) = [row for row in rows(found, 0) if row[:2] == ["diffuse", "published"]]
+    (row,) = [row for row in sum_rows(found, 0) if row[:2] == ["diffuse", "published"]]
     assert list(map(float, row[2:5])) == pytest.approx([one["rel"] for one in of["diffuse"]], rel=0.05)
     assert "d'Eon" in rendered(sum_tables(found), 80)
     for other in (FOUND["heart"], replace(found, stack=replace(found.stack, unit="cm"))):
