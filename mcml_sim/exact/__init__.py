@@ -13,7 +13,7 @@
     light.reflectance, light.profile([0.01, 0.1])
 
 `transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `hankel` its inverse,
-`anisotropic` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
+`forwards` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
 medium itself, not reduced by 1 - g.
 
 Every function of the half space takes lengths in any one unit with `mfp` in that unit, and broadcasts `r` (or `xi`)

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError, SettingError
-from mcml_sim.exact import dispersion, hankel
-from mcml_sim.exact.anisotropic import functions as forwards
+from mcml_sim.exact import dispersion, forwards, hankel
 from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, surface, total
 from mcml_sim.exact.transform import STANDARD, Transform
 from mcml_sim.media.arrays import Floats
