@@ -3,7 +3,7 @@
 The first orders, near the source, need every detail of the phase function; photons have them. What remains is wide and
 needs few harmonics and few wave numbers: its transform has fallen by 1e-6 at k = 1.6 / mfp.
 
-R^ is wanted on lines that start below i kappa (`hankel`), for groups of albedos of nearly one kappa.
+R^ is wanted on lines that start below i kappa (`by_albedo`), for groups of albedos of nearly one kappa.
 """
 
 from __future__ import annotations

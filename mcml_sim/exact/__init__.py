@@ -12,7 +12,7 @@
     light = exact.solve(Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0))))   # a stack of layers
     light.reflectance, light.profile([0.01, 0.1])
 
-`transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `hankel` its inverse,
+`transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `by_albedo` its inverse,
 `forwards` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
 medium itself, not reduced by 1 - g.
 

@@ -37,8 +37,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.dispersion import dispersion
-from mcml_sim.exact.special_functions import logarithm, square_root
+from mcml_sim.exact.special_functions import dispersion, logarithm, square_root
 
 SLOPES = np.linspace(-0.8, 0.8, 7)  # Im tau of the paths at hand
 FIRST_TAU, LAST_TAU = -7.0, 10.0  # beyond, the integrand is its own leading power to 1e-12

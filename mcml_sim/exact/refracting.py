@@ -26,9 +26,8 @@ from threadpoolctl import threadpool_limits
 
 from mcml_sim.exact import cone
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.special_functions import panels, square_root
+from mcml_sim.exact.special_functions import dispersion, panels, square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
 from mcml_sim.files.kept import kept
 from mcml_sim.media.arrays import Floats

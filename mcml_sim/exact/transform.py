@@ -11,7 +11,7 @@ Multiple Scattering, 2016):
 
 Lengths are in mean free paths. What makes few nodes enough:
 
-- k runs along 0.9 i kappa + rho e^{i pi/4}, kappa the decay rate of the profile, L(i kappa) = 0; see `hankel`.
+- k runs along 0.9 i kappa + rho e^{i pi/4}, kappa the decay rate of the profile, L(i kappa) = 0; see `by_albedo`.
 - The zeros of L, at distance kappa from the origin, are divided out: with (K^2 + kappa^2) / (K^2 + 1) for L it is
   H_k(1/s) = (s + sqrt(k^2 + 1)) / (s + sqrt(k^2 + kappa^2)), and what is left has no scale but 1.
 - x runs along a ray halfway between the singularities on either side, as |sqrt(k^2 + 1)| sinh(u); trapezoids in u,
@@ -31,8 +31,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact.dispersion import dispersion, squared_decay_rate
-from mcml_sim.exact.special_functions import inverse_sinh, logarithm, sinh_and_cosh, square_root
+from mcml_sim.exact.special_functions import (
+    dispersion,
+    inverse_sinh,
+    logarithm,
+    sinh_and_cosh,
+    square_root,
+    squared_decay_rate,
+)
 from mcml_sim.media.arrays import Floats
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].

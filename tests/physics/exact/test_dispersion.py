@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from mcml_sim.exact.dispersion import LEAST_ALBEDO, SMALL_SQUARE, dispersion, squared_decay_rate
+from mcml_sim.exact.special_functions import LEAST_ALBEDO, SMALL_SQUARE, dispersion, squared_decay_rate
 
 pytestmark = pytest.mark.usefixtures("x64")
 
