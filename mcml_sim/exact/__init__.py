@@ -39,7 +39,6 @@ light, which is A to within 8e-4, and 3.2e-3 in white media (alpha' > .999).
 """
 
 from mcml_sim.exact.half_space import (
-    ARGUMENTS,
     FINER,
     SEARCHLIGHT,
     cdf,
@@ -49,11 +48,10 @@ from mcml_sim.exact.half_space import (
     quantile,
     reflectance,
 )
-from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.stack.solution import Solution, solve
 
 __all__ = [
-    "ARGUMENTS",
     "FINER",
     "SEARCHLIGHT",
     "Nodes",

@@ -54,6 +54,14 @@ def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     raise InputError(f"{name} must be {accepted}, got {shown(value)}")
 
 
+def checked_range(name: str, value: object, accepted: str, low: float, high: float = math.inf) -> Floats:
+    """Return numbers as `checked_numbers` does; InputError on the first that is not within bounds, both included."""
+    numbers = checked_numbers(name, value, accepted)
+    if np.any(outside := ~((numbers >= low) & (numbers <= high))):
+        raise InputError(f"{name} must be {accepted}, got {float(numbers[outside].flat[0])}")
+    return numbers
+
+
 def require_one_shape(**arrays: Any) -> None:
     """Raise InputError unless the arguments broadcast to one shape."""
     try:

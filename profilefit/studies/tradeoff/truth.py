@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
 from mcml_sim.exact import by_albedo, refracting
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
