@@ -30,7 +30,7 @@ from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.setting import ILLUMINATIONS
 from mcml_sim.tracing import half_space_event, orders_batch, rng
-from mcml_sim.tracing.bins import rounded_up
+from mcml_sim.tracing.deposits import rounded_up
 
 Floats = NDArray[np.float64]
 

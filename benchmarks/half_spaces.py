@@ -24,7 +24,7 @@ from mcml_sim.exact import forwards
 from mcml_sim.exact.light import unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.order_bins import Counts
 
 Floats = NDArray[np.float64]
 

@@ -17,8 +17,7 @@ from mcml_sim.media.setting import Setting
 from mcml_sim.results import estimate
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing import order_bins
-from mcml_sim.tracing.counts import Counts, Ledger
-from mcml_sim.tracing.order_bins import OrderBins
+from mcml_sim.tracing.order_bins import Counts, Ledger, OrderBins
 
 SEARCHLIGHT = Setting()
 

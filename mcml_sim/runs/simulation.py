@@ -16,8 +16,8 @@ from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store, manifest, require_ours
 from mcml_sim.tracing import deposits, layered_batch, matched_batch, order_bins, orders_batch, pool
-from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.deposits import Deposits
+from mcml_sim.tracing.order_bins import Counts
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
 SEARCHLIGHT = Setting()

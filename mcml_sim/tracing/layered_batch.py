@@ -22,8 +22,7 @@ from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import deposits, half_space_event, layered_event, pool, rng
-from mcml_sim.tracing.bins import Axis, axis, groups
-from mcml_sim.tracing.deposits import Deposits
+from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
 from mcml_sim.tracing.layered_event import (
     CUT,
     EVENTS_PER_TURN,

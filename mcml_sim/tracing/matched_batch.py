@@ -27,8 +27,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
-from mcml_sim.tracing.bins import Axis, axis, groups
-from mcml_sim.tracing.deposits import Deposits
+from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
 from mcml_sim.tracing.isotropic_event import IsotropicLanes
 from mcml_sim.tracing.orders_batch import Ends
 

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
-from mcml_sim.tracing.bins import rounded_up
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.deposits import rounded_up
 from mcml_sim.tracing.isotropic_event import IsotropicLanes
-from mcml_sim.tracing.order_bins import OrderBins
+from mcml_sim.tracing.order_bins import Counts, OrderBins
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
 OrderLanes = IsotropicLanes | half_space_event.HalfSpaceLanes

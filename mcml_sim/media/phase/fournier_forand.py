@@ -13,8 +13,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
 from mcml_sim.media.checks import is_number, shown
 from mcml_sim.media.phase.phase import Phase
-from mcml_sim.media.phase.pieces import Pieces
-from mcml_sim.media.phase.tabulated import STRAIGHT, Tabulated
+from mcml_sim.media.phase.tabulated import STRAIGHT, Pieces, Tabulated
 
 INDICES, SLOPES = (1.0, 2.0), (3.0, 5.0)
 SMALL = 0.05  # ln delta below which a difference of second order is a series

@@ -1,4 +1,4 @@
-"""Henyey and Greenstein's phase function, the one of tissue optics."""
+"""Henyey and Greenstein's phase function, the one of tissue optics; and scattering that forgets the direction."""
 
 from __future__ import annotations
 
@@ -62,3 +62,28 @@ class HenyeyGreenstein(Phase):
         """Return 1 + g^2 - 2 g c, without cancellation at c = 1."""
         g = self.g
         return (1 - g) * (1 - g) + 2 * g * (1 - cosine)
+
+
+@dataclass(frozen=True)
+class Isotropic(Phase):
+    """Uniform density in all directions: p(c) = 1 / (4 pi) [1/sr].
+
+    Henyey and Greenstein's phase function of g = 0, to the last bit of `deflection`: the cosine is v itself, which is
+    what the kernels of the matched half space draw.
+    """
+
+    def pdf(self, cosine: Any) -> Any:
+        """Return 1 / (4 pi) [1/sr]."""
+        return 0.0 * cosine + 1 / (4 * np.pi)
+
+    def invert(self, cosine: Any) -> Any:
+        """Return (1 + c) / 2 [-]."""
+        return 0.5 * (1 + cosine)
+
+    def deflection(self, v: Any) -> tuple[Any, Any]:
+        """Return 1 - v and 1 + v [-]."""
+        return 1 - v, 1 + v
+
+    def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
+        """Return 1 for l = 0, else 0 [-]."""
+        return 1.0 * (l == 0)

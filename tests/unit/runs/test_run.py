@@ -13,7 +13,7 @@ import pytest
 from mcml_sim import Grid, simulate_orders
 from mcml_sim.runs.batches import AHEAD, run_batches
 from mcml_sim.runs.store import Store
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.order_bins import Counts
 from mcml_sim.tracing.orders_batch import BATCH_PHOTONS
 from tests.fixtures import slow
 
