@@ -29,7 +29,7 @@ from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import dispersion, panels, square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
-from mcml_sim.files.kept import kept
+from mcml_sim.files.npz import kept
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 

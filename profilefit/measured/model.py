@@ -37,7 +37,7 @@ from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
-from mcml_sim.files.kept import kept
+from mcml_sim.files.npz import kept
 from mcml_sim.media.setting import FORWARD_N, Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.instrument import PENCIL, Instrument

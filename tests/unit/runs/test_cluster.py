@@ -13,7 +13,7 @@ import pytest
 
 from mcml_sim import Grid, InputError
 from mcml_sim.errors import ClusterError
-from mcml_sim.runs import cluster
+from mcml_sim.runs import batches as cluster
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing import orders_batch
