@@ -16,8 +16,7 @@ from mcml_sim.files.whole_file import ROOM, read_whole, require_target, require_
 from mcml_sim.media.medium import Medium
 from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
-from mcml_sim.results.tally import Precision, quantities
-from mcml_sim.results.tally_file import Results, read_results, results_bytes
+from mcml_sim.results.tally import Precision, Results, quantities, read_results, results_bytes
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
 
