@@ -22,7 +22,7 @@ from mcml_sim.media import fresnel
 from mcml_sim.media.phase import Phase
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import rng
-from mcml_sim.tracing.isotropic_event import STOPPED, azimuth_cosine, has_ended, landed, stop, was_stopped
+from mcml_sim.tracing.isotropic_event import STOPPED, OrderLanes, azimuth_cosine, landed, stop
 
 # Directions of entering diffuse light come from a table, linear between so many even steps of the cube root of the
 # probability, by which it is smooth at grazing incidence too: within 2e-6 of the exact cosine.
@@ -38,37 +38,12 @@ class HalfSpace(NamedTuple):
     """Cosines of the light that has entered, to the normal and inside; see `entry_cosines`, (STEPS + 1,)."""
 
 
-class HalfSpaceLanes(NamedTuple):
-    """Photons in flight, arrays of one shape (lanes,)."""
-
-    place: Array
-    """Complex rho + i z as in `isotropic_event.IsotropicLanes`, where -z counts events once the photon has ended."""
-    direction: Array
-    """Components outwards + i down of the flight that ended here, complex64."""
-    order: Array
-    """Number of scatterings so far, int32."""
-    last: Array
-    """Order at which the photon will be stopped if it is still inside, int32."""
-    photon: Array
-    """Number of the photon in its batch, uint32."""
-
-    @property
-    def ended(self) -> Array:
-        """True where the photon has left or was stopped."""
-        return has_ended(self.place)
-
-    @property
-    def stopped(self) -> Array:
-        """True where the photon was stopped inside, among those that have ended."""
-        return was_stopped(self.place)
-
-
 def half_space(setting: Setting) -> HalfSpace:
     """Return the arrays of a setting for the kernel."""
     return HalfSpace(jnp.float32(setting.n), setting.scattering.for_kernel(), jnp.asarray(entry_cosines(setting)))
 
 
-def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpaceLanes:
+def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> OrderLanes:
     """Return photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
@@ -78,10 +53,10 @@ def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpac
     place = lax.complex(path * sine, path * cosine)
     # Outwards is where the light goes; straight down that is any direction.
     direction = lax.complex(sine, cosine)
-    return HalfSpaceLanes(place, direction, event.astype(jnp.int32), stop(toss_word, stops), photon)
+    return OrderLanes(place, direction, event.astype(jnp.int32), stop(toss_word, stops), photon)
 
 
-def fly(key: Array, lanes: HalfSpaceLanes, events: int, where: HalfSpace) -> HalfSpaceLanes:
+def fly(key: Array, lanes: OrderLanes, events: int, where: HalfSpace) -> OrderLanes:
     """Scatter every photon up to `events` times, until it ends; those that have ended stay where they are."""
     first = lanes.order.astype(jnp.uint32) + 1
     left = lanes.last - lanes.order
@@ -116,7 +91,7 @@ def _scattered(
     outwards = jnp.where(rho > 0, (outwards * along + around * across) / rho, outwards)
     out = -number.astype(jnp.float32)
     z = jnp.where(leaves, out, jnp.where(left == number, out - STOPPED, jnp.abs(z)))
-    place = jnp.where(has_ended(place), place, lax.complex(rho, z))
+    place = jnp.where(place.imag < 0, place, lax.complex(rho, z))
     return place, lax.complex(outwards, jnp.where(above, -down, down))
 
 

@@ -12,7 +12,7 @@ leading zeros of a random word. So a photon carries the order at which it will b
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array, lax
@@ -30,15 +30,14 @@ GPU_UNROLLED = 16  # measured on an H100: 4 take twice as long
 SINE = (3.141591787338257, -5.167705535888672, 2.5500307083129883, -0.5980450510978699, 0.07722011208534241)
 
 
-L = TypeVar("L", bound=Any)  # IsotropicLanes, or others with a place and an order
-
-
-class IsotropicLanes(NamedTuple):
+class OrderLanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
     """Complex rho + i z, distance from the beam and depth [mfp], complex64; -z counts events once the photon has ended
     since it was last looked at, and half an event more if it was stopped inside."""
+    direction: Array | None
+    """Components outwards + i down of the flight that ended here, complex64; None where scattering forgets them."""
     order: Array
     """Number of scatterings so far, int32."""
     last: Array
@@ -49,25 +48,15 @@ class IsotropicLanes(NamedTuple):
     @property
     def ended(self) -> Array:
         """True where the photon has left or was stopped."""
-        return has_ended(self.place)
+        return self.place.imag < 0
 
     @property
     def stopped(self) -> Array:
         """True where the photon was stopped inside, among those that have ended."""
-        return was_stopped(self.place)
+        return self.place.imag != jnp.floor(self.place.imag)
 
 
-def has_ended(place: Array) -> Array:
-    """Return True where a place, as in IsotropicLanes, is that of a photon that has left or was stopped."""
-    return place.imag < 0
-
-
-def was_stopped(place: Array) -> Array:
-    """Return True where a photon was stopped inside, among those that have ended."""
-    return place.imag != jnp.floor(place.imag)
-
-
-def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> IsotropicLanes:
+def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> OrderLanes:
     """Return photons at the place of their first scattering; `stops` rise, int32 (at most 32,).
 
     A searchlight comes straight down. Diffuse light comes from all sides alike, so the square of its cosine to the
@@ -80,7 +69,7 @@ def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchli
     if illumination == "diffuse":
         square = rng.uniform(square_word)
         place = lax.complex(path * jnp.sqrt(1 - square), path * jnp.sqrt(square))
-    return IsotropicLanes(place, event.astype(jnp.int32), stop(toss_word, stops), photon)
+    return OrderLanes(place, None, event.astype(jnp.int32), stop(toss_word, stops), photon)
 
 
 def stop(words: Array, stops: Array) -> Array:
@@ -88,7 +77,7 @@ def stop(words: Array, stops: Array) -> Array:
     return stops[jnp.minimum(lax.clz(words).astype(jnp.int32), len(stops) - 1)]
 
 
-def fly(key: Array, lanes: IsotropicLanes, events: int) -> IsotropicLanes:
+def fly(key: Array, lanes: OrderLanes, events: int) -> OrderLanes:
     """Scatter every photon up to `events` times, until it ends; those that have ended stay where they are."""
     unrolled = min(events, UNROLLED if pool.on_cpu() else GPU_UNROLLED)
     place = lax.fori_loop(
@@ -97,7 +86,7 @@ def fly(key: Array, lanes: IsotropicLanes, events: int) -> IsotropicLanes:
     return landed(lanes, place, events)
 
 
-def scatter(key: Array, lanes: IsotropicLanes, place: Array, number: Array) -> Array:
+def scatter(key: Array, lanes: OrderLanes, place: Array, number: Array) -> Array:
     """Return places after one more scattering and flight, where `number` of them (int32) led the lanes to `place`.
 
     XLA compiles one loop an output, and each would draw all random words again. So a place is one complex number, and
@@ -118,7 +107,7 @@ def scatter(key: Array, lanes: IsotropicLanes, place: Array, number: Array) -> A
     return jnp.where(place.imag < 0, place, lax.complex(rho, z))
 
 
-def landed(lanes: L, place: Array, events: int) -> L:
+def landed(lanes: OrderLanes, place: Array, events: int) -> OrderLanes:
     """Return lanes, of this or another event, after `events` scatterings that led to `place`, or that ended before."""
     done = jnp.where(place.imag < 0, (-place.imag).astype(jnp.int32), events)
     return lanes._replace(place=place, order=lanes.order + done)
@@ -133,8 +122,4 @@ def displaced(rho: Array, path: Array, sine_squared: Array, cosine: Array) -> Ar
 def azimuth_cosine(words: Array) -> Array:
     """Return the cosine of an angle uniform in (0, pi), as the sine of one uniform in (-pi/2, pi/2): |value| <= 1."""
     v = rng.symmetric(words) * jnp.float32(0.5)
-    square = v * v
-    value = jnp.float32(SINE[-1])
-    for coefficient in SINE[-2::-1]:
-        value = value * square + jnp.float32(coefficient)
-    return v * value
+    return v * rng.polynomial(SINE, v * v)

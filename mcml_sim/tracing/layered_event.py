@@ -241,7 +241,7 @@ def azimuth(v: Array) -> tuple[Array, Array]:
     """Return cosine and sine of pi v for v in [-1, 1], by the half angle."""
     half = v * jnp.float32(0.5)
     square = half * half
-    sine, cosine = half * _polynomial(SINE, square), _polynomial(COSINE, square)
+    sine, cosine = half * rng.polynomial(SINE, square), rng.polynomial(COSINE, square)
     return (cosine - sine) * (cosine + sine), 2 * sine * cosine
 
 
@@ -319,10 +319,3 @@ def _renormalising(lanes: LayeredLanes, layers: int) -> Array:
     """Return 1 / length of the direction, to first order: rounding lets it drift by 1e-7 an event. 1 after the end."""
     ux, uy, uz = lanes.heading.real, lanes.heading.imag, lanes.down.imag
     return jnp.where(inside(lanes.layer, layers), 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz), 1)
-
-
-def _polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
-    value = jnp.float32(coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        value = value * x + jnp.float32(coefficient)
-    return value

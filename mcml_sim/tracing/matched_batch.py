@@ -28,7 +28,7 @@ from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
 from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
-from mcml_sim.tracing.isotropic_event import IsotropicLanes
+from mcml_sim.tracing.isotropic_event import OrderLanes
 from mcml_sim.tracing.orders_batch import Ends
 
 # Where nothing is absorbed, 0.6 % of the light is still inside after this many scatterings; `cut` says so.
@@ -139,7 +139,7 @@ def _trace_visits(
     shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
 
-    def turn(flying: IsotropicLanes, state: tuple[Array, Array]) -> tuple[IsotropicLanes, tuple[Array, Array]]:
+    def turn(flying: OrderLanes, state: tuple[Array, Array]) -> tuple[OrderLanes, tuple[Array, Array]]:
         group = ((flying.photon.astype(jnp.float32) + 0.5) * (jnp.float32(parts) / photons)).astype(jnp.int32)
         first = jnp.minimum(group, parts - 1) * (size // parts)
 

@@ -64,10 +64,15 @@ def exponential(words: Array) -> Array:
     bits = lax.bitcast_convert_type(number, jnp.int32)
     zeros = (158 - (bits >> 23)).astype(jnp.float32)
     y = 2 - lax.bitcast_convert_type((bits & 0x7FFFFF) | 0x3F800000, jnp.float32)
-    value = jnp.float32(LOGARITHM[-1])
-    for coefficient in LOGARITHM[-2::-1]:
-        value = value * y + jnp.float32(coefficient)
-    return value * y + zeros * jnp.float32(np.log(2))
+    return polynomial(LOGARITHM, y) * y + zeros * jnp.float32(np.log(2))
+
+
+def polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
+    """Return a polynomial of rising coefficients, in float32."""
+    value = jnp.float32(coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        value = value * x + jnp.float32(coefficient)
+    return value
 
 
 def symmetric(words: Array) -> Array:

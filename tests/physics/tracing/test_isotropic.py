@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mcml_sim.tracing import isotropic_event, rng
-from mcml_sim.tracing.isotropic_event import IsotropicLanes
+from mcml_sim.tracing.isotropic_event import OrderLanes
 from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
 
 STOPS = OrderBins().stops
@@ -47,7 +47,7 @@ def test_displacement_is_that_of_the_plane():
 def lanes(z, order, last=MAX_ORDER, count=2**14):
     place = jnp.full(count, 1 + 1j * z, jnp.complex64)
     numbers = (jnp.full(count, n, jnp.int32) for n in (order, last))
-    return IsotropicLanes(place, *numbers, jnp.arange(count, dtype=jnp.uint32))
+    return OrderLanes(place, None, *numbers, jnp.arange(count, dtype=jnp.uint32))
 
 
 KEY = jnp.asarray(rng.batch_key(0, 0))
