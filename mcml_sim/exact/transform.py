@@ -104,7 +104,7 @@ def solve(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> Transfo
     """Return the transform of one albedo, a float64 scalar in [0, 1]."""
     k, weight = _contour(alpha, rule)
     value = over_alpha(alpha, jnp.append(k, ORIGIN), illumination, rule)
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha))
+    return _of_values(alpha, k, weight, value)
 
 
 @solve.defjvp
@@ -116,7 +116,7 @@ def _solve_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tuple) -
     of_value, of_total = slope[:-1] * d_alpha, slope[-1].real * d_alpha
     held = jnp.zeros_like(k), jnp.zeros_like(k)
     tangent = Transform(*held, of_value, of_total, jnp.zeros_like(alpha), jnp.zeros_like(alpha))
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha)), tangent
+    return _of_values(alpha, k, weight, value), tangent
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
@@ -142,13 +142,11 @@ def _total(alpha: jax.Array, value: jax.Array) -> jax.Array:
     return jnp.where(alpha == 1.0, 1.0, value[-1].real)
 
 
-def _pole(alpha: jax.Array) -> jax.Array:
-    """Return the part of H1's pole: a contour that starts at the origin itself passes half of it there."""
-    return jnp.where(alpha == 1.0, 0.5, 0.0)
-
-
-def _farthest(alpha: jax.Array) -> jax.Array:
-    return jnp.where(alpha == 1.0, FARTHEST_RADIUS, NO_LIGHT)
+def _of_values(alpha: jax.Array, k: jax.Array, weight: jax.Array, value: jax.Array) -> Transform:
+    """Return the transform of values at k and, last, at the origin: where alpha is 1 the contour starts there."""
+    is_white = alpha == 1.0
+    ends = jnp.where(is_white, 0.5, 0.0), jnp.where(is_white, FARTHEST_RADIUS, NO_LIGHT)
+    return Transform(k, weight, value[:-1], _total(alpha, value), *ends)
 
 
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:

@@ -241,13 +241,10 @@ def parse_mco(content: bytes, name: str) -> Output:
     if _beginning(lines) == OUTPUT_2:
         return _parse_2(lines)
     run = read_run(lines, set())
-    _keyword(lines, "RAT")
-    specular, diffuse, _, _ = _read_column(lines, "RAT", 4)
-    for key, size in (("A_l", len(run.medium.layers)), ("A_z", run.nz)):
-        _keyword(lines, key)
-        _read_column(lines, key, size)
-    _keyword(lines, "Rd_r")
-    return Output(run, specular, diffuse, np.array(_read_column(lines, "Rd_r", run.nr)))
+    sizes = {"RAT": 4, "A_l": len(run.medium.layers), "A_z": run.nz, "Rd_r": run.nr}
+    columns = {key: _read_column(lines, key, size) for key, size in sizes.items()}
+    specular, diffuse, *_ = columns["RAT"]
+    return Output(run, specular, diffuse, np.array(columns["Rd_r"]))
 
 
 def _parse_2(lines: Lines) -> Output:
@@ -296,6 +293,7 @@ def _keyword(lines: Lines, key: str) -> None:
 
 
 def _read_column(lines: Lines, key: str, size: int) -> list[float]:
+    _keyword(lines, key)
     numbers = []
     for at in range(size):
         what = f"number {at + 1} of {size} of {key}"

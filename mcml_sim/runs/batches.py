@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_EXCEPTION, CancelledError, Future, ThreadPo
 from types import ModuleType, TracebackType
 from typing import Generic
 
-from rich.progress import Progress
+from rich.progress import Progress, TaskID
 
 from mcml_sim.errors import ClusterError, InputError, Notice
 from mcml_sim.media.checks import checked_workers
@@ -68,16 +68,33 @@ def run_batches(
     checked_workers(workers, scheduler)
     cluster = None if scheduler is None else Cluster(scheduler, trace)
     threads = min(cluster.tasks if cluster else workers or os.cpu_count() or 1, -(-photons // batch_photons))
+    fold = _Fold(enough, AHEAD * threads)
+
+    def work(shown: Progress, line: TaskID) -> None:
+        while (batch := fold.take()) is not None:
+            size = min(batch_photons, photons - batch * batch_photons)
+            if size <= 0:
+                return
+            kept = store.load(batch) if store else None
+            if kept is not None and kept.started == size:
+                result = kept
+            else:
+                result = (cluster.trace if cluster else trace)(batch, size)
+                # A fuller batch from a longer run holds these photons and more: keep it.
+                if store and (kept is None or kept.started < size):
+                    store.save(batch, result)
+            fold.add(batch, result)
+            shown.advance(line, size)
+
     # Leaving, the cluster is closed first: that frees the threads that wait for it.
     with (
         bar("photons", progress, kept=True) as shown,
         ThreadPoolExecutor(threads) as pool,
         cluster or contextlib.nullcontext(),
     ):
-        fold = _Fold(enough, AHEAD * threads)
-        run = _Run(cluster.trace if cluster else trace, batch_photons, photons, store, fold, shown)
+        line = shown.add_task("photons", total=photons)
         try:
-            _wait([pool.submit(run.work) for _ in range(threads)])
+            _wait([pool.submit(work, shown, line) for _ in range(threads)])
         finally:
             fold.stop()
     return fold.total()
@@ -124,42 +141,6 @@ class _Fold(Generic[R]):
         if self._sum is None:
             raise RuntimeError("no batch was run")
         return self._sum
-
-
-class _Run(Generic[R]):
-    """State that the threads of one run share."""
-
-    def __init__(
-        self,
-        trace: Callable[[int, int], R],
-        batch_photons: int,
-        photons: int,
-        store: Store[R] | None,
-        fold: _Fold[R],
-        shown: Progress,
-    ) -> None:
-        self._trace, self._store, self._fold = trace, store, fold
-        self._batch_photons, self._photons = batch_photons, photons
-        self._bar, self._line = shown, shown.add_task("photons", total=photons)
-
-    def work(self) -> None:
-        """Take the next batch until there is none."""
-        while (batch := self._fold.take()) is not None:
-            photons = min(self._batch_photons, self._photons - batch * self._batch_photons)
-            if photons <= 0:
-                return
-            self._fold.add(batch, self._batch(batch, photons))
-            self._bar.advance(self._line, photons)
-
-    def _batch(self, batch: int, photons: int) -> R:
-        kept = self._store.load(batch) if self._store else None
-        if kept is not None and kept.started == photons:
-            return kept
-        result = self._trace(batch, photons)
-        # A fuller batch from a longer run holds these photons and more: keep it.
-        if self._store and (kept is None or kept.started < photons):
-            self._store.save(batch, result)
-        return result
 
 
 def _wait(futures: list[Future[None]]) -> None:

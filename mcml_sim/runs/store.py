@@ -191,18 +191,14 @@ def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
     file = io.BytesIO()
     np.savez_compressed(file, allow_pickle=False, **arrays)
     body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
-    return body + _seal(body)
+    return body + hashlib.sha256(body).hexdigest().encode()
 
 
 def _unsealed(data: bytes) -> dict[str, NDArray]:
     """Return the arrays of a sealed file; ValueError if a bit of it has changed."""
-    if data[-SEAL_BYTES:] != _seal(data[:-SEAL_BYTES]):
+    if data[-SEAL_BYTES:] != hashlib.sha256(data[:-SEAL_BYTES]).hexdigest().encode():
         raise ValueError("its bytes are not those that were written")
     return read_npz(data, MAX_BATCH, text=["made_by"])
-
-
-def _seal(body: bytes) -> bytes:
-    return hashlib.sha256(body).hexdigest().encode()
 
 
 def manifest(folder: Path) -> dict[str, object] | None:
@@ -213,14 +209,12 @@ def manifest(folder: Path) -> dict[str, object] | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise _damaged(path, reason_of(error)) from None
-    if not isinstance(content, dict):
-        raise _damaged(path, "not an object")
-    return content
-
-
-def _damaged(path: Path, reason: str) -> StoreError:
-    return StoreError(f"{path} is damaged ({reason}); delete it, the batches beside it stay valid")
+        reason = reason_of(error)
+    else:
+        if isinstance(content, dict):
+            return content
+        reason = "not an object"
+    raise StoreError(f"{path} is damaged ({reason}); delete it, the batches beside it stay valid")
 
 
 def maker() -> dict[str, object]:
@@ -254,9 +248,8 @@ def _apart(theirs: object, ours: object) -> tuple[str, str]:
         return there, here
     differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)
     start = max(next(differ, 0) - SHARED_SHOWN, 0)
-    return _cut(there, start), _cut(here, start)
-
-
-def _cut(text: str, start: int) -> str:
     end = start + LONGEST_SHOWN
-    return ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "")
+    theirs, ours = (
+        ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "") for text in (there, here)
+    )
+    return theirs, ours

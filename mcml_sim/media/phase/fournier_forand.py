@@ -45,11 +45,9 @@ class FournierForand(Phase):
                 raise InputError(f"{name} must be in ({low:g}, {high:g}), got {shown(value)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]; straight on, that of the nearest cosine below 1."""
         return self._density(namespace(self.n, self.mu, cosine).maximum(1 - cosine, STRAIGHT))
 
     def invert(self, cosine: Any) -> Any:
-        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return 1 - self._below(1 - cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
@@ -58,7 +56,6 @@ class FournierForand(Phase):
         return below_one, 2 - below_one
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """Return the Legendre moment of order l [-], by quadrature over the table."""
         return _pieces(self).moment(l)
 
     def for_kernel(self) -> Tabulated:

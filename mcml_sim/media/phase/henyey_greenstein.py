@@ -34,13 +34,11 @@ class HenyeyGreenstein(Phase):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]."""
         xp = namespace(self.g, cosine)
         square = self._square(cosine)
         return (1 - self.g * self.g) / (2 * square * xp.sqrt(square)) / (2 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """Return the `xi` whose sample is `cosine` [-], the integral of the density from -1 on."""
         xp, g = namespace(self.g, cosine), self.g
         distance = xp.sqrt(self._square(cosine))
         return 0.5 + 0.5 * (2 * cosine - 3 * g + g * g * g) / (distance * (1 - g * g + distance))
@@ -55,7 +53,6 @@ class HenyeyGreenstein(Phase):
         return below_one, above_minus_one
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Return the Legendre moment g^l [-]."""
         return self.g**l
 
     def _square(self, cosine: Any) -> Any:
@@ -73,11 +70,9 @@ class Isotropic(Phase):
     """
 
     def pdf(self, cosine: Any) -> Any:
-        """Return 1 / (4 pi) [1/sr]."""
         return 0.0 * cosine + 1 / (4 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """Return (1 + c) / 2 [-]."""
         return 0.5 * (1 + cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
@@ -85,5 +80,4 @@ class Isotropic(Phase):
         return 1 - v, 1 + v
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Return 1 for l = 0, else 0 [-]."""
         return 1.0 * (l == 0)

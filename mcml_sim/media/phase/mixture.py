@@ -56,11 +56,9 @@ class Mixture(Phase):
             raise InputError(f"weights must sum to 1, got {math.fsum(self.weights):.12g}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]."""
         return self._mean([phase.pdf(cosine) for phase in self.phases])
 
     def invert(self, cosine: Any) -> Any:
-        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return self._mean([phase.invert(cosine) for phase in self.phases])
 
     def sample(self, xi: Any) -> Any:
@@ -89,7 +87,6 @@ class Mixture(Phase):
         return sample
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Return the mean of the terms' Legendre moments of order l [-]."""
         return self._mean([phase.moment(l) for phase in self.phases])
 
     @property

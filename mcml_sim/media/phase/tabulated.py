@@ -205,12 +205,10 @@ class Tabulated(Phase):
         return f"Tabulated({len(self.angles)} angles, {digest[:DIGITS]})"
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]; straight on, that of the nearest cosine below 1."""
         xp = namespace(cosine, self.pieces.end)
         return self.pieces.value(xp.maximum(1 - cosine, STRAIGHT)) / (2 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """Return the `xi` whose sample is `cosine` [-]."""
         return 1 - self.pieces.below(1 - cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
@@ -219,7 +217,6 @@ class Tabulated(Phase):
         return below_one, 2 - below_one
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """Return the Legendre moment of order l [-], by quadrature."""
         return self.pieces.moment(l)
 
     def for_kernel(self) -> Tabulated:
