@@ -49,7 +49,6 @@ from __future__ import annotations
 
 import io
 import itertools
-import math
 import os
 import posixpath
 import re
