@@ -109,12 +109,7 @@ class Grid:
         a = "" if self.a_edges is None else f", {self.angles} angles"
         return f"Grid({self.rings} annuli to r = {self.r_edges[-1]:g}{z}{a}, {self.digest[:8]})"
 
-    def _set_edges(
-        self,
-        r_edges: Floats,
-        z_edges: Floats | None,
-        a_edges: Floats | None,
-    ) -> None:
+    def _set_edges(self, r_edges: Floats, z_edges: Floats | None, a_edges: Floats | None) -> None:
         for name, edges in (("r_edges", r_edges), ("z_edges", z_edges), ("a_edges", a_edges)):
             if edges is not None:
                 edges.setflags(write=False)

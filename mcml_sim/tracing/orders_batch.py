@@ -52,10 +52,7 @@ def trace_batch(
     edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns(bins))
     cells = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
     counts = Counts(
-        exits=cells[:, :-2],
-        rouletted=int(cells[:, -2].sum()),
-        cut=int(cells[:, -1].sum()),
-        started=photons,
+        exits=cells[:, :-2], rouletted=int(cells[:, -2].sum()), cut=int(cells[:, -1].sum()), started=photons
     )
     counts.require_closed()
     return counts

@@ -174,9 +174,7 @@ def test_what_another_table_would_change_is_small():
 
 
 @pytest.mark.parametrize(
-    "setting",
-    [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)],
-    ids=str,
+    "setting", [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)], ids=str
 )
 def test_outside_the_table_the_tracer_is_named(setting):
     assert not setting.is_solved

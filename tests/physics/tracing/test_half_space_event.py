@@ -14,12 +14,7 @@ from mcml_sim.tracing.order_bins import OrderBins
 pytestmark = pytest.mark.slow
 
 EDGES = np.array([0, 0.1, 0.3, 0.6, 1, 2, 4, 8.0])
-SETTINGS = [
-    Setting(n=1.4),
-    Setting(g=0.8),
-    Setting("diffuse", n=1.5, g=-0.5),
-    Setting("diffuse", n=0.8, g=0.4),
-]
+SETTINGS = [Setting(n=1.4), Setting(g=0.8), Setting("diffuse", n=1.5, g=-0.5), Setting("diffuse", n=0.8, g=0.4)]
 STOPS = OrderBins().stops
 PHOTONS, LAST_ORDER = 150_000, 32
 
@@ -88,10 +83,7 @@ def table(rho, order):
 def traced(setting, photons):
     """Exit radius and order of the kernel, whatever the setting."""
     ends = orders_batch.trace(
-        jnp.asarray(rng.batch_key(7, 0)),
-        jnp.int32(photons),
-        jnp.asarray(STOPS),
-        half_space_event.half_space(setting),
+        jnp.asarray(rng.batch_key(7, 0)), jnp.int32(photons), jnp.asarray(STOPS), half_space_event.half_space(setting)
     )
     return np.asarray(ends.rho)[:photons], np.asarray(ends.order)[:photons]
 
