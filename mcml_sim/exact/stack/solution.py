@@ -36,7 +36,7 @@ from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, stack
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, shown
+from mcml_sim.media.checks import checked_range, require
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting, require_illumination
 
@@ -128,8 +128,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
     radii cost little.
     """
     _require_solved(medium, illumination)
-    if not isinstance(nodes, Nodes):
-        raise InputError(f"nodes must be a mcml_sim.exact.Nodes, got {shown(nodes)}")
+    require(isinstance(nodes, Nodes), "nodes", "a mcml_sim.exact.Nodes", nodes)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
     (fine, down, absorbed), (coarse, _, other) = (_shares(medium, illumination, rule) for rule in (nodes, nodes.fewer))
     waves = np.array([first.mu_t])
@@ -150,8 +149,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
 
 
 def _require_solved(medium: Medium, illumination: str) -> None:
-    if not isinstance(medium, Medium):
-        raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
+    require(isinstance(medium, Medium), "medium", "a mcml_sim.Medium", medium)
     require_illumination(illumination)
     layers = medium.layers
     if len(layers) > MAX_LAYERS:

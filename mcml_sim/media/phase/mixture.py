@@ -12,7 +12,7 @@ import numpy as np
 
 from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require
 from mcml_sim.media.phase.phase import Phase
 
 MOST_TERMS = 64
@@ -38,8 +38,7 @@ class Mixture(Phase):
     def __post_init__(self) -> None:
         for name in ("weights", "phases"):
             value = getattr(self, name)
-            if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str):
-                raise InputError(f"{name} must be a list, got {shown(value)}")
+            require(isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str), name, "a list", value)
             object.__setattr__(self, name, tuple(value))
         if not 1 <= len(self.weights) == len(self.phases) <= MOST_TERMS:
             raise InputError(
@@ -47,11 +46,9 @@ class Mixture(Phase):
                 f"got {len(self.weights)} weights and {len(self.phases)} phases"
             )
         for phase in self.phases:
-            if not isinstance(phase, Phase):
-                raise InputError(f"phases must be phase functions, got {shown(phase)}")
+            require(isinstance(phase, Phase), "phases", "phase functions", phase)
         for weight in self.weights:
-            if not (is_number(weight) and 0 <= weight <= 1):
-                raise InputError(f"weights must be shares in [0, 1], got {shown(weight)}")
+            require(is_number(weight) and 0 <= weight <= 1, "weights", "shares in [0, 1]", weight)
         if abs(math.fsum(self.weights) - 1) > ROUNDING:
             raise InputError(f"weights must sum to 1, got {math.fsum(self.weights):.12g}")
 
