@@ -7,14 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import (
-    MAX_PHOTONS,
-    checked_folder,
-    checked_whole,
-    checked_workers,
-    require,
-    require_own_process,
-)
+from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting, require_illumination
@@ -62,7 +55,8 @@ def simulate(
     InputError on other arguments; StoreError if the folder is another run's or cannot be written. Ctrl-C stops after
     the batches in flight, which the store keeps too.
     """
-    require(isinstance(medium, Medium), "medium", "a mcml_sim.Medium", medium)
+    if not isinstance(medium, Medium):
+        raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
     require_resolved(grid)
     require_illumination(illumination)
     require_own_process()
@@ -201,7 +195,8 @@ def trace_share(
 def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
     """Return the number of photons and the seed; InputError if the run cannot be done."""
     require_own_process()
-    require(isinstance(setting, Setting), "setting", "a mcml_sim.Setting", setting)
+    if not isinstance(setting, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
     require_resolved(grid)
     return checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS), checked_whole("seed", seed, lowest=0)
 
