@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
-from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
+from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
 from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
-from mcml_sim.tracing.isotropic_event import OrderLanes
+from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.orders_batch import Ends
 
 # Where nothing is absorbed, 0.6 % of the light is still inside after this many scatterings; `cut` says so.
@@ -150,17 +150,17 @@ def _trace_visits(
             weight = visiting.at[flying.order + number.astype(jnp.int32) + 1].get(mode="clip")
             # Those that have ended add nothing, somewhere: a branch that no processor can foresee costs more.
             weight = jnp.where(place.imag < 0, 0, weight)
-            return isotropic_event.scatter(key, flying, place, number), table.at[cell].add(
+            return half_space_event.scatter(key, flying, place, number), table.at[cell].add(
                 weight, mode="promise_in_bounds"
             )
 
         table, ends = state
         place, table = lax.fori_loop(0, VISITS_PER_TURN, event, (flying.place, table))
-        flying = isotropic_event.landed(flying, place, VISITS_PER_TURN)
+        flying = half_space_event.landed(flying, place, VISITS_PER_TURN)
         return flying, (table, orders_batch.recorded(ends, flying))
 
     state = jnp.zeros(size, jnp.int64), orders_batch.no_ends(lanes)
-    table, ends = pool.follow(lambda photon: isotropic_event.enter(key, photon, stops), turn, state, photons, lanes)
+    table, ends = pool.follow(lambda photon: half_space_event.enter(key, photon, stops), turn, state, photons, lanes)
     by_group = table.reshape(shape) * UNIT
     return orders_batch.as_ends(ends), Visits(*_summed(by_group), *_summed(by_group.sum(axis=1)))
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
-from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
+from mcml_sim.tracing import half_space_event, order_bins, pool, rng
 from mcml_sim.tracing.deposits import rounded_up
-from mcml_sim.tracing.isotropic_event import OrderLanes
+from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.order_bins import Counts, OrderBins
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
@@ -71,21 +71,16 @@ def trace(
     """Return the ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
 
     `where` is the half space and its light, by default matched and isotropic under this `illumination`. `stops` as in
-    `isotropic_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
+    `half_space_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
     nothing but the speed.
     """
     lanes = lanes or pool.lanes()
 
     def enter(photon: Array) -> OrderLanes:
-        if where is None:
-            return isotropic_event.enter(key, photon, stops, illumination)
-        return half_space_event.enter(key, photon, stops, where)
+        return half_space_event.enter(key, photon, stops, where, illumination)
 
     def turn(flying: OrderLanes, ends: Array) -> tuple[OrderLanes, Array]:
-        if where is None:
-            flying = isotropic_event.fly(key, flying, events)
-        else:
-            flying = half_space_event.fly(key, flying, events, where)
+        flying = half_space_event.fly(key, flying, events, where)
         return flying, recorded(ends, flying)
 
     return as_ends(pool.follow(enter, turn, no_ends(lanes), photons, lanes))

@@ -3,8 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim.tracing import isotropic_event, rng
-from mcml_sim.tracing.isotropic_event import OrderLanes
+from mcml_sim.tracing import half_space_event, rng
+from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
 
 STOPS = OrderBins().stops
@@ -21,7 +21,7 @@ def azimuth_words():
 
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
     words = azimuth_words()
-    cosine = np.asarray(jax.jit(isotropic_event.azimuth_cosine)(words), np.float64)
+    cosine = np.asarray(jax.jit(half_space_event.azimuth_cosine)(words), np.float64)
     exact = np.sin(np.pi * (words.view(np.int32) + 0.5) / 2.0**32)
     assert np.abs(cosine - exact).max() < 5e-7
     assert np.abs(cosine).max() <= 1
@@ -29,7 +29,7 @@ def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
 
 def test_azimuth_cosine_is_that_of_a_uniform_angle():
     words = np.random.default_rng(1).integers(0, 2**32, 10**6).astype(np.uint32)
-    angle = np.arccos(np.asarray(isotropic_event.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
+    angle = np.arccos(np.asarray(half_space_event.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
     # Kolmogorov-Smirnov: 1.95 / sqrt(N) has a chance of 1e-3.
     rank = (np.arange(10**6) + 0.5) / 10**6
     assert np.abs(np.sort(angle) - rank).max() < 1.95e-3
@@ -40,7 +40,7 @@ def test_displacement_is_that_of_the_plane():
     rho, path = 10 ** source.uniform(-3, 2, 10**5), 10 ** source.uniform(-3, 1, 10**5)
     angle, sine = source.uniform(0, 6.3, 10**5), source.uniform(0, 1, 10**5)
     exact = np.hypot(rho + path * sine * np.cos(angle), path * sine * np.sin(angle))
-    fast = isotropic_event.displaced(*(jnp.asarray(v, jnp.float32) for v in (rho, path, sine**2, np.cos(angle))))
+    fast = half_space_event.displaced(*(jnp.asarray(v, jnp.float32) for v in (rho, path, sine**2, np.cos(angle))))
     np.testing.assert_allclose(fast, exact, atol=3e-7 * (rho + path).max(), rtol=2e-6)
 
 
@@ -51,8 +51,8 @@ def lanes(z, order, last=MAX_ORDER, count=2**14):
 
 
 KEY = jnp.asarray(rng.batch_key(0, 0))
-ENTER = jax.jit(isotropic_event.enter, static_argnames="illumination")
-FLY = jax.jit(isotropic_event.fly, static_argnames="events")
+ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
+FLY = jax.jit(half_space_event.fly, static_argnames="events")
 
 
 def test_first_scatterings_lie_straight_below_at_exponential_depths():
