@@ -48,12 +48,9 @@ BISECTIONS = 50
 class System(NamedTuple):
     """Equations of the half space at one wave number, on nodes x."""
 
-    matrix: jax.Array
-    """Matrix M, complex128 (x, x)."""
-    leaving: jax.Array
-    """Vector sqrt(w) q, complex128 (x,)."""
-    source: jax.Array
-    """Vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)."""
+    matrix: jax.Array  # matrix M, complex128 (x, x)
+    leaving: jax.Array  # vector sqrt(w) q, complex128 (x,)
+    source: jax.Array  # vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)
 
 
 class _Cone(NamedTuple):

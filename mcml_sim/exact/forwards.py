@@ -54,10 +54,8 @@ DARKEST, FAINTEST = 1e-200, 1e-300  # an albedo that stands for 0, whose shares 
 class SplinedLight(NamedTuple):
     """Light of one half space."""
 
-    rest: Floats
-    """Coefficients of f in B-splines on KNOTS, by node of s, (s, splines)."""
-    share: Floats
-    """Ratio A / alpha', (s,)."""
+    rest: Floats  # coefficients of f in B-splines on KNOTS, by node of s, (s, splines)
+    share: Floats  # ratio A / alpha', (s,)
 
 
 @lru_cache(maxsize=32)

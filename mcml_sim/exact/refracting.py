@@ -58,8 +58,7 @@ class Table(NamedTuple):
 
     lines: Complexes
     """Chebyshev coefficients of R^(k) / alpha on the groups' lines, and at k = 0: (2 lights, groups, k, degree)."""
-    ray: Complexes
-    """Transform of each order of scattering, on the ray: (2 lights, k, orders)."""
+    ray: Complexes  # transform of each order of scattering, on the ray: (2 lights, k, orders)
 
 
 class _Contour(NamedTuple):

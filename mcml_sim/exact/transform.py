@@ -64,13 +64,10 @@ class Rule:
     k: int
     m: int
     x: int
-    line: int = 12
-    """Number of wave numbers of a panel."""
-    depth: int = 96
-    """Number of nodes x of `cone`."""
+    line: int = 12  # number of wave numbers of a panel
+    depth: int = 96  # number of nodes x of `cone`
     angles: int = 72
-    degree: int = 18
-    """Number of polynomials in w."""
+    degree: int = 18  # number of polynomials in w
 
     def scaled(self, factor: float) -> Rule:
         """Return the rule with that many times as many nodes."""
@@ -85,14 +82,10 @@ STANDARD = Rule(k=224, m=24, x=40)
 class Transform(NamedTuple):
     """Transform of one albedo on its contour, over alpha, so that it has a limit where alpha is 0."""
 
-    k: jax.Array
-    """Wave numbers, complex128 (nodes,) [1/mfp]."""
-    weight: jax.Array
-    """Steps dk, complex128 (nodes,) [1/mfp]."""
-    value: jax.Array
-    """Values R^(k) / alpha, complex128 (nodes,) [-]."""
-    reflectance: jax.Array
-    """Ratio A / alpha, float64 () [-]."""
+    k: jax.Array  # wave numbers, complex128 (nodes,) [1/mfp]
+    weight: jax.Array  # steps dk, complex128 (nodes,) [1/mfp]
+    value: jax.Array  # values R^(k) / alpha, complex128 (nodes,) [-]
+    reflectance: jax.Array  # ratio A / alpha, float64 () [-]
     pole: jax.Array
     """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where it starts at 0."""
     farthest: jax.Array

@@ -25,10 +25,8 @@ TABLE_BYTES = 2**26  # for the tables of all groups
 class Axis:
     """Bins of one coordinate; what is beyond them has the number `bins`."""
 
-    edges: Array
-    """Edges but the first [length], float32 (bins,)."""
-    per_length: Array
-    """Bins in a unit of length, if all are equal, float32 ()."""
+    edges: Array  # edges but the first [length], float32 (bins,)
+    per_length: Array  # bins in a unit of length, if all are equal, float32 ()
     bins: int
     even: bool
 
@@ -69,31 +67,23 @@ class Deposits:
     groups of photons: `..._variance` estimates the variance of the sum beside it.
     """
 
-    started: int
-    """Number of photons."""
+    started: int  # number of photons
     reflected: Floats
     """Weight out of the top, by ring (the last row: beyond the last ring) and angle, (rings + 1, angles or 1)."""
     reflected_squares: Floats
-    transmitted: Floats
-    """Weight out of the bottom that was scattered, like `reflected`."""
+    transmitted: Floats  # weight out of the bottom that was scattered, like `reflected`
     transmitted_squares: Floats
-    ballistic: Floats
-    """Weight out of the bottom that was never scattered, ()."""
+    ballistic: Floats  # weight out of the bottom that was never scattered, ()
     ballistic_squares: Floats
-    absorbed: Floats
-    """Weight absorbed by each layer, and by all of them together in the last entry, (layers + 1,)."""
-    absorbed_squares: Floats
-    """Squares of what one photon left in each layer, and in all."""
-    accounted: Floats
-    """Weight that left, was absorbed, or was cut, (): `started` but for roulette's luck."""
+    absorbed: Floats  # weight absorbed by each layer, and by all of them together in the last entry, (layers + 1,)
+    absorbed_squares: Floats  # squares of what one photon left in each layer, and in all
+    accounted: Floats  # weight that left, was absorbed, or was cut, (): `started` but for roulette's luck
     accounted_squares: Floats
-    cut: Floats
-    """Weight still inside at the last event allowed, ()."""
+    cut: Floats  # weight still inside at the last event allowed, ()
     absorbed_rz: Floats
     """Weight absorbed by ring and depth, overflows last, (rings + 1, depths + 1); (0, 0) if depth is not resolved."""
     absorbed_rz_variance: Floats
-    absorbed_z: Floats
-    """Weight absorbed by depth, (depths + 1,) or (0,)."""
+    absorbed_z: Floats  # weight absorbed by depth, (depths + 1,) or (0,)
     absorbed_z_variance: Floats
 
     def __add__(self, other: Deposits) -> Deposits:

@@ -48,12 +48,9 @@ class OrderLanes(NamedTuple):
     since it was last looked at, and half an event more if it was stopped inside."""
     direction: Array | None
     """Components outwards + i down of the flight that ended here, complex64; None where scattering forgets them."""
-    order: Array
-    """Number of scatterings so far, int32."""
-    last: Array
-    """Order at which the photon will be stopped if it is still inside, int32."""
-    photon: Array
-    """Number of the photon in its batch, uint32."""
+    order: Array  # number of scatterings so far, int32
+    last: Array  # order at which the photon will be stopped if it is still inside, int32
+    photon: Array  # number of the photon in its batch, uint32
 
     @property
     def ended(self) -> Array:
@@ -71,8 +68,7 @@ class HalfSpace(NamedTuple):
 
     n: Array
     phase: Phase
-    entry: Array
-    """Cosines of the light that has entered, to the normal and inside; see `entry_cosines`, (STEPS + 1,)."""
+    entry: Array  # cosines of the light that has entered, to the normal and inside; see `entry_cosines`, (STEPS + 1,)
 
 
 def half_space(setting: Setting) -> HalfSpace:

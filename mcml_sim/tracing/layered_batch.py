@@ -47,21 +47,16 @@ class LayeredBins(NamedTuple):
 
     r: Axis
     z: Axis
-    cosines: Array
-    """Cosines of the lower edges of the angles, falling from 1, float32 (angles,)."""
-    groups_per_photon: Array
-    """Groups of photons over photons, float32."""
-    per_weight: Array
-    """Units of the sums in a weight of 1, float64."""
+    cosines: Array  # cosines of the lower edges of the angles, falling from 1, float32 (angles,)
+    groups_per_photon: Array  # groups of photons over photons, float32
+    per_weight: Array  # units of the sums in a weight of 1, float64
 
 
 class KernelShape(NamedTuple):
     """Properties that the kernels are compiled for, besides the shapes of their arrays."""
 
-    groups: int
-    """Number of groups of photons."""
-    depths: bool
-    """Whether depth is resolved."""
+    groups: int  # number of groups of photons
+    depths: bool  # whether depth is resolved
     lanes: int
 
 
@@ -71,8 +66,7 @@ class PhotonFates(NamedTuple):
     exits: Array
     """Complex rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 after roulette,
     complex64 (BATCH_PHOTONS + lanes,)."""
-    cosines: Array
-    """Cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
+    cosines: Array  # cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved
     absorbed: tuple[Array, ...]
     """Weight left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
     by_layer: Array

@@ -52,20 +52,15 @@ COSINE = (1.0, -4.934802055358887, 4.058711528778076, -1.3352385759353638, 0.235
 class Stack(NamedTuple):
     """Medium as float32 arrays by layer, (layers,)."""
 
-    thickness: Array
-    """Thickness [length]."""
-    top: Array
-    """Depth of the layer's upper interface [length]."""
-    mfp: Array
-    """Mean free path [length], FARTHEST in clear glass."""
+    thickness: Array  # thickness [length]
+    top: Array  # depth of the layer's upper interface [length]
+    mfp: Array  # mean free path [length], FARTHEST in clear glass
     absorbs: Array
     """Number 1 - alpha = mu_a / mu_t [-], kept apart: the difference would lose the digits of weak absorption."""
-    phase: Phase
-    """Phase function of Henyey and Greenstein, its g by layer."""
+    phase: Phase  # phase function of Henyey and Greenstein, its g by layer
     others: tuple[Phase | None, ...]
     """Phase functions of layers that have another one, a single one each; what is None is no array."""
-    n: Array
-    """Refractive indices [-], (layers + 2,): those above and below are first and last."""
+    n: Array  # refractive indices [-], (layers + 2,): those above and below are first and last
 
     @property
     def layers(self) -> int:
@@ -76,21 +71,16 @@ class Stack(NamedTuple):
 class LayeredLanes(NamedTuple):
     """Photons in flight, arrays (lanes,)."""
 
-    place: Array
-    """Complex x + i y [length], complex64."""
+    place: Array  # complex x + i y [length], complex64
     down: Array
     """Depth below the top of the layer [length], and i times the direction's cosine to the axis [-], complex64."""
-    heading: Array
-    """Other cosines of the direction, ux + i uy [-], complex64."""
-    weight: Array
-    """Weight left of the photon [-], negative while it waits at an interface and once it has ended."""
+    heading: Array  # other cosines of the direction, ux + i uy [-], complex64
+    weight: Array  # weight left of the photon [-], negative while it waits at an interface and once it has ended
     layer: Array
     """Number of the layer it is in, from 1, int32; once it has ended REFLECTED, ROULETTED, CUT or, if it was
     transmitted, one more than there are layers."""
-    event: Array
-    """Number of events so far, waiting included, uint32."""
-    photon: Array
-    """Number of the photon in its batch, uint32."""
+    event: Array  # number of events so far, waiting included, uint32
+    photon: Array  # number of the photon in its batch, uint32
     absorbed: tuple[Array, ...]
     """Weight it has left in each of the layers, as far as they are followed one by one, or in all of them [-]."""
 

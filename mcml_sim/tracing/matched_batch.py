@@ -50,14 +50,10 @@ MOST_GROUPS = 16  # of photons, whose spread gives the errors of what is absorbe
 class Weights:
     """Weights of a photon by order n = 0 ... MAX_ORDER; all arrays float64 (MAX_ORDER + 1,) but `stops`."""
 
-    stops: NDArray[np.int32]
-    """Orders at which half of those inside end, and the last at which all do, int32 (STOPS,)."""
-    leaving: Floats
-    """Weight of one that leaves after n scatterings."""
-    visiting: Floats
-    """Weight of one that arrives at its n-th place; 1 - alpha of it stays there."""
-    absorbed: Floats
-    """Weight left by a photon at its first n places."""
+    stops: NDArray[np.int32]  # orders at which half of those inside end, and the last at which all do, int32 (STOPS,)
+    leaving: Floats  # weight of one that leaves after n scatterings
+    visiting: Floats  # weight of one that arrives at its n-th place; 1 - alpha of it stays there
+    absorbed: Floats  # weight left by a photon at its first n places
 
     @property
     def last(self) -> int:

@@ -35,8 +35,7 @@ FARTHEST = 64  # reach, at most: MAX_ORDER times it is a whole float32
 class OrderBins:
     """Bins of order for a half space where one scattering turns light as far as 1 / `reach` of isotropic ones."""
 
-    reach: int = 1
-    """Power of two from 1 to FARTHEST."""
+    reach: int = 1  # power of two from 1 to FARTHEST
 
     @property
     def first_roulette(self) -> int:
@@ -135,10 +134,8 @@ class Counts:
 
     exits: NDArray[np.int64]
     """Photons that left, by ring (the last row: beyond the last ring) and bin of order, (rings + 1, bins)."""
-    rouletted: int
-    """Photons ended by roulette."""
-    cut: int
-    """Photons ended by the cap on the order."""
+    rouletted: int  # photons ended by roulette
+    cut: int  # photons ended by the cap on the order
     started: int
 
     def __add__(self, other: Counts) -> Counts:

@@ -29,8 +29,7 @@ EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 class Ends(NamedTuple):
     """Ends of the photons of a batch, arrays (BATCH_PHOTONS,) by photon number."""
 
-    rho: Array
-    """Distance from the beam [mfp], float32."""
+    rho: Array  # distance from the beam [mfp], float32
     order: Array
     """Scatterings n, int32: n of one that left, -n of one that ended inside (roulette, last order), 0 never started."""
 

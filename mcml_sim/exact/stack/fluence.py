@@ -56,16 +56,11 @@ DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen b
 class Field(NamedTuple):
     """Light at one wave number; arrays (N,)."""
 
-    phi: dict[str, Floats]
-    """Fluence over the light that arrives, under each illumination [-]."""
-    unscattered: dict[str, Floats]
-    """Fluence phi_0 of unscattered light [-]."""
-    up: Floats
-    """Response X of the light that comes out above."""
-    up_at_once: Floats
-    """Part of X without the light that the upper surface had reflected before."""
-    down: Floats
-    """Response X of the light that comes out below."""
+    phi: dict[str, Floats]  # fluence over the light that arrives, under each illumination [-]
+    unscattered: dict[str, Floats]  # fluence phi_0 of unscattered light [-]
+    up: Floats  # response X of the light that comes out above
+    up_at_once: Floats  # part of X without the light that the upper surface had reflected before
+    down: Floats  # response X of the light that comes out below
 
 
 def direct(optical: Floats, height: Floats, k: float) -> Floats:

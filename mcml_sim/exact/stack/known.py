@@ -33,12 +33,9 @@ MOST_TURNS = 10_000
 class _Piece(NamedTuple):
     """Layer, or its image in the lower surface, as the light flies."""
 
-    near: float
-    """Height at its nearer end [length]."""
-    far: float
-    """Height at its farther end [length]."""
-    optical: float
-    """Optical thickness up to the nearer end [-]."""
+    near: float  # height at its nearer end [length]
+    far: float  # height at its farther end [length]
+    optical: float  # optical thickness up to the nearer end [-]
     layer: Layer
     image: bool
 

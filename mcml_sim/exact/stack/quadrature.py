@@ -70,34 +70,20 @@ class Nodes:
 class Depths(NamedTuple):
     """Depths in the layers of a medium that scatter, N = panels * nodes, for one wave number. Lengths in its unit."""
 
-    z: Floats
-    """Depths of the nodes, (N,) [length]."""
-    tau: Floats
-    """Optical depths of the nodes, (N,) [-]."""
-    weight: Floats
-    """Weights mu_s dz, (N,) [-]."""
-    absorbs: Floats
-    """Weights mu_a dz, (N,) [-]."""
-    z_ends: Floats
-    """Depths of the ends of panels, (2, panels) [length]."""
-    tau_ends: Floats
-    """Optical depths of the ends of panels, (2, panels) [-]."""
-    alpha: Floats
-    """Albedo, (panels,) [-]."""
-    tail: Floats
-    """Depths, optical depths and mu_s dz below the last node in an infinite layer, (3, tail)."""
-    last: Layer
-    """Layer at the bottom."""
-    height: float
-    """Thickness d, infinite in a half space [length]."""
-    optical: float
-    """Optical thickness [-]."""
-    above: float
-    """Index n over the index above."""
-    below: float
-    """Index n over the index below; 1 in a half space."""
-    pane: bool
-    """Whether this is a single layer of clear glass."""
+    z: Floats  # depths of the nodes, (N,) [length]
+    tau: Floats  # optical depths of the nodes, (N,) [-]
+    weight: Floats  # weights mu_s dz, (N,) [-]
+    absorbs: Floats  # weights mu_a dz, (N,) [-]
+    z_ends: Floats  # depths of the ends of panels, (2, panels) [length]
+    tau_ends: Floats  # optical depths of the ends of panels, (2, panels) [-]
+    alpha: Floats  # albedo, (panels,) [-]
+    tail: Floats  # depths, optical depths and mu_s dz below the last node in an infinite layer, (3, tail)
+    last: Layer  # layer at the bottom
+    height: float  # thickness d, infinite in a half space [length]
+    optical: float  # optical thickness [-]
+    above: float  # index n over the index above
+    below: float  # index n over the index below; 1 in a half space
+    pane: bool  # whether this is a single layer of clear glass
 
     @property
     def panels(self) -> int:
@@ -203,12 +189,9 @@ def _crowded(s: Floats) -> tuple[Floats, Floats]:
 class Near(NamedTuple):
     """Double-exponential rule (Takahasi & Mori, Publ. RIMS 9, 1974) on a panel of length 1, for each node of it."""
 
-    height: Floats
-    """Distances from the node, on both sides of it, (nodes, rule)."""
-    weight: Floats
-    """Weights, (nodes, rule)."""
-    through: Floats
-    """Values of the polynomials in s that are 1 at one of the panel's nodes, (nodes, rule, nodes)."""
+    height: Floats  # distances from the node, on both sides of it, (nodes, rule)
+    weight: Floats  # weights, (nodes, rule)
+    through: Floats  # values of the polynomials in s that are 1 at one of the panel's nodes, (nodes, rule, nodes)
 
 
 @lru_cache
@@ -255,20 +238,14 @@ def interpolation(t: Floats, nodes: int) -> Floats:
 class Slants(NamedTuple):
     """Directions, arrays (directions,), and light along them."""
 
-    weight: Complexes
-    """Weight: dmu/mu, times 1/2, times the share of the azimuth."""
+    weight: Complexes  # weight: dmu/mu, times 1/2, times the share of the azimuth
     mu: Complexes
-    a: Complexes
-    """Reflectance of the upper surface from inside."""
+    a: Complexes  # reflectance of the upper surface from inside
     b: Complexes
-    whole: Complexes
-    """Transmission E(d), 0 in a half space."""
-    from_top: Complexes
-    """Transmission E(z), (directions, N)."""
-    to_bottom: Complexes
-    """Transmission E(d - z), (directions, N)."""
-    cones: int
-    """Number of the first directions, those inside the cones of escape."""
+    whole: Complexes  # transmission E(d), 0 in a half space
+    from_top: Complexes  # transmission E(z), (directions, N)
+    to_bottom: Complexes  # transmission E(d - z), (directions, N)
+    cones: int  # number of the first directions, those inside the cones of escape
 
 
 def reflectance(ratio: float, t: Any) -> Any:

@@ -35,18 +35,12 @@ class Pieces(NamedTuple):
     where a row is zero no power goes through it, and a line does.
     """
 
-    end: Any
-    """End of each piece [-], rising to 2."""
-    at: Any
-    """Point of reference u of a piece [-]: its beginning; of a first power law its end, which alone is positive."""
-    share: Any
-    """Share of all scatterings with a smaller u than that point [-]."""
-    before: Any
-    """Share of all scatterings before the beginning of each piece [-], rising from 0."""
-    density: Any
-    """Density f at that point [-]."""
-    slope: Any
-    """Exponent s of a power f ~ u^s, or df/du of a line."""
+    end: Any  # end of each piece [-], rising to 2
+    at: Any  # point of reference u of a piece [-]: its beginning; of a first power law its end, which alone is positive
+    share: Any  # share of all scatterings with a smaller u than that point [-]
+    before: Any  # share of all scatterings before the beginning of each piece [-], rising from 0
+    density: Any  # density f at that point [-]
+    slope: Any  # exponent s of a power f ~ u^s, or df/du of a line
     is_power: Any
 
     @classmethod
@@ -166,8 +160,7 @@ class Tabulated(Phase):
     angles: Any
     values: Any
     pieces: Pieces = field(init=False, compare=False)
-    integral: float = field(init=False, compare=False)
-    """Integral of the rows as they were given [-]."""
+    integral: float = field(init=False, compare=False)  # integral of the rows as they were given [-]
 
     def __post_init__(self) -> None:
         angles = _checked("angles", self.angles, "angles in radians, rising from >= 0 to <= pi")
