@@ -9,7 +9,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, Future, ThreadPoolExecutor, wait
-from types import ModuleType, TracebackType
+from types import ModuleType
 from typing import Generic
 
 from rich.progress import Progress, TaskID
@@ -90,7 +90,7 @@ def run_batches(
     with (
         bar("photons", progress, kept=True) as shown,
         ThreadPoolExecutor(threads) as pool,
-        cluster or contextlib.nullcontext(),
+        contextlib.closing(cluster) if cluster else contextlib.nullcontext(),
     ):
         line = shown.add_task("photons", total=photons)
         try:
@@ -198,12 +198,8 @@ class Cluster(Generic[R]):
         except ModuleNotFoundError as error:
             raise ClusterError(f"a worker of {self._scheduler} lacks {error.name}; {REMEDY}") from None
 
-    def __enter__(self) -> Cluster[R]:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Disconnect, which frees the threads that wait."""
         self._client.close()
 
     def _warn_if_deserted(self) -> None:

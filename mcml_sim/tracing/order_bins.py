@@ -13,7 +13,7 @@ that scatters forwards takes 1 / (1 - g) scatterings to turn as far as one does 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -139,12 +139,7 @@ class Counts:
     started: int
 
     def __add__(self, other: Counts) -> Counts:
-        return Counts(
-            self.exits + other.exits,
-            self.rouletted + other.rouletted,
-            self.cut + other.cut,
-            self.started + other.started,
-        )
+        return Counts(*(getattr(self, part.name) + getattr(other, part.name) for part in fields(self)))
 
     def arrays(self) -> dict[str, NDArray]:
         """Return all parts by name, as a store keeps them: of `exits`, which is mostly 0, only the other cells."""
