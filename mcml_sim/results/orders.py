@@ -143,8 +143,7 @@ class Orders:
     def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
         """Return the estimate from one row of counts, in the shape of alpha."""
         rows = self._estimate(counts[None, :], np.array([share]), alpha)
-        parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
-        return Estimate(*map(scalar_or_array, parts))
+        return rows.mapped(lambda part: scalar_or_array(part[..., 0]))
 
 
 _albedos = partial(checked_range, "alpha", accepted="a single-scattering albedo in [0, 1]", low=0.0, high=1.0)

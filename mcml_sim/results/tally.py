@@ -26,7 +26,7 @@ from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, write_whole
 from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
@@ -238,7 +238,7 @@ class Tally:
     def absorbed_z_overflow(self) -> Estimate:
         """Light absorbed below the last depth, at all radii [-]."""
         _ = self.grid.z_widths
-        return _scalar(self._spread(self.deposits.absorbed_z[-1], self.deposits.absorbed_z_variance[-1]))
+        return self._spread(self.deposits.absorbed_z[-1], self.deposits.absorbed_z_variance[-1])
 
     @property
     def _entering(self) -> float:
@@ -248,14 +248,14 @@ class Tally:
         return 1 - fresnel.specular_reflectance(self.medium)
 
     def _by_radius(self, what: str) -> Estimate:
-        return _rows(self._leaving(what, (1,)), slice(-1)).scaled(1 / self.grid.r_areas)
+        return self._leaving(what, (1,)).mapped(lambda part: part[:-1]).scaled(1 / self.grid.r_areas)
 
     def _overflow(self, what: str) -> Estimate:
-        return _scalar(_rows(self._leaving(what, (1,)), -1))
+        return self._leaving(what, (1,)).mapped(lambda part: float(part[-1]))
 
     def _by_radius_and_angle(self, what: str) -> Estimate:
         bins = self.grid.r_areas[:, None] * self.grid.solid_angles
-        return _rows(self._leaving(what, ()), slice(-1)).scaled(1 / bins)
+        return self._leaving(what, ()).mapped(lambda part: part[:-1]).scaled(1 / bins)
 
     def _leaving(self, what: str, axes: tuple[int, ...]) -> Estimate:
         """Return the light out of one side, summed over `axes` (0: radius, 1: angle)."""
@@ -275,26 +275,13 @@ class Tally:
         squares = variance + sums**2 / self.photons
         effective = np.divide(sums**2, squares, out=np.zeros_like(sums), where=squares > 0)
         share = self._entering / self.photons
-        return _scalar(Estimate(share * sums, share * np.sqrt(variance), effective))
+        return Estimate(share * sums, share * np.sqrt(variance), effective).mapped(scalar_or_array)
 
 
 def require_quantity(name: str, grid: Grid) -> None:
     """Raise InputError unless a grid resolves the quantity of that name."""
     if name not in quantities(grid):
         raise InputError(f"quantity must be one of {', '.join(quantities(grid))}, got {name!r}")
-
-
-def _rows(estimate: Estimate, rows: slice | int) -> Estimate:
-    return Estimate(*(np.asarray(part)[rows] for part in _parts(estimate)))
-
-
-def _scalar(estimate: Estimate) -> Estimate:
-    """Return floats in place of arrays without a dimension."""
-    return estimate if np.ndim(estimate.value) else Estimate(*map(float, _parts(estimate)))
-
-
-def _parts(estimate: Estimate) -> tuple[float | Floats, float | Floats, float | Floats]:
-    return estimate.value, estimate.standard_error, estimate.effective_samples
 
 
 @dataclass(frozen=True, eq=False)
