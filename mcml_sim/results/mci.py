@@ -137,7 +137,13 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     """Return what `read_mci` gives for a file of this name and content."""
-    lines = Lines(name, _checked(name, content))
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
+    before, null, _ = content.partition(b"\x00")
+    if null:
+        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
+        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
+    lines = Lines(name, content)
     (version,) = lines.take(1, "the file version, 1.0 or mcmli2.0")
     if version.startswith(VERSION_2):
         return tuple(_runs_of_2(lines, read_media(lines)))
@@ -382,16 +388,6 @@ def _layer(lines: Lines, at: int, number: int) -> Layer:
     *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
     got = f"{quoted(words[1])} and {quoted(words[2])}"
     return _settled(lines, of, _optics(lines, of, *words), thickness, at == number, got)
-
-
-def _checked(name: str, content: bytes) -> bytes:
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
-    before, null, _ = content.partition(b"\x00")
-    if null:
-        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
-        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
-    return content
 
 
 def _is_number(word: str) -> bool:

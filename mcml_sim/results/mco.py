@@ -88,7 +88,13 @@ def _sections(tally: Tally, name: str) -> Iterator[str]:
     yield HEAD
     yield f"{made_by(tally.seed)}\n"
     yield _parameters(tally, dz, dr, name)
-    yield _totals(specular, reflected.sum(), layers[-1], transmitted.sum())
+    yield (
+        "RAT #Reflectance, absorption, transmission. \n"
+        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
+        f"{reflected.sum():<14.6G} \t#Diffuse reflectance [-]\n"
+        f"{layers[-1]:<14.6G} \t#Absorbed fraction [-]\n"
+        f"{transmitted.sum():<14.6G} \t#Transmittance [-]\n\n"
+    )
     yield _column("A_l #Absorption as a function of layer. [-]", layers[:-1], "%12.4G\n")
     yield _column("A_z #A[0], [1],..A[nz-1]. [1/cm]", share * _folded(tally.deposits.absorbed_z, 0) / dz)
     yield _column("Rd_r #Rd[0], [1],..Rd[nr-1]. [1/cm2]", reflected.sum(axis=1) / areas)
@@ -117,16 +123,6 @@ def _parameters(tally: Tally, dz: float, dr: float, name: str) -> str:
         f"{_number(tally.medium.n_above)}\t\t\t\t\t# n for medium above\n"
         f"{layers}"
         f"{_number(tally.medium.n_below)}\t\t\t\t\t# n for medium below\n\n"
-    )
-
-
-def _totals(specular: float, reflected: float, absorbed: float, transmitted: float) -> str:
-    return (
-        "RAT #Reflectance, absorption, transmission. \n"
-        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
-        f"{reflected:<14.6G} \t#Diffuse reflectance [-]\n"
-        f"{absorbed:<14.6G} \t#Absorbed fraction [-]\n"
-        f"{transmitted:<14.6G} \t#Transmittance [-]\n\n"
     )
 
 

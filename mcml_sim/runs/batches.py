@@ -8,7 +8,7 @@ import os
 import threading
 import warnings
 from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, CancelledError, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from types import ModuleType
 from typing import Generic
 
@@ -94,7 +94,11 @@ def run_batches(
     ):
         line = shown.add_task("photons", total=photons)
         try:
-            _wait([pool.submit(work, shown, line) for _ in range(threads)])
+            pending = {pool.submit(work, shown, line) for _ in range(threads)}
+            while pending:
+                done, pending = wait(pending, timeout=GLANCE, return_when=FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
         finally:
             fold.stop()
     return fold.total()
@@ -143,15 +147,6 @@ class _Fold(Generic[R]):
         return self._sum
 
 
-def _wait(futures: list[Future[None]]) -> None:
-    """Wait for all, or raise the first error."""
-    pending: set[Future[None]] = set(futures)
-    while pending:
-        done, pending = wait(pending, timeout=GLANCE, return_when=FIRST_EXCEPTION)
-        for future in done:
-            future.result()
-
-
 class Deserted(Notice):
     """Notice that a Dask cluster has no workers; the run waits for one."""
 
@@ -170,7 +165,11 @@ class Cluster(Generic[R]):
         self._scheduler, self._trace = scheduler, trace
         _require_scheduler(self._dask, scheduler)
         self._client = self._dask.Client(scheduler, timeout=PATIENCE, set_as_default=False)
-        self._require_package()
+        try:
+            self._client.run_on_scheduler(cpu_class)  # which has the package, or cannot unpickle what it passes on
+        except Exception as error:  # whatever unpickling raises over there
+            self._client.close()
+            raise ClusterError(f"the scheduler at {scheduler} cannot load mcml_sim ({error}); {REMEDY}") from None
         threads = sum(self._client.nthreads().values())
         self.tasks = min(max(BATCHES_PER_THREAD * threads, MIN_TASKS), MAX_TASKS)
         """Number of batches that may be under way at once."""
@@ -213,14 +212,6 @@ class Cluster(Generic[R]):
         if self._has_warned:
             text = f"no worker has come to the scheduler at {self._scheduler} so far; waiting for one"
             warnings.warn(text, Deserted, stacklevel=2)
-
-    def _require_package(self) -> None:
-        """Raise ClusterError unless the scheduler has the package: it unpickles what it passes on."""
-        try:
-            self._client.run_on_scheduler(cpu_class)
-        except Exception as error:  # whatever unpickling raises over there
-            self._client.close()
-            raise ClusterError(f"the scheduler at {self._scheduler} cannot load mcml_sim ({error}); {REMEDY}") from None
 
 
 def _dask() -> ModuleType:

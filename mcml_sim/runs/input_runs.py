@@ -78,11 +78,6 @@ class Job:
     store: Path
 
     @property
-    def is_begun(self) -> bool:
-        """Whether the store holds batches."""
-        return bool(batches(self.store))
-
-    @property
     def is_part_of_more(self) -> bool:
         """Whether the store holds batches beyond this run's photons, which are a longer run's."""
         return self._holds_more(self.run.medium, self.photons)
@@ -149,7 +144,7 @@ def done(job: Job, options: RunOptions) -> Done:
 def _traced(job: Job, options: RunOptions) -> Done:
     if job.is_in_the_way():
         discard(job.store)
-    resumed, start = job.is_begun, time.perf_counter()
+    resumed, start = bool(batches(job.store)), time.perf_counter()
     with Compiling() as compiling:
         tally = simulate(
             job.run.medium,

@@ -97,7 +97,10 @@ class Store(Generic[R]):
         """Return the batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
         path = self._path(batch)
         try:
-            fields = _unsealed(_read(path, MAX_BATCH))
+            data = _read(path, MAX_BATCH)
+            if data[-SEAL_BYTES:] != hashlib.sha256(data[:-SEAL_BYTES]).hexdigest().encode():
+                raise ValueError("its bytes are not those that were written")
+            fields = read_npz(data, MAX_BATCH, text=["made_by"])
             if str(fields.pop("made_by", "")) != self._digest:
                 raise StoreError(
                     f"{path} was made by another run; if that is still at work, {ELSEWHERE}; "
@@ -112,8 +115,11 @@ class Store(Generic[R]):
             return None
 
     def save(self, batch: int, result: R) -> None:
-        """Keep a batch, whole or not at all."""
-        self._write(self._path(batch), _sealed({"made_by": np.array(self._digest), **result.arrays()}))
+        """Keep a batch, whole or not at all; the last bytes, a zip file's comment, are the digest of all the others."""
+        file = io.BytesIO()
+        np.savez_compressed(file, allow_pickle=False, made_by=np.array(self._digest), **result.arrays())
+        body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
+        self._write(self._path(batch), body + hashlib.sha256(body).hexdigest().encode())
 
     def _path(self, batch: int) -> Path:
         # 1e13 photons in batches of 2^17 are 8 digits of batches: names sort as their numbers do.
@@ -184,21 +190,6 @@ def _read(path: Path, most: int) -> bytes:
     if len(content) > most:
         raise ValueError(f"more than {most} bytes")
     return content
-
-
-def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
-    """Return an .npz file whose last bytes, a zip file's comment, are the digest of all the others."""
-    file = io.BytesIO()
-    np.savez_compressed(file, allow_pickle=False, **arrays)
-    body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
-    return body + hashlib.sha256(body).hexdigest().encode()
-
-
-def _unsealed(data: bytes) -> dict[str, NDArray]:
-    """Return the arrays of a sealed file; ValueError if a bit of it has changed."""
-    if data[-SEAL_BYTES:] != hashlib.sha256(data[:-SEAL_BYTES]).hexdigest().encode():
-        raise ValueError("its bytes are not those that were written")
-    return read_npz(data, MAX_BATCH, text=["made_by"])
 
 
 def manifest(folder: Path) -> dict[str, object] | None:

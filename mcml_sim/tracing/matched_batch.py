@@ -66,19 +66,16 @@ def weights(alpha: float) -> Weights:
     """Return the roulette for an albedo, and the weights that follow from it."""
     order = np.arange(MAX_ORDER + 1)
     plain = alpha ** order.astype(np.float64)
-    stops = _stops(np.minimum(plain / THRESHOLD, 1) * np.sqrt(LONG_PATH / np.maximum(order, LONG_PATH)))
+    survival = np.minimum(plain / THRESHOLD, 1) * np.sqrt(LONG_PATH / np.maximum(order, LONG_PATH))
+    # Orders where the survival falls below 1, 1/2, 1/4, ..., and a last one for all.
+    below = np.argmax(survival < 0.5 ** np.arange(STOPS - 1)[:, None], axis=1)
+    tosses = np.maximum(below[below > 0], 1)
+    last = tosses[-1] + 1 if len(tosses) == STOPS - 1 else MAX_ORDER
+    stops = np.concatenate([tosses, np.full(STOPS - len(tosses), last)]).astype(np.int32)
     won = np.searchsorted(stops[:-1], order)  # a photon that leaves or arrives at n has not tossed at n
     leaving = plain * 2.0**won
     visiting = np.concatenate([[0.0], plain[:-1] * 2.0 ** won[1:]])
     return Weights(stops, leaving, visiting, (1 - alpha) * np.cumsum(visiting))
-
-
-def _stops(survival: Floats) -> NDArray[np.int32]:
-    """Return orders where the survival, (MAX_ORDER + 1,), falls below 1, 1/2, 1/4, ..., and a last one for all."""
-    below = np.argmax(survival < 0.5 ** np.arange(STOPS - 1)[:, None], axis=1)
-    tosses = np.maximum(below[below > 0], 1)
-    last = tosses[-1] + 1 if len(tosses) == STOPS - 1 else MAX_ORDER
-    return np.concatenate([tosses, np.full(STOPS - len(tosses), last)]).astype(np.int32)
 
 
 def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None) -> Deposits:
