@@ -60,8 +60,7 @@ class ExactLight(eqx.Module):
     setting: Setting = eqx.field(static=True)
     g: Array
     critical: Array  # rate k_c of light scattered once [1/mfp]
-    nearest: Array
-    """Radius x of f's first knot; nearer, light scattered more than once is taken for x (1 - ln x) of itself."""
+    nearest: Array  # radius x of f's first knot; nearer, light scattered again is x (1 - ln x) of itself
     farthest: Array  # radius x of the last knot; farther, light goes on as its decay over x^2
     step: Array  # step of ln x, from knot to knot
     rest: Array  # spline of f in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling

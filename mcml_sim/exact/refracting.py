@@ -56,8 +56,7 @@ VERSION = 2  # of what `new_table` puts into a table; a file of another version,
 class Table(NamedTuple):
     """Arrays that albedos share under one surface."""
 
-    lines: Complexes
-    """Chebyshev coefficients of R^(k) / alpha on the groups' lines, and at k = 0: (2 lights, groups, k, degree)."""
+    lines: Complexes  # Chebyshev coefficients of R^(k) / alpha on the lines, and at 0: (2 lights, groups, k, degree)
     ray: Complexes  # transform of each order of scattering, on the ray: (2 lights, k, orders)
 
 

@@ -86,10 +86,8 @@ class Transform(NamedTuple):
     weight: jax.Array  # steps dk, complex128 (nodes,) [1/mfp]
     value: jax.Array  # values R^(k) / alpha, complex128 (nodes,) [-]
     reflectance: jax.Array  # ratio A / alpha, float64 () [-]
-    pole: jax.Array
-    """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where it starts at 0."""
-    farthest: jax.Array
-    """Radius from which on R_d is taken for its power, r^-3, float64 () [mfp]: below NO_LIGHT where alpha = 1."""
+    pole: jax.Array  # part of A that the contour leaves out beyond a radius [-]: 1/2 where it starts at 0
+    farthest: jax.Array  # radius from which on R_d is its power, r^-3 [mfp]: below NO_LIGHT where alpha = 1
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))

@@ -68,8 +68,7 @@ class Deposits:
     """
 
     started: int  # number of photons
-    reflected: Floats
-    """Weight out of the top, by ring (the last row: beyond the last ring) and angle, (rings + 1, angles or 1)."""
+    reflected: Floats  # weight out of the top, by ring (the last row: beyond) and angle, (rings + 1, angles or 1)
     reflected_squares: Floats
     transmitted: Floats  # weight out of the bottom that was scattered, like `reflected`
     transmitted_squares: Floats
@@ -80,8 +79,7 @@ class Deposits:
     accounted: Floats  # weight that left, was absorbed, or was cut, (): `started` but for roulette's luck
     accounted_squares: Floats
     cut: Floats  # weight still inside at the last event allowed, ()
-    absorbed_rz: Floats
-    """Weight absorbed by ring and depth, overflows last, (rings + 1, depths + 1); (0, 0) if depth is not resolved."""
+    absorbed_rz: Floats  # weight absorbed by ring and depth, overflows last, (rings + 1, depths + 1); or (0, 0)
     absorbed_rz_variance: Floats
     absorbed_z: Floats  # weight absorbed by depth, (depths + 1,) or (0,)
     absorbed_z_variance: Floats

@@ -46,8 +46,7 @@ class OrderLanes(NamedTuple):
     place: Array
     """Complex rho + i z, distance from the beam and depth [mfp], complex64; -z counts events once the photon has ended
     since it was last looked at, and half an event more if it was stopped inside."""
-    direction: Array | None
-    """Components outwards + i down of the flight that ended here, complex64; None where scattering forgets them."""
+    direction: Array | None  # outwards + i down of the flight that ended here, complex64; None if forgotten
     order: Array  # number of scatterings so far, int32
     last: Array  # order at which the photon will be stopped if it is still inside, int32
     photon: Array  # number of the photon in its batch, uint32

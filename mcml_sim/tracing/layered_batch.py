@@ -67,12 +67,9 @@ class PhotonFates(NamedTuple):
     """Complex rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 after roulette,
     complex64 (BATCH_PHOTONS + lanes,)."""
     cosines: Array  # cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved
-    absorbed: tuple[Array, ...]
-    """Weight left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
-    by_layer: Array
-    """Weight left by each group in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
-    by_cell: Array
-    """Weight left by each group by ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
+    absorbed: tuple[Array, ...]  # weight left in each layer, or in all if they are many, float32, as exits
+    by_layer: Array  # weight left by group in each layer, in units, int64 (groups * layers,), or (0,)
+    by_cell: Array  # weight by group, ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)
 
 
 def trace_batch(

@@ -55,11 +55,9 @@ class Stack(NamedTuple):
     thickness: Array  # thickness [length]
     top: Array  # depth of the layer's upper interface [length]
     mfp: Array  # mean free path [length], FARTHEST in clear glass
-    absorbs: Array
-    """Number 1 - alpha = mu_a / mu_t [-], kept apart: the difference would lose the digits of weak absorption."""
+    absorbs: Array  # 1 - alpha = mu_a / mu_t [-], kept apart: a difference loses the digits of weak absorption
     phase: Phase  # phase function of Henyey and Greenstein, its g by layer
-    others: tuple[Phase | None, ...]
-    """Phase functions of layers that have another one, a single one each; what is None is no array."""
+    others: tuple[Phase | None, ...]  # of layers that have another phase function; None is no array
     n: Array  # refractive indices [-], (layers + 2,): those above and below are first and last
 
     @property
@@ -72,8 +70,7 @@ class LayeredLanes(NamedTuple):
     """Photons in flight, arrays (lanes,)."""
 
     place: Array  # complex x + i y [length], complex64
-    down: Array
-    """Depth below the top of the layer [length], and i times the direction's cosine to the axis [-], complex64."""
+    down: Array  # depth below the top of the layer [length], and i times the cosine to the axis [-], complex64
     heading: Array  # other cosines of the direction, ux + i uy [-], complex64
     weight: Array  # weight left of the photon [-], negative while it waits at an interface and once it has ended
     layer: Array
@@ -81,8 +78,7 @@ class LayeredLanes(NamedTuple):
     transmitted, one more than there are layers."""
     event: Array  # number of events so far, waiting included, uint32
     photon: Array  # number of the photon in its batch, uint32
-    absorbed: tuple[Array, ...]
-    """Weight it has left in each of the layers, as far as they are followed one by one, or in all of them [-]."""
+    absorbed: tuple[Array, ...]  # weight left in each of the layers that are followed, or in all of them [-]
 
     @property
     def ended(self) -> Array:

@@ -110,8 +110,7 @@ class MatchedBins(NamedTuple):
 
     r: Axis
     z: Axis | None
-    cosines: Array
-    """Cosines of the edges between angle bins, rising, float32 (angles - 1,); empty if angles are not resolved."""
+    cosines: Array  # cosines of the edges between angle bins, rising, float32 (angles - 1,), or empty
 
 
 class Visits(NamedTuple):

@@ -132,8 +132,7 @@ class Ledger:
 class Counts:
     """Whole photons of one or more batches."""
 
-    exits: NDArray[np.int64]
-    """Photons that left, by ring (the last row: beyond the last ring) and bin of order, (rings + 1, bins)."""
+    exits: NDArray[np.int64]  # photons that left, by ring (the last row: beyond) and bin of order, (rings + 1, bins)
     rouletted: int  # photons ended by roulette
     cut: int  # photons ended by the cap on the order
     started: int

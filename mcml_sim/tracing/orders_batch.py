@@ -30,8 +30,7 @@ class Ends(NamedTuple):
     """Ends of the photons of a batch, arrays (BATCH_PHOTONS,) by photon number."""
 
     rho: Array  # distance from the beam [mfp], float32
-    order: Array
-    """Scatterings n, int32: n of one that left, -n of one that ended inside (roulette, last order), 0 never started."""
+    order: Array  # scatterings n, int32: n of one that left, -n of one that ended inside, 0 of one never started
 
 
 def trace_batch(

@@ -210,14 +210,10 @@ class _Difference:
 
     medium: Medium
     illumination: str
-    base: Medium | None
-    """Half space whose profile, without what is known of it, is taken away; None where nothing is."""
-    share: float
-    """Share of that profile [-]."""
-    edges: Floats
-    """Edges of panels of k, (panels + 1,) [1/length]."""
-    rest: Floats
-    """Transform of the rest, (panels, nodes) [-]."""
+    base: Medium | None  # half space whose profile, without what is known of it, is taken away; None where nothing is
+    share: float  # of that profile [-]
+    edges: Floats  # edges of panels of k, (panels + 1,) [1/length]
+    rest: Floats  # transform of the rest, (panels, nodes) [-]
 
     def profile(self, r: Floats) -> Floats:
         """Return R_d [1/length^2] at radii of shape (n,)."""
