@@ -63,7 +63,7 @@ def test_first_scatterings_lie_straight_below_at_exponential_depths():
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():
-    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS, "diffuse").place
+    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS, illumination="diffuse").place
     rho, z = np.asarray(place.real, np.float64), np.asarray(place.imag, np.float64)
     path, square = np.hypot(rho, z), np.sort(z**2 / (rho**2 + z**2))
     assert abs(path.mean() - 1) < 4 / 2**9
