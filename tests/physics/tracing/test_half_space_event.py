@@ -44,7 +44,8 @@ def slow_twin(setting, photons, last_order, seed):
         end = start + step * ray
         up = end[:, 2] < 0
         surface = start - ray * (start[:, 2:] / np.where(up, ray[:, 2], 1)[:, None])
-        back = up & (source.uniform(size=up.size) < textbook_fresnel(setting.n, 1.0, np.arccos(np.abs(ray[:, 2])))[0])
+        reflectance, _ = textbook_fresnel(setting.n, 1.0, np.arccos(np.minimum(np.abs(ray[:, 2]), 1)))
+        back = up & (source.uniform(size=up.size) < reflectance)
         left_over = step - np.linalg.norm(surface - start, axis=1, keepdims=True)
         mirrored = ray * [1, 1, -1]
         position[flying] = np.where(back[:, None], surface + left_over * mirrored, end)
