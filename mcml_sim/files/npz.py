@@ -81,7 +81,6 @@ def read_npz(content: bytes, most: int, shapes: Shapes | None = None, text: Coll
 
 
 def _members(archive: zipfile.ZipFile, shapes: Shapes | None) -> dict[str, zipfile.ZipInfo]:
-    """Return the wanted members by the name of their array."""
     members: dict[str, zipfile.ZipInfo] = {}
     for member in archive.infolist():
         name = member.filename.removesuffix(SUFFIX)
@@ -155,7 +154,6 @@ def kept(name: str, arrays: Collection[str], make: Callable[[], Arrays]) -> Arra
 
 
 def _kept(content: bytes, names: Collection[str]) -> Arrays:
-    """Return the wanted arrays of a file."""
     arrays = read_npz(content, MOST_KEPT, text=("sha256",))
     if not {"sha256", *names} <= arrays.keys():
         raise ValueError("an array is missing")

@@ -239,7 +239,6 @@ def read_run(lines: Lines, outputs: set[str]) -> Run:
 
 
 def _bins(lines: Lines, words: dict[str, str], decimal: bool = False) -> tuple[int, int, int]:
-    """Return nz, nr and na."""
     of = {name: lines.whole(f"{name}, a number of bins", word, MAX_BINS, 1, decimal) for name, word in words.items()}
     for other in ("nz", "na"):
         if (cells := of["nr"] * of[other]) > MAX_CELLS:

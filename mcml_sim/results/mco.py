@@ -242,7 +242,6 @@ def begins_mco(path: str | os.PathLike[str]) -> bool:
 
 
 def _beginning(lines: Lines) -> str:
-    """Return the version."""
     (version,) = lines.take(1, "the file version, A1")
     if version not in ("A1", OUTPUT_2):
         raise lines.error(f"the file version, A1 or {OUTPUT_2}", repr(version[:10]))

@@ -90,7 +90,11 @@ def trace_batch(
     diffuse = illumination == "diffuse"
     first = 1 if diffuse or medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):
-        return _all_ballistic(grid, photons)
+        # Of a single sheet of clear glass what is not reflected at once goes through.
+        sums: dict[str, Floats] = {name: np.zeros(size) for name, size in deposits.shapes(grid, 1).items()}
+        for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
+            sums[name] = np.asarray(float(photons))
+        return Deposits.from_arrays(sums, deposits.shapes(grid, 1))
     # Lengths are in the shortest free path, or in the whole thickness where all is clear.
     mu_t = max(layer.mu_t for layer in medium.layers)
     unit = 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
@@ -187,7 +191,6 @@ def _cell(bins: LayeredBins, place: Array, down: Array, top: Array, group: Array
 
 
 def _units(left: Array, bins: LayeredBins) -> Array:
-    """Return weights in whole units, int64."""
     return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
@@ -294,11 +297,3 @@ def _variance(parts: Floats) -> Floats:
     """Return the variance of the sum of independent, equally distributed groups, by spread: (groups, ...) -> (...)."""
     number = len(parts)
     return number * parts.var(axis=0, ddof=1) if number > 1 else np.full(parts.shape[1:], np.inf)
-
-
-def _all_ballistic(grid: Grid, photons: int) -> Deposits:
-    """Return the sums of a single sheet of clear glass: what is not reflected at once goes through."""
-    sums: dict[str, Floats] = {name: np.zeros(shape) for name, shape in deposits.shapes(grid, 1).items()}
-    for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
-        sums[name] = np.asarray(float(photons))
-    return Deposits.from_arrays(sums, deposits.shapes(grid, 1))

@@ -279,7 +279,6 @@ def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits
 
 
 def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array) -> Array:
-    """Return the layer after the interface and after roulette."""
     passes = (outcome.imag > 0) | (outcome.imag == ON)
     step = jnp.where(passes, jnp.where(outcome.real > 0, 1, -1), 0)
     layer = lanes.layer + step.astype(jnp.int32)

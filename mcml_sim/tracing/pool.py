@@ -89,7 +89,6 @@ def _emptied(pool: Lanes) -> Lanes:
 
 
 def _idle(enter: Enter, lanes: int) -> Lanes:
-    """Return lanes without a photon."""
     shapes = jax.eval_shape(enter, jax.ShapeDtypeStruct((lanes,), jnp.uint32))
     empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     place, photon = jnp.full(lanes, -1j, jnp.complex64), jnp.full(lanes, BATCH_PHOTONS, jnp.uint32)

@@ -114,7 +114,6 @@ def _second_order(xp: Any, nu: Any, log: Any) -> Any:
 
 @lru_cache(maxsize=64)
 def _pieces(phase: FournierForand) -> Pieces:
-    """Return the table that draws."""
     u = np.geomspace(LEAST, 2.0, ROWS)
     u[-1] = 2.0
     return Pieces.of(u, 2 * np.pi * phase._density(u), phase._below(u))
