@@ -77,6 +77,11 @@ class Job:
     npz: Path
     store: Path
 
+    @property
+    def is_part_of_more(self) -> bool:
+        """Whether the store holds batches beyond this run's photons, which are a longer run's."""
+        return self._holds_more(self.run.medium, self.photons)
+
     def is_in_the_way(self) -> bool:
         """Return True if the store holds what another run left, finished: no more photons than the results to replace.
 
@@ -86,15 +91,14 @@ class Job:
             require_store(self.store, self.run.medium, self.run.grid, self.seed)
         except StoreError:
             done = _results(self.npz) if self.store.is_dir() else None
-            if done is None or self.holds_more(done.medium, done.photons):
+            if done is None or self._holds_more(done.medium, done.photons):
                 raise
             if not is_store_of(self.store, done.medium, done.grid, done.seed):
                 raise
             return True
         return False
 
-    def holds_more(self, medium: Medium, photons: int) -> bool:
-        """Return whether the store holds batches beyond so many photons, which are a longer run's."""
+    def _holds_more(self, medium: Medium, photons: int) -> bool:
         return any(batch * batch_photons(medium) >= photons for batch in batches(self.store))
 
 
@@ -132,9 +136,7 @@ def done(job: Job, options: RunOptions) -> Done:
     finished = _traced(job, options) if kept is None else Done(kept)
     kept = finished.results
     is_enough = options.goal is None or options.goal.is_reached(kept.estimates[options.goal.quantity])
-    if is_enough and not job.holds_more(
-        job.run.medium, job.photons
-    ):  # else the photons at hand would save a longer run theirs
+    if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
         discard(job.store)
     return finished
 
