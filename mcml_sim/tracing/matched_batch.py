@@ -113,20 +113,14 @@ class MatchedBins(NamedTuple):
     cosines: Array  # cosines of the edges between angle bins, rising, float32 (angles - 1,), or empty
 
 
-class Visits(NamedTuple):
-    """Weight that arrived at places, in float64, with the variance of each sum: by ring and depth, and by depth."""
-
-    rz: Array
-    rz_variance: Array
-    z: Array
-    z_variance: Array
-
-
 @partial(jax.jit, static_argnames=("parts", "lanes"), compiler_options=pool.COMPILER_OPTIONS)
 def _trace_visits(
     key: Array, photons: Array, stops: Array, visiting: Array, bins: MatchedBins, parts: int, lanes: int
-) -> tuple[Ends, Visits]:
-    """Return ends as `orders_batch.trace` does, and arrivals by place; `visiting` (MAX_ORDER + 1,) int64, in UNITs."""
+) -> tuple[Ends, tuple[Array, ...]]:
+    """Return ends as `orders_batch.trace` does, and weight that arrived by ring and depth, and by depth, with variances.
+
+    `visiting` (MAX_ORDER + 1,) int64, in UNITs.
+    """
     depths = cast("Axis", bins.z)
     shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
@@ -154,7 +148,7 @@ def _trace_visits(
     state = jnp.zeros(size, jnp.int64), orders_batch.no_ends(lanes)
     table, ends = pool.follow(lambda photon: half_space_event.enter(key, photon, stops), turn, state, photons, lanes)
     by_group = table.reshape(shape) * UNIT
-    return orders_batch.as_ends(ends), Visits(*_summed(by_group), *_summed(by_group.sum(axis=1)))
+    return orders_batch.as_ends(ends), (*_summed(by_group), *_summed(by_group.sum(axis=1)))
 
 
 def _summed(by_group: Array) -> tuple[Array, Array]:
