@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.results.estimate import Estimate
-from mcml_sim.results.tally import Precision
-from mcml_sim.results.tally_file import Results
+from mcml_sim.results.tally import Precision, Results
 from mcml_sim.runs.input_runs import Done, Job, RunOptions
 
 # What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.

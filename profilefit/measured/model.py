@@ -32,12 +32,12 @@ from scipy.interpolate import CubicSpline
 from scipy.special import expit
 
 from mcml_sim import exact
-from mcml_sim.exact.anisotropic import forward_table
+from mcml_sim.exact import forwards
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
-from mcml_sim.files.kept import kept
+from mcml_sim.files.npz import kept
 from mcml_sim.media.setting import FORWARD_N, Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.instrument import PENCIL, Instrument
@@ -226,7 +226,7 @@ def exact_light(setting: Setting) -> ExactLight:
     """Return exact light of a semi-infinite medium; SettingError of one not solved. Seconds at first, if g = 0."""
     require_solved(setting)
     if not setting.is_isotropic:
-        return _filled(forward_table.light(setting))
+        return _filled(forwards.light(setting))
     parts = ("rest", "kappa", "share")
     name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
     arrays = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
@@ -236,7 +236,7 @@ def exact_light(setting: Setting) -> ExactLight:
 def light_at_hand(setting: Setting) -> ExactLight:
     """Return exact light of one of many settings that a search tries: by the table, to 3e-4, where it has these n."""
     if setting.is_isotropic and FORWARD_N[0] <= setting.n <= FORWARD_N[1]:
-        return _filled(forward_table.light(setting))
+        return _filled(forwards.light(setting))
     return exact_light(setting)
 
 

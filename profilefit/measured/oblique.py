@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 from scipy.special import roots_genlaguerre
 
-from mcml_sim.exact.anisotropic.high_orders import decay_rate
+from mcml_sim.exact.forwards import decay_rate
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.laws.diffusion import exitance_factors

@@ -24,7 +24,7 @@ import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.medium import Medium
-from mcml_sim.results import mco, tally_file
+from mcml_sim.results import mco, tally
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 
@@ -59,8 +59,8 @@ def read_mco_profile(path: Path) -> Measured:
 
 def read_npz_profile(path: Path) -> Measured:
     """Read reflectance_r of the results of `mcml-sim run`, with its own errors, lengths in cm."""
-    content = read_whole(path, tally_file.MAX_BYTES)
-    result = tally_file.parse_results(content, str(path))
+    content = read_whole(path, tally.MAX_BYTES)
+    result = tally.parse_results(content, str(path))
     if result.photons < 2:
         raise InputError(f"{path}: expected two photons or more, since one has no standard error, got 1")
     estimate = result.estimates["reflectance_r"]

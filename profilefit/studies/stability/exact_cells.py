@@ -11,16 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, Setting, exact
-from mcml_sim.exact import hankel
-from mcml_sim.exact.by_albedo import by_alpha
+from mcml_sim.exact import by_albedo
 from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.transform import Transform
 from profilefit.laws.rational import Normalisation
 from profilefit.studies.stability import layout
 from profilefit.studies.stability.cells import (
@@ -75,11 +72,7 @@ def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator
 
 def finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
     """Return the cdf by more nodes, (alphas, radii, 1)."""
-    return np.asarray(by_alpha(_share_within, x, alpha[:, None], setting, FINER))[..., None]
-
-
-def _share_within(transform: Transform, alpha: Array, x: Array) -> Array:
-    return hankel.cdf(transform, x)
+    return np.asarray(by_albedo.by_alpha(by_albedo.cdf, x, alpha[:, None], setting, FINER))[..., None]
 
 
 def _profile(name: str, setting: Setting, places: tuple[ArgumentAxis, ...], value: Floats) -> Cells:

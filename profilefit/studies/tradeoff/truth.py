@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
-from mcml_sim.exact import hankel, refracting
-from mcml_sim.exact.by_albedo import by_alpha, forget
+from mcml_sim.exact import by_albedo, refracting
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
@@ -73,12 +72,12 @@ class Annuli:
 
 def half_spaces(setting: Setting, rule: Rule) -> Floats:
     """Return the energy within EDGES at ALPHAS from the table of n alone: no transform is kept between calls."""
-    forget()
-    return by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
+    by_albedo.forget()
+    return by_albedo.by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
 
 
 def _energy_within(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
-    return alpha * transform.reflectance * hankel.cdf(transform, x)
+    return alpha * transform.reflectance * by_albedo.cdf(transform, alpha, x)
 
 
 def stack(nodes: Nodes) -> Floats:

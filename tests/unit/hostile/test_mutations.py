@@ -33,7 +33,7 @@ import pytest
 from mcml_sim.errors import InputError, OutputError, StoreError
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.results.mci import read_mci
-from mcml_sim.results.tally_file import read_results
+from mcml_sim.results.tally import read_results
 from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading

@@ -16,8 +16,7 @@ from mcml_sim.files.version import __version__
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import half_space
 from mcml_sim.results.mci import read_mci
-from mcml_sim.results.tally import Precision, quantities
-from mcml_sim.results.tally_file import read_results
+from mcml_sim.results.tally import Precision, quantities, read_results
 from mcml_sim.runs import input_runs
 from mcml_sim.runs.batches import FIRST_LOOK
 from mcml_sim.runs.simulation import batch_photons, simulate

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Estimate, Grid, Layer, Medium
 from mcml_sim.cli import printed
-from mcml_sim.results.tally_file import Results
+from mcml_sim.results.tally import Results
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mcml_sim.cli.terminal import STOPPING, mend_streams, two_interrupts, without_logs
-from mcml_sim.results.tally_file import read_results
+from mcml_sim.results.tally import read_results
 
 MCI = "1.0\n1\nfirst.mco A\n2000\n0.01 0.02\n4 5 3\n1\n1.0\n1.4 10 90 0.5 0.05\n1.0\n"
 STOPPED = "mcml-sim: stopped; the finished batches are kept, the same command resumes\n"

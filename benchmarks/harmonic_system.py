@@ -28,7 +28,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from mcml_sim.exact.anisotropic import harmonics
+from benchmarks import harmonics
 from mcml_sim.exact.special_functions import panels
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats

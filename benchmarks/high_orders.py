@@ -3,7 +3,7 @@
 The first orders, near the source, need every detail of the phase function; photons have them. What remains is wide and
 needs few harmonics and few wave numbers: its transform has fallen by 1e-6 at k = 1.6 / mfp.
 
-R^ is wanted on lines that start below i kappa (`hankel`), for groups of albedos of nearly one kappa.
+R^ is wanted on lines that start below i kappa (`by_albedo`), for groups of albedos of nearly one kappa.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.linalg
 from jax import Array
 from numpy.typing import NDArray
 from scipy.special import hankel1
 
-from mcml_sim.exact.anisotropic import system as systems
+from benchmarks import harmonic_system as systems
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.light import unreduced
+from mcml_sim.exact.forwards import decay_rate
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import panels
 from mcml_sim.media.arrays import Floats
@@ -64,24 +63,6 @@ class Contour(NamedTuple):
     k: Complexes
     dk: Complexes
     alpha: Floats
-
-
-def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
-    """Return kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [1/mfp].
-
-    1 over the largest eigenvalue of the tridiagonal matrix of l / sqrt(h_l-1 h_l), h_l = (2 l + 1)(1 - alpha g^l).
-    """
-    ell = np.arange(degree + 1)
-    h = (2 * ell + 1) * (1.0 - alpha * float(g) ** ell)
-    beside = ell[1:] / np.sqrt(h[:-1] * h[1:])
-    last = scipy.linalg.eigh_tridiagonal(np.zeros(degree + 1), beside, True, select="i", select_range=(degree, degree))
-    return float(1.0 / last[0])
-
-
-def decay_rates(reduced: Floats, g: float) -> Floats:
-    """Return kappa of reduced albedos [1/l*]."""
-    alpha = unreduced(reduced, g)
-    return np.array([decay_rate(albedo, g) for albedo in alpha]) / (1.0 - alpha * g)
 
 
 def lines(alphas: Floats, g: float) -> list[tuple[Contour, NDArray[np.intp]]]:
