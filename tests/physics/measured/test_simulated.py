@@ -10,8 +10,7 @@ import pytest
 
 from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.reading import read
-from profilefit.measured.simulated_file import FEWEST_PHOTONS, NARROWEST, merged
+from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
 
 DATA = Path(__file__).parents[3] / "examples"
 
