@@ -21,7 +21,7 @@ from profilefit.laws import PROFILES
 if TYPE_CHECKING:
     from mcml_sim import Medium
     from profilefit.measured import Known, Measured, MediumPosterior
-    from profilefit.measured.oblique import Oblique
+    from profilefit.measured.model import Oblique
     from profilefit.measured.premises import Premises
 
 FAILED = 1  # exit status
@@ -350,7 +350,7 @@ def _oblique(text: str, unit: str) -> Oblique:
     with interruptible(__name__):
         from mcml_sim.media.checks import shown
         from profilefit.measured.data import length
-        from profilefit.measured.oblique import Oblique
+        from profilefit.measured.model import Oblique
 
     angle, r, shift = text.split(":") if text.count(":") == 2 else ("", "", "")
     match = WITH_ERROR.fullmatch(shift.strip())

@@ -192,6 +192,12 @@ def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
     return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)
 
 
+def gaussianised_rows(residuals: Floats, freedom: Floats, pooled: float) -> Floats:
+    """Return residuals (m,), the first of which rest on errors of `freedom` (n,), as normal ones of equal chance."""
+    own = gaussianised(residuals[: freedom.size], own_degrees_of_freedom(freedom, pooled))
+    return np.append(own, residuals[freedom.size :])
+
+
 def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
     """Return ln likelihood (m,) where chi-square has risen by `rise` (m,).
 

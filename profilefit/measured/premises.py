@@ -14,9 +14,8 @@ from profilefit.errors import InputError
 from profilefit.laws import profile_classes, takes_g
 from profilefit.measured.data import Measured, length
 from profilefit.measured.instrument import FWHM, PENCIL, TOPHAT, Gaussian, Instrument, Irradiance, beam_of, gaussian
-from profilefit.measured.model import EXACT, Light, exact_light
+from profilefit.measured.model import EXACT, Light, Oblique, exact_light
 from profilefit.measured.noise import origin
-from profilefit.measured.oblique import Oblique
 from profilefit.measured.problem import MEDIUM, FitSpec, Known, held_albedo
 from profilefit.recipes import catalogue
 

@@ -33,8 +33,7 @@ from profilefit.measured.identifiability import (
     identifiability,
     rank_designs,
 )
-from profilefit.measured.model import EXACT, FLOCK, NAMES, U, u_of
-from profilefit.measured.oblique import Oblique
+from profilefit.measured.model import EXACT, FLOCK, NAMES, Oblique, U, u_of
 from profilefit.measured.premises import Premises, specified
 from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, Known, descended, log_prior
 from profilefit.measured.reading import read
