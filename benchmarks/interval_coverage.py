@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
-from benchmarks.refits import LEVELS, Coverage, coverage, refits
+from benchmarks.refits import LEVELS, Coverage, coverage, drawn_noise, refits
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
@@ -75,7 +75,7 @@ def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
         closed = profiles.covariance
         if closed is None:
             raise InputError(f"names must be of records of fits to profiles, got {name!r}")
-        noise = _matched(closed.draws(replicates, SEED + 1), run)
+        noise = _matched(drawn_noise(closed, replicates, SEED + 1), run)
         one = fitted(chosen, law, profiles)
         again = refits(one, np.column_stack([profiles.energy, profiles.beyond]), noise)
         off = again.found - again.truth

@@ -26,8 +26,6 @@ COVARIANCE_RANK = 8
 # A reweighted ring that rests on fewer photons than this has a standard error that is itself unknown by a tenth,
 # and that collapses where the heavy photons are missing altogether.
 FEWEST_EFFECTIVE_SAMPLES = 50.0
-# Directions of a ring below this share of its largest are rounding where few photons arrived: E has no part in them.
-FAINTEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -62,24 +60,6 @@ class Covariance:
         total = ring.sum(axis=1)
         between = np.outer(total, total) - ring @ ring.T
         return np.einsum("pik,qik->pq", within, within) - between / max(self.photons - 1, 1)
-
-    def draws(self, number: int, seed: int) -> Floats:
-        """Noise of ring energies (number, alphas, rings + 1) as another run's photons would have it, taken for normal.
-
-        Photons are shared out: what one ring gets, another lacks. So noise that is independent between rings, as of
-        Poisson counts, is drawn first, and then freed of the fluctuation t of its total [standard deviations]. Within
-        the directions L that each ring keeps, E = sqrt(photons - 1) L y: v of covariance 1 + y y^T, less t y.
-        """
-        generator = np.random.default_rng(seed)
-        root = self.energy.T[:, :, None] / np.sqrt(max(self.photons - 1, 1))
-        unit = np.linalg.norm(self.factor, axis=2, keepdims=True)
-        unit = np.where(unit > 0, unit, 1.0)
-        y = np.einsum("ika,iao->ik", np.linalg.pinv(self.factor / unit, rcond=FAINTEST), root / unit)
-        size = 1.0 + np.sum(y**2, axis=1)
-        rest = np.sqrt(max(1.0 - float(np.sum(1.0 - 1.0 / size)), 0.0))  # photons that no ring saw
-        v = generator.standard_normal((number, *y.shape)) + generator.standard_normal((number, len(y), 1)) * y
-        total = np.einsum("rik,ik->r", v, y / size[:, None]) + rest * generator.standard_normal(number)
-        return np.einsum("iak,rik->rai", self.factor, v - total[:, None, None] * y, optimize=True)
 
 
 @dataclass(frozen=True)

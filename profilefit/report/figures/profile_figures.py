@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from profilefit.fitting import derived
+from profilefit.fitting.discrepancy import LawWithErrors
+from profilefit.fitting.discrepancy import profile as profile_with_errors
 from profilefit.report.figures.canvas import (
     AS_PUBLISHED,
     BLACK,
@@ -135,8 +136,8 @@ def _truth_band(fitted: Fitted | None, r: Floats, alpha: float) -> tuple[Floats,
     """Return the band in which a fitted law states the exact profile to lie; None for printed laws and old records."""
     if fitted is None:
         return None
-    known = derived.LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays)
-    return None if known.discrepancy is None else derived.profile(known, r, alpha).interval()
+    known = LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays)
+    return None if known.discrepancy is None else profile_with_errors(known, r, alpha).interval()
 
 
 def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from benchmarks.refits import LEVELS, binomial_band, counted, coverage, refits
+from benchmarks.refits import LEVELS, binomial_band, counted, coverage, drawn_noise, refits
 from mcml_sim import InputError
 from profilefit.fitting.chains import posterior
 from profilefit.fitting.estimate import fit
@@ -27,7 +27,7 @@ def refitted(tallies, law, free=None):
     """Refits of a law to 2000 runs of normal noise, and the covariance that made it."""
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     one = fit(profiles, law, "energy", free, jackknife=False)
-    noise = with_beyond(profiles.covariance.draws(REPLICATES, seed=21))
+    noise = with_beyond(drawn_noise(profiles.covariance, REPLICATES, seed=21))
     return one, profiles.covariance, refits(one, expected_energy(tallies), noise)
 
 
