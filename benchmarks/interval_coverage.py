@@ -27,8 +27,7 @@ from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import write_whole
 from profilefit.fitting.discrepancy import predicted
-from profilefit.fitting.estimate import Fit, ResidualFunction, fit
-from profilefit.fitting.objectives import EVERYWHERE, Rings
+from profilefit.fitting.estimate import EVERYWHERE, Fit, ResidualFunction, Rings, fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.recipe import Recipe

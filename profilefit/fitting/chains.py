@@ -64,7 +64,7 @@ LAPLACE_SHARE = 0.5  # of the moves; the others walk where the density is nothin
 
 
 def laplace_move(centre: Floats, covariance: Floats) -> emcee.moves.MHMove:
-    """Return proposals that do not depend on where a walker is: t about `centre` (p,), scaled to `covariance` (p, p)."""
+    """Return proposals that do not depend on where a walker is: t about `centre` (p,) with `covariance` (p, p)."""
     root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
 
     def log_q(white: Floats) -> Floats:

@@ -37,9 +37,8 @@ from mcml_sim.errors import InputError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.estimate import Fit, ResidualFunction, followed
+from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
 from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
-from profilefit.fitting.objectives import NO_LIMITS, Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.fitting.solver import unit_columns
@@ -381,7 +380,7 @@ class LawWithErrors:
 
 @dataclass(frozen=True)
 class AtAlbedo:
-    """A profile law at one albedo, ring by ring of `EDGES`: energy (n,) [-], its derivatives (n, p) by the constants."""
+    """A profile law at one albedo, ring by ring of `EDGES`: energy (n,) [-] and slope (n, p), its derivatives."""
 
     known: LawWithErrors
     alpha: float

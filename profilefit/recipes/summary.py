@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from profilefit.fitting.chains import LEVELS, Posterior, posterior
 from profilefit.fitting.discrepancy import LawWithErrors, discrepancy
 from profilefit.fitting.discrepancy import summary as quantities
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, Fit, ResidualFunction, judged
-from profilefit.fitting.objectives import Rings
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, Fit, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import solve_batch
 from profilefit.recipes import record

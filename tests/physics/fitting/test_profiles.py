@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, Setting, SettingError, exact, simulate_orders
 from benchmarks.refits import drawn_noise
+from mcml_sim import Grid, InputError, Setting, SettingError, exact, simulate_orders
 from profilefit.fitting.profiles import COVARIANCE_RANK, FEWEST_EFFECTIVE_SAMPLES, Covariance, Profiles
 
 ALPHAS = [0.3, 0.6, 0.9, 0.97]
