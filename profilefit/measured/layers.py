@@ -49,8 +49,7 @@ class LayersFit:
     names     of the free quantities; scale last where it is free
     values    (p,); errors (p,) their relative standard errors, with the misfit; correlation (p, p) of their logarithms
     products  (exponents, relative error) of the products of powers that are independent of each other, best first
-    chi2, freedom, chance   by the errors of the data
-    light     (n,) of the rows
+    chi2, freedom, chance   by the errors of the data; light (n,) of the rows
     """
 
     data: Measured
@@ -81,18 +80,12 @@ class LayersFit:
 
     def product(self, at: int) -> str:
         """One of the products, in words."""
-        exponents = self.products[at][0]
-        return " ".join(
-            f"{name}^{power:.2g}" for name, power in zip(self.names, exponents, strict=True) if abs(power) > NAMED
-        )
+        pairs = zip(self.names, self.products[at][0], strict=True)
+        return " ".join(f"{name}^{power:.2g}" for name, power in pairs if abs(power) > NAMED)
 
 
 def fit_layers(
-    data: Measured,
-    medium: Medium,
-    free: Sequence[str],
-    premises: Premises,
-    scale: float | Known | None = 1.0,
+    data: Measured, medium: Medium, free: Sequence[str], premises: Premises, scale: float | Known | None = 1.0
 ) -> LayersFit:
     """Fit the free quantities of a stack, from where `medium` has them; lengths in the unit of the data. Minutes.
 
@@ -107,12 +100,12 @@ def fit_layers(
     """
     require_workable(data)
     data = replace(data, notes=(*data.notes, *premises.notes))
-    names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
+    known = scale if isinstance(scale, Known) else None
+    held = float(scale) if isinstance(scale, float | int) else 1.0
+    names = tuple(free) + (() if isinstance(scale, float | int) else ("scale",))
     _require_free(medium, free)
     if data.value.size <= len(names):
         raise InputError(f"{data.source}: expected more than {len(names)} rows, one more than is free")
-    known = scale if isinstance(scale, Known) else None
-    held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     wider = widening(data.freedom, len(names))
     problem = _LayersProblem(data, medium, tuple(free), premises, noise(data, widening=wider), held, known)
     start = np.zeros(len(names))
@@ -149,10 +142,7 @@ def _setting(data: Measured, medium: Medium, premises: Premises) -> Setting:
 
 @dataclass(frozen=True)
 class _LayersProblem:
-    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free.
-
-    weights  the errors of the rows; held the scale if it is not free, known what is known of it
-    """
+    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free."""
 
     data: Measured
     medium: Medium

@@ -50,15 +50,9 @@ def premises(
     options: Mapping[str, str | None] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> Premises:
-    """Return the premises of a fit from options, else from what the file states.
+    """Return the premises of a fit of `law` from options, else from what the file states.
 
-    A simulation's medium is what its file states, its g only where exact light, or the law that is fitted, has it.
-
-    Args:
-        data: the profile.
-        law: that is fitted.
-        options: texts by the names light, n, g, beam and fibre.
-        names: what messages call these.
+    options  texts by the names light, n, g, beam and fibre; names what messages call these
     """
     chosen = {name: text for name, text in (options or {}).items() if text is not None}
     labels = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
@@ -80,34 +74,30 @@ def premises(
     ranges = {name: parsed(labels[name], given[name], name) for name in MEDIUM if name in given}
     n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
     setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
-    # Clear layers may state any g.
+    # A simulation's g counts only where exact light, or the law that is fitted, has it. Clear layers may state any g.
     forward = replace(setting, g=data.g) if "g" not in given and data.g and abs(data.g) < 1.0 else setting
     if forward.is_solved and (law == EXACT or takes_g(law)):
         setting = forward
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:
-        raise InputError(
-            f"{labels[min(ranges)]} must be a number where a law is fitted, got {shown(given[min(ranges)])}"
-        )
+        name = min(ranges)
+        raise InputError(f"{labels[name]} must be a number where a law is fitted, got {shown(given[name])}")
     if "fibre" in given and data.rings:
         raise InputError(f"{labels['fibre']} must be left out where rows are averages over annuli")
-    # What a file states lies beside it; a pipe has no place.
-    beside = "beam" not in chosen and Path(data.source).is_file()
-    folder = Path(data.source).parent if beside else Path()
-    beam, widths = _beam(labels["beam"], given.get("beam"), data.unit, folder)
-    ranges |= {} if widths is None else {"beam": widths}
+    beam: Irradiance | None = None
+    if "beam" in given:
+        # What a file states lies beside it; a pipe has no place.
+        beside = "beam" not in chosen and Path(data.source).is_file()
+        folder = Path(data.source).parent if beside else Path()
+        beam, widths = _beam(labels["beam"], given["beam"].strip(), data.unit, folder)
+        ranges |= {} if widths is None else {"beam": widths}
     fibre = length(labels["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
     assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
     return Premises(setting, Instrument(beam, fibre), ranges, assumed, notes)
 
 
-def _beam(
-    option: str, text: str | None, unit: str, folder: Path
-) -> tuple[Irradiance | None, tuple[float, float] | None]:
+def _beam(option: str, text: str, unit: str, folder: Path) -> tuple[Irradiance, tuple[float, float] | None]:
     """Return a beam, and the range of its 1/e^2 radius if it has one: LOW:HIGH, or fwhm:LOW:HIGH."""
-    if text is None:
-        return None, None
-    text = text.strip()
     kind = next((one for one in (FWHM, TOPHAT) if text.lower().startswith(one)), "")
     ends = text[len(kind) :].split(":")
     if len(ends) != 2 or kind == TOPHAT:
@@ -142,19 +132,9 @@ def specified(
     folder: Path | None = None,
     oblique: Oblique | None = None,
 ) -> FitSpec:
-    """Return the specification of a fit to data; InputError, SettingError or RecordError of one that cannot be.
+    """Return the specification of a fit to data, from the arguments of `result.fit`.
 
-    Args:
-        data: the profile.
-        law: "exact", light solved exactly, or a law's name.
-        constants: which of the law's, as for `catalogue.load`.
-        setting: illumination, surface and scattering, or all premises; by default what the file states, else
-            "searchlight" (a pencil beam, normal, collimated), n = 1 and g = 0.
-        held: fixed quantities: alpha or A [-], l [unit of the data].
-        total: the total reflectance A [-], if that was measured too.
-        scale: the values are light times this: a number, one that is known to within an error, or None if unknown.
-        folder: of the records, by default the ones shipped.
-        oblique: the centre of a circle of the same medium's light, where a beam fell in obliquely.
+    InputError, SettingError or RecordError of one that cannot be.
     """
     records, held = folder or catalogue.fits_folder(), {**(held or {})}
     where = Premises(setting) if isinstance(setting, Setting) else setting or premises(data, law)
@@ -166,9 +146,9 @@ def specified(
         raise InputError(f"oblique light must be a {Setting().illumination}, got {illumination} light to fit")
     light = _light(law, constants, where.setting, records)
     _require_held(light, held)
-    if not (scale is None or isinstance(scale, Known)):
-        held["scale"] = _positive("scale", scale)
     known = scale if isinstance(scale, Known) else None
+    if scale is not None and known is None:
+        held["scale"] = _positive("scale", scale)
     notes = where.notes
     if data.n is not None and not math.isclose(data.n, n):
         notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")

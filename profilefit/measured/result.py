@@ -1,7 +1,7 @@
 """The posterior of a fit: values, intervals, identifiability, the best additional measurement; and its JSON content.
 
-Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k: nothing is known of the units, and alpha may be 1. Errors
-estimated from replicates share a scale that is itself an estimate: with that unknown the likelihood is Student's t.
+Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k. Errors estimated from replicates share a scale that is
+itself an estimate: with that unknown the likelihood is Student's t.
 """
 
 from __future__ import annotations
@@ -59,10 +59,9 @@ class MediumPosterior:
     Where the data do not exclude the end of a coordinate's range (alpha = 1, say: chi-square there is within the
     square of the 95 % quantile, 3.84 of known errors, of the minimum), the optimum is no estimate and the derivatives
     there give no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
-    no value; the others keep their interval, and a value if it lies inside. No value lies outside its own interval.
-    The limit is a quantile of the posterior, whose prior is flat in sqrt(1 - alpha) >= 0: it covers at 95 % or more.
-    Without a chain it is the end of the two-sided interval of the profile likelihood: 97.5 %. At an end no interval
-    includes the law's own error.
+    no value; the others keep their interval, and a value if it lies inside. The limit is a quantile of the posterior,
+    without a chain the end of the two-sided interval of the profile likelihood (97.5 %); neither includes the law's own
+    error.
     """
 
     fit: MediumFit
@@ -76,8 +75,7 @@ class MediumPosterior:
     def draws(self) -> dict[str, Floats]:
         """Posterior draws (k,) of every quantity by the errors of data and law; empty without a chain.
 
-        Draws by all errors are drawn towards the fit, in the coordinates, as far as the lack of fit widens their
-        covariance. At an end, where derivatives give no errors, they stay as they are.
+        They are draws by all errors, nearer to the fit by as much as the lack of fit widens their covariance.
         """
         if self.walk is None:
             return {}
@@ -92,10 +90,7 @@ class MediumPosterior:
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """Posterior draws (k,) of every quantity by all errors, with the lack of fit that is allowed for.
-
-        Empty at an end, and where neither the law's error nor a lack of fit is known.
-        """
+        """Posterior draws (k,) of every quantity by all errors; empty at an end, or if only the data's are known."""
         if self.walk is None or not self.identified or (self.fit.plain is None and self.fit.rel is None):
             return {}
         return self.draws if self.fit.plain is None else quantities_at(self.fit, self._sampled)
@@ -147,7 +142,7 @@ class MediumPosterior:
         return value if inside else None
 
     def interval(self, name: str) -> Ends | None:
-        """Return 95 % by the errors of data and law: of posterior draws; without a chain, of the profile likelihood.
+        """Return 95 % by the errors of data and law, of posterior draws; without a chain, of the profile likelihood.
 
         Both ends, or one and None: a one-sided limit. That limit, and the profile likelihood, are by all errors.
         """
@@ -186,9 +181,7 @@ def fit(
     folder: Path | None = None,
     oblique: Oblique | None = None,
 ) -> MediumPosterior:
-    """Fit a medium to a measured or simulated profile, and judge the fit.
-
-    A fit that fails is returned and says so.
+    """Fit a medium to a measured or simulated profile, and judge the fit; one that fails is returned and says so.
 
     Args:
         data: a file (see `reading.read`), or what was read from one, for example `within` some radii.
@@ -215,10 +208,7 @@ def fit(
 
 
 def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:
-    """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate.
-
-    Where an intermediate number is not finite, that is the fit's result, and nothing else is reported.
-    """
+    """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate."""
     if not fit.has_ended:
         return MediumPosterior(fit, None, None, None)
     try:
@@ -322,12 +312,9 @@ def rival_values(fit: MediumFit, rival: Solution) -> dict[str, float]:
 
 
 def content(result: MediumPosterior) -> dict[str, Any]:
-    """Return everything as JSON content; model errors are null where they are not known.
-
-    Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
-    """
+    """Return everything as JSON content; null are errors that are not known, and values and ends at an edge."""
     fit = result.fit
-    data, spec, names = fit.data, fit.spec, result.identified
+    data, spec, names, ranges = fit.data, fit.spec, result.identified, fit.range_marginal
     joint = model.correlation(fit.gradients, fit.statistical, names) if names else None
     body = {
         "data": {
@@ -358,9 +345,7 @@ def content(result: MediumPosterior) -> dict[str, Any]:
         "beam": None if spec.instrument.beam is None else spec.instrument.beam.words,
         "fibre": spec.instrument.fibre,
         "ranges": spec.ranges,
-        "of_ranges": None
-        if fit.range_marginal is None
-        else {"mean": fit.range_marginal.mean, "error": fit.range_marginal.error},
+        "of_ranges": ranges and {"mean": ranges.mean, "error": ranges.error},
         "free": [NAMES[at] for at in spec.free],
         "held": spec.held,
         "known": {"A": spec.total, "scale": spec.scale, "oblique": spec.oblique},

@@ -11,10 +11,10 @@ from profilefit.fitting import estimate, solver
 from profilefit.fitting.estimate import (
     ResidualFunction,
     fit,
+    followed,
     misfit_covariance,
     residual_structure,
     rings_of,
-    sensitivity,
 )
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
