@@ -38,7 +38,7 @@ from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
-from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
+from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, likeliest, matern
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.fitting.solver import unit_columns
@@ -168,7 +168,7 @@ def of_residuals(data: Residuals) -> Discrepancy:
     )
     amplitude, length_u, length_s = map(float, np.exp(theta))
     gain = worth if np.any(noise) else np.inf
-    kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
+    kernel_u, kernel_s = (matern(apart(x, x) / length) for x, length in ((data.u, length_u), (data.s, length_s)))
     across = data.influence, kernel_s, kernel_u, data.influence
     covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
     result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED

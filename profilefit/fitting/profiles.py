@@ -32,9 +32,8 @@ FEWEST_EFFECTIVE_SAMPLES = 50.0
 class Covariance:
     """Covariance of ring energies between rings and albedos, in the closed form of a multinomial tally.
 
-    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
-             ring is one more
-    energy   (alphas, rings + 1) energies E that were counted: between rings i != j, cov(E_i(a), E_j(b)) =
+    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond last
+    energy   (alphas, rings + 1) energies E that were counted: between rings cov(E_i(a), E_j(b)) =
              -E_i(a) E_j(b) / (photons - 1)
     dropped  the largest share of any one variance that the truncation to `rank` leaves out
     """
@@ -49,10 +48,9 @@ class Covariance:
         return self.factor.shape[-1]
 
     def sandwich(self, weights: Floats) -> Floats:
-        """Covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
+        """Return the covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
 
-        Rings at the end that only one of the two knows count for nothing: a fit to trimmed rings sees no light beyond,
-        and a tally without an overflow has none.
+        Rings at the end that only one of the two knows count for nothing.
         """
         rings = min(weights.shape[-1], len(self.factor))
         within = np.einsum("pai,iak->pik", weights[..., :rings], self.factor[:rings])
@@ -66,16 +64,14 @@ class Covariance:
 class Profiles:
     """Reflectance profiles in units of the transport mean free path (l* = 1).
 
-    alpha              (m,) reduced single-scattering albedos [-]
-    r_edges            (n + 1,) ring edges from 0 [mfp]
+    alpha, r_edges     (m,) reduced single-scattering albedos [-], (n + 1,) ring edges from 0 [mfp]
     energy             (m, n) energy reflected through each ring, per unit incident [-]: the integral of 2 pi r R_d
     standard_error     (m, n) of `energy`; zero where the truth has no noise
     effective_samples  (m, n) photons that the estimate really rests on; infinite where it has no noise
     beyond             (m,) energy reflected beyond the last edge [-]
     covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
-    settings           of each profile (m,), where those of several indices and g are joined; none where all are of
-                       `setting`
+    settings           of each profile (m,), where several are joined; none where all are of `setting`
     """
 
     alpha: Floats
@@ -94,12 +90,10 @@ class Profiles:
     def joined(cls, parts: Sequence[Profiles], setting: Setting) -> Profiles:
         """Return profiles without noise of several indices and g, each of the same albedos and rings.
 
-        The illumination is that of `setting`, to which the record of a fit will belong.
+        `setting` is the one to which the record of a fit will belong.
         """
-        first = parts[0]
-        if not all(
-            np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
-        ):
+        first, same = parts[0], np.array_equal
+        if not all(same(first.alpha, one.alpha) and same(first.r_edges, one.r_edges) for one in parts):
             raise InputError("profiles of several settings must have the same albedos and rings, got others")
         rows: dict[str, Any] = {
             name: np.concatenate([getattr(one, name) for one in parts])
@@ -126,18 +120,9 @@ class Profiles:
             factor, dropped = orders.covariance_factor(albedos, rank, overflow=True)
             counted = np.column_stack([value, beyond]) - orders.once(albedos)
             covariance = Covariance(factor, counted, orders.photons, dropped)
-        return cls(
-            albedos,
-            orders.grid.r_edges,
-            value,
-            np.asarray(energy.standard_error),
-            np.asarray(energy.effective_samples),
-            beyond,
-            "orders",
-            orders.setting,
-            orders.photons,
-            covariance,
-        )
+        noise = np.asarray(energy.standard_error), np.asarray(energy.effective_samples)
+        run = orders.setting, orders.photons, covariance
+        return cls(albedos, orders.grid.r_edges, value, *noise, beyond, "orders", *run)
 
     @classmethod
     def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:
@@ -212,10 +197,9 @@ def walk(last: float) -> Floats:
 
 
 def trimmed_radius(r: Floats, quantity: Floats, epsilon: float = 0.005) -> float:
-    """r'_max of (6): the first r of the walk where `quantity` (n,) at ring centres `r` is at most epsilon its largest.
+    """Return r'_max of (6): the first r of the walk where `quantity` (n,) at centres `r` is <= epsilon its largest.
 
-    The paper compares with the value at 0; R_d and r R_d are largest in the first rings, and r R_d is zero at r = 0
-    itself, so the largest value stands for it. Returns the last ring's centre where the walk never gets that low.
+    The paper compares with the value at 0, which r R_d has not. Where the walk never gets that low it is the last r.
     """
     steps = walk(float(r[-1]))
     steps = steps[steps <= r[-1]]

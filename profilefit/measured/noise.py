@@ -98,7 +98,7 @@ class Noise:
         return scaled + growth * np.multiply.outer(self.common, self.common @ scaled)
 
     def in_errors(self, error: Floats | None, rows: int) -> Floats:
-        """Return the covariance (rows, rows), in standard errors, of an error (n, n) of the first rows; zero of None."""
+        """Return the covariance (rows, rows), in standard errors, of an error (n, n) of the first rows, or None."""
         joint = np.zeros((rows, rows))
         if error is not None:
             joint[: len(error), : len(error)] = self.whitened(self.whitened(error).T)
