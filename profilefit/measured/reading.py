@@ -33,6 +33,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -495,8 +496,9 @@ def _read_mco(path: Path) -> Measured:
     each = entered / photons
     return _counted(
         path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
-        "bounds: no photon weighs more than it entered with", True, result.run.medium, "searchlight",
-        (f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",),
+        errors="bounds: no photon weighs more than it entered with", bounded=True, medium=result.run.medium,
+        illumination="searchlight",
+        notes=(f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",),
     )  # fmt: skip
 
 
@@ -514,30 +516,18 @@ def _read_npz(path: Path) -> Measured:
     _require_light(path, energy)
     return _counted(
         path, content, result.grid.r_edges, energy, error**2 + energy**2 / (result.photons - 1.0),
-        np.asarray(estimate.effective_samples), float(result.photons), "standard errors of the simulation", False,
-        result.medium, result.illumination, (),
+        np.asarray(estimate.effective_samples), float(result.photons), errors="standard errors of the simulation",
+        medium=result.medium, illumination=result.illumination, notes=(),
     )  # fmt: skip
 
 
 def _counted(
-    path: Path,
-    content: bytes,
-    edges: Floats,
-    energy: Floats,
-    squares: Floats,
-    seen: Floats,
-    photons: float,
-    errors: str,
-    bounded: bool,
-    medium: Medium,
-    illumination: str,
-    notes: tuple[str, ...],
+    path: Path, content: bytes, edges: Floats, energy: Floats, squares: Floats, seen: Floats, photons: float, **run: Any
 ) -> Measured:
-    """Return rings merged until each holds enough photons, from (n,) rings.
+    """Return rings merged until each holds enough of the run's N photons, from (n,) rings; `run` as of `Measured`.
 
-    energy      E of each; squares the sum of w^2 of its photons over N (N - 1), whose excess over E^2 / (N - 1) is the
-                variance of E; seen the photons that it is estimated from
-    photons     N, of the whole run
+    energy  E of each; squares the sum of w^2 of its photons over N (N - 1), whose excess over E^2 / (N - 1) is the
+            variance of E; seen the photons that it is estimated from
     """
     _require_light(path, energy)
     starts = merged(edges, seen)
@@ -551,14 +541,12 @@ def _counted(
     if not np.all(variance > 0):
         at = int(np.argmin(variance > 0))
         raise InputError(f"{path}: expected a standard error > 0 of the light from r = {inner[at]:g} to {outer[at]:g}")
-    notes = (*notes, *_layers(medium))
+    notes = [*run.pop("notes"), *_layers(run["medium"])]
     if starts.size < energy.size:
-        merging = f"{energy.size} annuli merged into {starts.size}, of at least {FEWEST_PHOTONS:.0f} photons each"
-        notes = (*notes, merging)
+        notes.append(f"{energy.size} annuli merged into {starts.size}, of at least {FEWEST_PHOTONS:.0f} photons each")
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), inner, outer, whole / areas, np.sqrt(variance) / areas,
-        np.full(whole.size, np.inf), errors, UNIT, True, bounded, photons=photons, medium=medium,
-        illumination=illumination, notes=notes,
+        np.full(whole.size, np.inf), unit=UNIT, counted=True, photons=photons, notes=tuple(notes), **run,
     )  # fmt: skip
 
 
