@@ -142,10 +142,13 @@ class Measured:
         if not np.any(keep):
             ends = f"from {self.inner[0]:g} to {self.outer[-1]:g}"
             raise InputError(f"{self.source}: no row is left between `r_min` and `r_max`: r goes {ends}")
+        return self.chosen(keep, f"{np.sum(~keep)} of {keep.size} rows left out, by `r_min` and `r_max`")
+
+    def chosen(self, keep: NDArray[np.bool_], *notes: str) -> Measured:
+        """Return the rows where `keep` (n,) is true, with notes on it."""
         fields = ("inner", "outer", "value", "sigma", "freedom")
         rows: dict[str, Any] = {name: getattr(self, name)[keep] for name in fields}
-        note = f"{np.sum(~keep)} of {keep.size} rows left out, by `r_min` and `r_max`"
-        return replace(self, **rows, notes=(*self.notes, note))
+        return replace(self, **rows, notes=(*self.notes, *notes))
 
 
 def require_workable(data: Measured) -> None:

@@ -96,7 +96,7 @@ def fit_layers(
         medium: the stack, whose n and g count.
         free: names of the free quantities.
         premises: light, beam and fibre.
-        scale: as of `premises.specified`.
+        scale: as of `result.fit`.
     """
     require_workable(data)
     data = replace(data, notes=(*data.notes, *premises.notes))

@@ -6,6 +6,7 @@ itself an estimate: with that unknown the likelihood is Student's t.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
 from profilefit.fitting.chains import Node, Ridge, Walk, sample
 from profilefit.fitting.misfit import likelihood
 from profilefit.fitting.solver import Solution
+from profilefit.laws import profile_classes
 from profilefit.measured import model
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit, fitted
@@ -33,15 +36,17 @@ from profilefit.measured.identifiability import (
     identifiability,
     rank_designs,
 )
-from profilefit.measured.model import EXACT, FLOCK, NAMES, Oblique, U, u_of
-from profilefit.measured.premises import Premises, specified
-from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, Known, descended, log_prior
+from profilefit.measured.model import EXACT, FLOCK, NAMES, Light, Oblique, U, exact_light, u_of
+from profilefit.measured.noise import origin
+from profilefit.measured.premises import Premises, premises
+from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, FitSpec, Known, descended, held_albedo, log_prior
 from profilefit.measured.reading import read
-from profilefit.recipes import record
+from profilefit.recipes import catalogue, record
 
 Floats = NDArray[np.float64]
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
+HOLDABLE = ("alpha", "A", "l")
 GREY = 0.9  # albedo assumed for the advice where the data do not bound it at all
 KEPT = 4000  # draws
 WALKERS = 2 * FLOCK  # which move by halves
@@ -202,9 +207,56 @@ def fit(
         SettingError: the law does not cover the setting.
         RecordError: a record is missing or damaged.
     """
-    measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
-    spec = specified(measured, law, constants, setting, held, total, scale, folder, oblique)
-    return judged(fitted(measured, spec), seed, walk)
+    data = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
+    records, held = folder or catalogue.fits_folder(), {**(held or {})}
+    where = Premises(setting) if isinstance(setting, Setting) else setting or premises(data, law)
+    illumination, n = where.setting.illumination, where.setting.n
+    if data.illumination not in (None, illumination):
+        got = f"{data.illumination} light, got {illumination} light to fit"
+        raise InputError(f"{data.source}: a simulation of {got}")
+    if oblique is not None and illumination != Setting().illumination:
+        raise InputError(f"oblique light must be a {Setting().illumination}, got {illumination} light to fit")
+    light = _light(law, constants, where.setting, records)
+    _require_held(light, held)
+    known = scale if isinstance(scale, Known) else None
+    if scale is not None and known is None:
+        held["scale"] = _positive("scale", scale)
+    notes = where.notes
+    if data.n is not None and not math.isclose(data.n, n):
+        notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")
+    spec = FitSpec(
+        light, held, total, known, oblique, where.instrument, where.ranges, where.assumed,
+        origin(law, constants, light.setting, records), law, constants, notes,
+    )  # fmt: skip
+    return judged(fitted(data, spec), seed, walk)
+
+
+def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
+    if law == EXACT:
+        if constants != "regenerated":
+            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
+        return exact_light(setting)
+    if law not in profile_classes() and not law.startswith("gaussians:"):
+        raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")
+    return catalogue.load(law, constants, setting, folder)
+
+
+def _require_held(law: Light, held: Mapping[str, float]) -> None:
+    if unknown := [name for name in held if name not in HOLDABLE]:
+        raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
+    if {"alpha", "A"} <= set(held):
+        raise InputError("held must have one of alpha and A, which say the same, got both")
+    for name, value in held.items():
+        if name == "l":
+            _positive("held l", value)
+        else:
+            held_albedo(law, name, value)
+
+
+def _positive(name: str, value: float) -> float:
+    if not value > 0:
+        raise InputError(f"{name} must be a number > 0, got {value!r}")
+    return value
 
 
 def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:

@@ -109,7 +109,7 @@ def test_failures_have_names():
     bright = fit(rings(), scale=0.3)  # no medium reflects more than all of the light
     assert "alpha runs to 1" in bright.minimum.result
     with pytest.raises(InputError, match=r"made up: expected more than 3 rows, one more than is free, got 3"):
-        fit(rings().chosen(np.arange(24) < 3))
+        fit(rings().within(None, EDGES[3]))
 
 
 def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
