@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -75,10 +76,10 @@ class LawTarget:
 
     def density(self, x: Floats, alpha: float) -> Floats:
         """Return the slope of the law's cdf: whatever the law scales its profile to."""
-        return _called(_slope, self.law, x, alpha)
+        return _called("slope", self.law, x, alpha)
 
     def cdf(self, x: Floats, alpha: float) -> Floats:
-        return _called(_share, self.law, x, alpha)
+        return _called("cdf", self.law, x, alpha)
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def edge_light(target: Target, alpha: float, edge: float) -> float:
 
 def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str, float]:
     def radius(t: Floats) -> Floats:
-        return _called(_sample, sampler, -np.expm1(-t), alpha)
+        return _called("sample", sampler, -np.expm1(-t), alpha)
 
     with jax.enable_x64(True):
         jump = float(sampler.jump(jnp.asarray(sampler.law.similar(alpha, 1.0)[0])))
@@ -147,7 +148,7 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     light = target.density(x, alpha)
     lit = lit_beyond_edge(x, edge)
     moving = ~np.any([np.zeros(t.size, bool), *((t > low) & (t < high) for low, high, _ in flats)], axis=0)
-    weight = np.where(moving, _ratio(light, _called(_pdf, sampler, x, alpha)), 0.0)
+    weight = np.where(moving, _ratio(light, _called("pdf", sampler, x, alpha)), 0.0)
     by_law = np.where(moving, _ratio(light, LawTarget(sampler.law).density(x, alpha)), 0.0)
     lost = _at_atoms(sampler, alpha, target, flats, edge)
     beyond = edge_light(target, alpha, edge)
@@ -170,7 +171,7 @@ def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floa
 
     Where a sampler draws a radius twice, it is the nearer of its own two, moved by the difference of the cdfs.
     """
-    x = _called(_sample, sampler, xi, alpha)
+    x = _called("sample", sampler, xi, alpha)
     with jax.enable_x64(True):
         own = np.asarray(sampler.undone(x, xi, alpha))
     if isinstance(target, LawTarget) and target.law is sampler.law:
@@ -270,30 +271,17 @@ def _rule(breaks: Floats) -> tuple[Floats, Floats]:
     return t.ravel(), dt.ravel()
 
 
-def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
-    """Call a compiled function on every value, BATCH of them at a time."""
+def _called(name: str, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
+    """Call a method, or "slope" of a cdf, compiled, on every value, BATCH of them at a time."""
     padded = np.pad(values, (0, -values.size % BATCH), mode="edge").reshape(-1, BATCH)
     with jax.enable_x64(True):
         owner, at = jax.tree.map(jnp.asarray, (owner, alpha))  # traced, so that other constants compile nothing
-        parts = [np.asarray(function(owner, jnp.asarray(part), at)) for part in padded]
+        parts = [np.asarray(_method(owner, jnp.asarray(part), at, name)) for part in padded]
     return np.concatenate(parts)[: values.size]
 
 
 @filter_jit
-def _sample(sampler: Sampler, xi: Array, alpha: Array) -> Array:
-    return sampler.sample(xi, alpha)
-
-
-@filter_jit
-def _pdf(sampler: Sampler, x: Array, alpha: Array) -> Array:
-    return sampler.pdf(x, alpha)
-
-
-@filter_jit
-def _share(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return law.cdf(x, alpha)
-
-
-@filter_jit
-def _slope(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return jax.jvp(lambda y: law.cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]
+def _method(owner: Any, values: Array, alpha: Array, name: str) -> Array:
+    if name == "slope":
+        return jax.jvp(lambda x: owner.cdf(x, alpha), (values,), (jnp.ones_like(values),))[1]
+    return getattr(owner, name)(values, alpha)
