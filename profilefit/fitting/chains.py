@@ -118,10 +118,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Ridge:
-    """Nodes whose first parameter rises, two at least, and what is between them.
-
-    spread  (p - 1, p - 1) covariance of the straight coordinates but the first; None for 1
-    """
+    """Nodes whose first parameter rises, two at least; `spread` is the covariance of the others, None for 1."""
 
     nodes: tuple[Node, ...]
     spread: Floats | None = None
@@ -289,10 +286,7 @@ def walk(
 
 @dataclass(frozen=True)
 class Posterior(Walk):
-    """Chains of one fit's constants.
-
-    kind "statistical" or "misfit"; law its name, objective what it was fitted by; names (p,) of the constants
-    """
+    """Chains of one fit's constants (p,), of a kind "statistical" or "misfit"."""
 
     kind: str
     law: str

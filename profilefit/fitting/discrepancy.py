@@ -99,10 +99,7 @@ class Discrepancy:
         return {f"discrepancy_{name}": getattr(self, name) for name in KEPT}
 
     def law_covariance(self, u: Floats, s: Floats, slope: Floats) -> Floats:
-        """Covariance (k, k) of the law that was fitted, less the truth, at points (k,) of ln r and `places`.
-
-        slope  (k, p) d law / d constants there, in what `unit` calls 1: where the fit follows delta, less is left
-        """
+        """Return the covariance (k, k) of the law less the truth at points (k,), d law / d constants being `slope`."""
         joint = self._kernel(s, self.s, self.length_s)[:, :, None] * self._kernel(u, self.u, self.length_r)[:, None, :]
         own = self._kernel(s, s, self.length_s) * self._kernel(u, u, self.length_r)
         followed = self.amplitude**2 * np.einsum("kp,pai,lai->kl", slope, self.influence, joint, optimize=True)
@@ -438,10 +435,7 @@ class AtAlbedo:
 
 
 def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quantity:
-    """Return the radius (k,) [mfp] within which `share` of the reflected light leaves, at albedos `alpha` (k,).
-
-    Its model error knows nothing of light beyond 99.5 % of the energy: `tail_error` does.
-    """
+    """Return the radius (k,) [mfp] within which `share` of the light leaves; beyond 99.5 % see `tail_error`."""
     if known.is_map or not 0 < share < 1:
         raise InputError(f"share must be in (0, 1), of a profile law, got {share!r} of {type(known.law).__name__}")
     rows = [AtAlbedo(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]

@@ -234,10 +234,7 @@ class MediumFit:
 
 
 def fitted(data: Measured, spec: FitSpec) -> MediumFit:
-    """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
-
-    InputError if there are not more rows than free coordinates, or if the data are beyond `require_workable`.
-    """
+    """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`. InputError."""
     require_own_process()
     free = len(spec.free)
     if data.value.size <= free:
@@ -269,10 +266,7 @@ def _settled(fit: MediumFit, rounds: int) -> MediumFit:
 
 
 def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
-    """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none.
-
-    Wider errors let the search out of a local minimum; where this leads to a better fit, all begins again from there.
-    """
+    """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none."""
     wider = fit
     for _ in range(LACK_ROUNDS):
         values = {} if fit.range_marginal is None else fit.range_marginal.mean
@@ -284,7 +278,7 @@ def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
         if not wider.has_ended:
             return fit
         back = replace(wider.problem, noise=fit.problem.noise)
-        there = descended_from(back, wider.point)
+        there = descended_from(back, wider.point)  # wider errors let the search out of a local minimum
         if not there.cost < BETTER * fit.minimum.cost:
             break
         fit = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)

@@ -73,10 +73,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Identifiability of a fit: intervals of the free coordinates, relative errors of quantities not identified.
-
-    pair  the two most correlated free coordinates; correlation theirs (0 with fewer than two)
-    """
+    """Intervals of the free coordinates, relative errors of quantities not identified, the most correlated pair."""
 
     intervals: tuple[Interval, ...]
     loose: dict[str, float]

@@ -217,11 +217,7 @@ GRADES = between(np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5)))
 
 @dataclass(frozen=True)
 class Instrument:
-    """Beam and fibre that gather the light of a row.
-
-    beam   None of a pencil beam
-    fibre  radius of the fibre's core that a point is averaged over [unit of r], which may cover the axis; 0 of a point
-    """
+    """Beam, None of a pencil beam, and radius of the fibre's core that a point is averaged over [unit of r]."""
 
     beam: Irradiance | None = None
     fibre: float = 0.0
@@ -231,10 +227,7 @@ class Instrument:
         return self.gathered(*self._distances(inner, outer))
 
     def gathered(self, d: Floats, mean: Floats, farthest: float = 0.0) -> Nodes:
-        """Return `nodes` of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M).
-
-        With a beam the radii reach at least up to `farthest`.
-        """
+        """Return `nodes` of sums over distances d (n, M), weighted by `mean` (n, M); a beam's reach `farthest`."""
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
             return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)

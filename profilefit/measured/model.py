@@ -101,10 +101,7 @@ class Model:
         return np.asarray(values)[rows], np.asarray(slopes)[:, rows].T
 
     def density(self, point: Floats, rho: Floats) -> tuple[Floats, Floats]:
-        """Compute 2 pi rho R_d at radii (m,) for one point (3,), A last (m + 1,), and derivatives (m + 1, 3).
-
-        Numbers of radii that are alike share one compiled function, whatever rows they are summed to.
-        """
+        """Compute 2 pi rho R_d at radii (m,) for one point (3,), A last (m + 1,), and derivatives (m + 1, 3)."""
         values, slopes = _linearised(self.traced, point, rho, np.eye(rho.size))
         return np.asarray(values), np.asarray(slopes).T
 
@@ -158,8 +155,7 @@ def _light(law: Light, point, rho, weight):
 
 
 def _alpha(u):
-    """1 - s^2 without cancellation."""
-    return jax.nn.sigmoid(-u) * (1.0 + jax.nn.sigmoid(u))
+    return jax.nn.sigmoid(-u) * (1.0 + jax.nn.sigmoid(u))  # 1 - s^2 without cancellation
 
 
 def _double(function):
@@ -272,10 +268,7 @@ def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
 
 
 def _filled(light: ExactLight) -> ExactLight:
-    """Return the light with as many intervals as where g = 0, so that both share compiled code.
-
-    Those that are added hold f at its end.
-    """
+    """Return the light with as many intervals as where g = 0, for one compiled code: more hold f at its end."""
     intervals = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
     with jax.enable_x64(True):
         end = light.rest[:, -1] @ jnp.power(light.step, jnp.arange(3.0, -1.0, -1.0))

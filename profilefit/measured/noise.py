@@ -166,10 +166,7 @@ def relative_error(law: Light, alpha: float, source: Origin | None) -> float | N
 
 
 def law_covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_]) -> Floats | None:
-    """Return the covariance (n, n) of the law's own error in the rows of data; None where it has none.
-
-    rel  relative error of the law [-]; beyond (n,) rows farther out than the radii that it covers
-    """
+    """Return the covariance (n, n) of the law's own error, `rel` but in rows `beyond` (n,); None where it has none."""
     if not rel:
         return None
     size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)

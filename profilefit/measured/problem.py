@@ -173,10 +173,7 @@ class Problem:
         return cost
 
     def _also_known(self, points: Floats, total: Floats, slope: Floats) -> Iterator[tuple[Floats, Floats]]:
-        """Yield residuals (m,) and derivatives (m, 3) of what is known beside the rows, at points (m, 3).
-
-        total  (m,) total reflectance A there [-], and slope (m, 3) its derivatives
-        """
+        """Yield residuals (m,) and derivatives (m, 3) of what is known beside the rows; total and slope are A's."""
         spec = self.spec
         if (known := spec.total) is not None:
             yield (total - known.value) / known.error, slope / known.error
@@ -299,9 +296,9 @@ class RangeMarginal:
 
 
 def marginalise(problem: Problem, start: Solution, known: Mapping[str, float] | None = None) -> RangeMarginal | None:
-    """Compute the marginal posterior of a problem's ranges; None where the fit has no errors anywhere in them.
+    """Compute the marginal posterior of ranges from a fit within them; None where the fit has no errors anywhere.
 
-    start  a fit somewhere within the ranges; known their values there, which may be the best
+    known  values of the ranges at `start`, which may be the best
     """
     whole = dict(problem.spec.ranges)
     rough = [_scaled(leggauss(COARSE)[0], ends) for ends in whole.values()]

@@ -139,9 +139,8 @@ class Beliefs:
     """Prior knowledge, as values with errors; lengths in the unit of the rings. None: nothing is known.
 
     beam     1/e^2 radius that beam and lens make together; surface and glare shares of light
-    scale    of the counts, per light that falls on the medium
+    scale    of the counts, per light on the medium; halos widths of those that glare is a mixture of
     corner   share of light that a lens loses at `border`, growing as r^2
-    halos    widths of the halos that glare is a mixture of
     """
 
     beam: Known | None = None
@@ -175,9 +174,8 @@ class Card:
 class SpotLight(NamedTuple):
     """Light of the medium's rings as beam and lens spread it, by spread (c of them), for a scale of 1.
 
-    light      (c + 1, n) light of the medium, and last the core's derivative by ln sigma
-    by_medium  (c, n, 2) derivatives of the former by the first two coordinates
-    own        (c, n) light that the surface scatters, and `wider` (n,) the core's derivative by ln sigma
+    light  (c + 1, n) of the medium, last the core's derivative by ln sigma; by_medium (c, n, 2) by coordinates
+    own    (c, n) light that the surface scatters; wider (n,) the core's derivative by ln sigma
     """
 
     light: Floats
@@ -382,10 +380,7 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class PhotoFit:
-    """End of a fit: coordinates (p,) and their covariance (p, p); chi-square, its degrees of freedom, and the verdict.
-
-    rivals  minima beyond the intervals of 95 %, of a chi-square that is higher by RIVAL at most
-    """
+    """End of a fit: coordinates (p,), covariance (p, p); rivals have a chi-square higher by RIVAL at most."""
 
     shot: Shot
     x: Floats
