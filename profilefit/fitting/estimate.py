@@ -318,17 +318,16 @@ def fit(
     if counted is not None:
         rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
     solution = judged(least_squares(problem, law.vector(names), (law, rings)), names)
-    return Fit(
-        law.with_vector(names, [float(value) for value in solution.parameters]),
-        names,
-        target,
-        rings,
-        solution,
-        _statistical(problem, solution, law, rings, profiles),
-        misfit_covariance(solution),
-        _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan),
-        residual_structure(solution.residuals.reshape(profiles.alpha.size, -1)),
-    )
+    statistical = None
+    if profiles.covariance is not None:
+        statistical = np.full((len(names),) * 2, np.nan)
+        if solution.converged:
+            moved = followed(*_second_derivatives(problem, solution, law, rings))
+            statistical = profiles.covariance.sandwich(moved)
+    spread = _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan)
+    structure = residual_structure(solution.residuals.reshape(profiles.alpha.size, -1))
+    best = law.with_vector(names, [float(value) for value in solution.parameters])
+    return Fit(best, names, target, rings, solution, statistical, misfit_covariance(solution), spread, structure)
 
 
 @dataclass(frozen=True)
@@ -412,14 +411,6 @@ def _second_derivatives(
         columns = [_curved(problem, here, along, law, rings) for along in np.eye(here.size)]
     hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
     return hessian, mixed
-
-
-def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
-    if profiles.covariance is None:
-        return None
-    if not solution.converged:
-        return np.full((solution.parameters.size,) * 2, np.nan)
-    return profiles.covariance.sandwich(followed(*_second_derivatives(problem, solution, law, rings)))
 
 
 @filter_jit

@@ -105,13 +105,14 @@ def _by_marker(option: str, side: float, shots: Sequence[Exposure], unit: str) -
     cv2 = library("cv2")
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY)))
     for shot in shots:
-        corners, _, _ = detector.detectMarkers(_preview(shot))
+        counts = next((one for one in shot.planes if one.colour == "green"), shot.planes[0]).counts
+        most = max(float(np.percentile(counts, WHITE)), 1e-9)
+        corners, _, _ = detector.detectMarkers((255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0))).astype(np.uint8))
         if len(corners):
             break
     else:
-        raise InputError(
-            f"{option} must be a marker that {shots[0].source} shows, got none of {DICTIONARY}; {ACCEPTED}"
-        )
+        accepted = f"a marker that {shots[0].source} shows"
+        raise InputError(f"{option} must be {accepted}, got none of {DICTIONARY}; {ACCEPTED}")
     step = shots[0].planes[0].step
     points = (corners[0].reshape(4, 2) * step).astype(np.float32)
     square = side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
@@ -119,13 +120,6 @@ def _by_marker(option: str, side: float, shots: Sequence[Exposure], unit: str) -
     plate = PixelScale(matrix, "")
     size = plate.pixel((float(points[:, 0].mean()), float(points[:, 1].mean())))
     return PixelScale(matrix, f"{size:.4g} {unit} a pixel, and the tilt, by a marker of {side:g} {unit}")
-
-
-def _preview(shot: Exposure) -> NDArray[np.uint8]:
-    """Eight bits of the first green or only plane."""
-    counts = next((one for one in shot.planes if one.colour == "green"), shot.planes[0]).counts
-    most = max(float(np.percentile(counts, WHITE)), 1e-9)
-    return np.asarray(255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0)), np.uint8)
 
 
 @dataclass(frozen=True)
