@@ -49,6 +49,6 @@ nitpick_ignore = [
     for name in (
         "mcml_sim.tracing.deposits.Deposits",
         "mcml_sim.tracing.order_bins.Counts",
-        "profilefit.fitting.objectives.Rings",
+        "profilefit.fitting.estimate.Rings",
     )
 ]

@@ -21,7 +21,7 @@ from profilefit.laws import PROFILES
 if TYPE_CHECKING:
     from mcml_sim import Medium
     from profilefit.measured import Known, Measured, MediumPosterior
-    from profilefit.measured.oblique import Oblique
+    from profilefit.measured.model import Oblique
     from profilefit.measured.premises import Premises
 
 FAILED = 1  # exit status
@@ -126,10 +126,10 @@ def fit(
     with interruptible(__name__):
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
+        from profilefit.measured import fit as medium_of
         from profilefit.measured import read
-        from profilefit.measured.fitting import fitted
-        from profilefit.measured.premises import premises, specified
-        from profilefit.measured.result import content, judged
+        from profilefit.measured.premises import premises
+        from profilefit.measured.result import content
 
     if kind not in KINDS:
         raise InputError(f"--kind must be {PROFILE} or {PHASE}, got {kind!r}")
@@ -159,8 +159,9 @@ def fit(
         require_folder(out, "fit.json", *FIGURES)
     try:
         with working("fitting", quiet):
-            spec = specified(measured, law, constants, where, held, known, factor, folder, oblique_centre)
-            result = judged(fitted(measured, spec), seed)
+            result = medium_of(
+                measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=oblique_centre
+            )
     except SettingError as error:
         raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
     model = "exact light" if law == options.EXACT else f"law {law}"
@@ -350,7 +351,7 @@ def _oblique(text: str, unit: str) -> Oblique:
     with interruptible(__name__):
         from mcml_sim.media.checks import shown
         from profilefit.measured.data import length
-        from profilefit.measured.oblique import Oblique
+        from profilefit.measured.model import Oblique
 
     angle, r, shift = text.split(":") if text.count(":") == 2 else ("", "", "")
     match = WITH_ERROR.fullmatch(shift.strip())

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from mcml_sim import Orders
-from profilefit.fitting.estimate import Fit, fit
-from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.estimate import Fit, fit, rings_of
 from profilefit.fitting.profiles import Profiles
 
 Floats = NDArray[np.float64]

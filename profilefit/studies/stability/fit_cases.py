@@ -17,8 +17,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.estimate import ResidualFunction, judged
-from profilefit.fitting.objectives import NO_LIMITS, Rings
+from profilefit.fitting.estimate import NO_LIMITS, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.fitting.staged import fit_per_albedo

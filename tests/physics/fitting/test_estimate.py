@@ -8,8 +8,14 @@ from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
 from profilefit.fitting import estimate, solver
-from profilefit.fitting.estimate import ResidualFunction, fit, misfit_covariance, residual_structure, sensitivity
-from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.estimate import (
+    ResidualFunction,
+    fit,
+    followed,
+    misfit_covariance,
+    residual_structure,
+    rings_of,
+)
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
 from profilefit.laws.base import AlbedoLaw
@@ -96,7 +102,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
     free = ("s0", "s1", "s2")
     one = fit(profiles, burley, "energy", free)
     problem = ResidualFunction("energy", free)
-    found = sensitivity(problem, one.solution, burley, one.rings)
+    found = followed(*one.second_derivatives)
     assert found.shape == (3, 5, profiles.energy.shape[1] + 1)  # and the light beyond the last ring
     for a, i in ((0, 0), (2, 5), (4, 9)):
         ends = []
@@ -115,7 +121,7 @@ def test_sensitivity_without_the_residuals_curvature_would_be_wrong(tallies, bur
     """Negative control for the one above: Gauss and Newton's (J^T J)^-1 in place of the full Hessian."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))
     problem = ResidualFunction("energy", one.free)
-    full = sensitivity(problem, one.solution, burley, one.rings)
+    full = followed(*one.second_derivatives)
     hessian = _hessian(problem, one, burley)
     short = np.einsum("pq,qai->pai", np.linalg.inv(one.solution.jacobian.T @ one.solution.jacobian) @ hessian, full)
     assert np.max(np.abs(short - full)) > 1e-2 * np.max(np.abs(full))

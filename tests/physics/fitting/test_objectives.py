@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Setting
-from profilefit.fitting import objectives
-from profilefit.fitting.objectives import OBJECTIVES, Rings, rings_of
+from profilefit.fitting import estimate as objectives
+from profilefit.fitting.estimate import OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.laws.liang_albedo import LiangAlbedo
 

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.fitting.objectives import OBJECTIVES
+from profilefit.fitting.estimate import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import albedo_map, law

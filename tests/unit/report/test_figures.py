@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import OutputError, RecordError
-from profilefit.fitting.derived import LawWithErrors
+from profilefit.fitting.discrepancy import LawWithErrors
 from profilefit.recipes import catalogue
 from profilefit.report import draw_all
 from profilefit.report.figures import record_figures
