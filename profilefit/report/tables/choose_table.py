@@ -13,15 +13,12 @@ from profilefit.report.tables.cells import column_table, on_the_point, significa
 from profilefit.studies.choose.case import is_filter
 from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
 from profilefit.studies.choose.cost import Ratios
-from profilefit.studies.choose.error import CHANNELS, Error
+from profilefit.studies.choose.error import CHANNELS, Error, passes
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import reference_light
+from profilefit.studies.choose.response import ReferenceLight
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
-    from profilefit.studies.choose.atlas import AtlasNeed
-    from profilefit.studies.choose.fur import FurNeed
-    from profilefit.studies.choose.sea import SeaNeed
+    from profilefit.studies.choose.scenes import AtlasNeed, FurNeed, SeaNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {
@@ -228,7 +225,7 @@ def _filters(choice: Choice) -> list[dict[str, Any]]:
     option, scene = choice.nearest.option, choice.scene
     if not is_filter(option):
         return []
-    filters = passes(option, middle(scene), reference_light(scene.setting))
+    filters = passes(option, middle(scene), ReferenceLight(scene.setting))
     return [
         {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
         for share, kernel, stretches in filters

@@ -18,7 +18,7 @@ from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
 from profilefit.studies.choose.error import Error, error
 from profilefit.studies.choose.requirements import Range, Requirements
-from profilefit.studies.choose.response import reference_light
+from profilefit.studies.choose.response import ReferenceLight
 
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is
@@ -120,7 +120,7 @@ def middle(scene: Requirements) -> Case:
 
 def worst(option: Option, scene: Requirements) -> Error:
     """Return the option's error in the scene's worst case."""
-    light = reference_light(scene.setting)
+    light = ReferenceLight(scene.setting)
     return max((error(option, case, light, scene.within) for case in cases(scene)), key=lambda one: one.total)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from mcml_sim import Setting, exact
+from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.refracting_rational import REFRACTING
@@ -102,26 +102,18 @@ def _within(share: Beyond, mfp: float, radius: float) -> CubicSpline:
 
 @dataclass(frozen=True)
 class ReferenceLight:
-    """The light of a setting, exact."""
+    """The light of a setting, exact; InputError where no law has constants for its index."""
 
     setting: Setting
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.setting.n <= REFRACTING.high:
+            raise InputError(f"index must be a refractive index in [1, {REFRACTING.high:g}], got {self.setting.n:g}")
 
     def alpha(self, reflectance: float) -> float:
         """Return the single-scattering albedo [-] of a reflectance A [-]."""
         return max(albedo_of(reflectance, self.setting), DARKEST)
 
-    def reflectance(self, alpha: float) -> float:
-        """Return A [-] of a single-scattering albedo [-]."""
-        return float(exact.reflectance(alpha, self.setting))
-
     def beyond(self, reflectance: float) -> Beyond:
         """Return F(d) of a reflectance A [-]."""
         return beyond(self.alpha(reflectance), self.setting)
-
-
-def reference_light(setting: Setting) -> ReferenceLight:
-    """Return the exact light of a setting; InputError where no law has constants for its index."""
-    low, high = 1.0, REFRACTING.high
-    if not low <= setting.n <= high:
-        raise InputError(f"index must be a refractive index in [{low:g}, {high:g}], got {setting.n:g}")
-    return ReferenceLight(setting)

@@ -36,8 +36,7 @@ from profilefit.scenes.stage.step_edge import (
     random_points,
 )
 from profilefit.studies.tradeoff import laws, stopwatch
-from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders
-from profilefit.studies.tradeoff.counting import count
+from profilefit.studies.tradeoff.laws import SPECS, YARDSTICK, Contender, contenders, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
 

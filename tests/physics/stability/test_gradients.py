@@ -5,8 +5,7 @@ import pytest
 from profilefit.recipes import catalogue
 from profilefit.shader.check import validity
 from profilefit.studies.stability import gradients
-from profilefit.studies.stability.cells import Verdict
-from profilefit.studies.stability.regions import regions_of
+from profilefit.studies.stability.cells import Verdict, regions_of
 
 FITS = catalogue.fits_folder()
 

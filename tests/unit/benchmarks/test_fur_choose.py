@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import fur_choose
 from benchmarks.fur_choose import COVER, DEGREES, SLENDER, TOLERANCES, Fur, Judged, furs, summary
-from profilefit.studies.choose import fur as study
+from profilefit.studies.choose import scenes as study
 
 
 def test_furs_are_within_their_ends_and_the_same_again():

@@ -20,10 +20,9 @@ from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
-from profilefit.studies.choose.fur import FurNeed
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.requirements import Budget, Requirements
-from profilefit.studies.choose.sea import SeaNeed
+from profilefit.studies.choose.scenes import FurNeed, SeaNeed
 
 ONE = ((0.5, 0.5),) * 3
 SCENE = Requirements("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
