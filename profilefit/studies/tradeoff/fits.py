@@ -32,7 +32,7 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
-from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
 Floats = NDArray[np.float64]
@@ -42,6 +42,12 @@ RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]
 TRIMMED, EPSILON = "r R_d", 0.005  # (6), as in the recipe liang-as-published
 HELD = ("a3", "c2")  # exponents that trade against their amplitudes; so held in the recipe too
 ALL_AT_ONCE, TWO_STAGES, EMCEE = "least squares", "two stages", "emcee"
+ERROR = "relative change of the annuli's energies by noise [-]"
+# Name, title, and whose time is the cost.
+PANELS = (
+    ("fit", "the fit alone, simulation given", "the fit"),
+    ("whole", "with the order-resolved run it is fitted to", "simulation and fit"),
+)
 
 
 @dataclass(frozen=True)
@@ -99,21 +105,13 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
                     compiling[name] = max(compiling.get(name, 0.0), trial.fit_seconds)
                 else:
                     trials.setdefault((name, photons), []).append(trial)
-    panels = tuple(
-        Panel(
-            name,
-            title,
-            f"time of {what}, one core [s]",
-            "relative change of the annuli's energies by noise [-]",
-            tuple(point_of(name, *key, group) for key, group in trials.items()),
-            joined=True,
-        )
-        for name, title, what in (
-            ("fit", "the fit alone, simulation given", "the fit"),
-            ("whole", "with the order-resolved run it is fitted to", "simulation and fit"),
-        )
-    )
+    panels = tuple(_panel(trials, *words) for words in PANELS)
     return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
+
+
+def _panel(trials: Mapping[tuple[str, int], Sequence[Trial]], name: str, title: str, timed: str) -> Panel:
+    points = tuple(point_of(name, *key, group) for key, group in trials.items())
+    return Panel(name, title, f"time of {timed}, one core [s]", ERROR, points, joined=True)
 
 
 def _light(photons: int, seed: int) -> tuple[Profiles, float]:
@@ -214,8 +212,8 @@ def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Po
         "converged": sum(t.converged for t in trials),
     }
     seconds = of_fit if panel == "fit" else of_fit + light
-    label = f"{photons:.0e}".replace("e+0", "e") + " photons"
-    return Point(panel, name, label, WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst), facts)
+    known = WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst)
+    return Point(panel, name, photons_text(photons), *known, facts)
 
 
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
