@@ -14,7 +14,7 @@ from profilefit.laws.entry import EVERYWHERE
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
-from profilefit.shader.check import validity
+from profilefit.shader.check import bounds
 from profilefit.studies.stability import exact_cells, fit_cases, gradients, law_cells, map_cells, misuse, scenes, stacks
 from profilefit.studies.stability.cells import QUANTITIES, TEXT16, TEXT32, Cells, Region, regions_of
 from profilefit.studies.stability.fit_cases import FitCase
@@ -117,7 +117,7 @@ def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Findings:
     text = map_cells.in_reduced(named)
     cells = [*map_cells.cells_of(named, folder), *misuse.of_map(text)]
     if named.label in DERIVED_MAPS and not quick:
-        cells += gradients.of_map(text, validity.of_map(named, folder))
+        cells += gradients.of_map(text, bounds.valid_map(named, folder))
     return _findings(map_label(named), cells)
 
 

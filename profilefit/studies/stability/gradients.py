@@ -17,8 +17,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from profilefit.laws.entry import Range
 from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.shader.check.validity import Range
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Cells, Mask, axis
 from profilefit.studies.stability.map_cells import map_label

@@ -24,7 +24,7 @@ from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
-from profilefit.shader.check import bounds, dense_grid, validity
+from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentGrid, Cells, Mask, RoundedText, absolute, axis, relative
@@ -67,7 +67,7 @@ class Limits:
     """Bounds of one law's errors by quantity, and where it holds."""
 
     of: dict[str, float]
-    valid: validity.Validity
+    valid: bounds.Validity
 
     def bound(self, quantity: str, dtype: type) -> float:
         """Return a tenth of the model's own error; in half not less than what keeping a number costs."""
@@ -77,12 +77,12 @@ class Limits:
 
 def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
     """Return a tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
-    model = MEASURED.get(named.name) or bounds.of_profile(named, folder).values
+    model = MEASURED.get(named.name) or bounds.model_of_profile(named, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
     errors = {cells.PROFILE: rel, cells.PDF: rel, cells.CDF: ks, cells.SAMPLE: drawn}
     known = {name: ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
-    return Limits(known, validity.of_profile(named, folder))
+    return Limits(known, bounds.valid_profile(named, folder))
 
 
 def cells_of(named: LoadedLaw, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
@@ -116,10 +116,10 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
         )
 
 
-def _inside(name: str, valid: validity.Validity, at: ArgumentGrid) -> Mask:
+def _inside(name: str, valid: bounds.Validity, at: ArgumentGrid) -> Mask:
     """Return where the law says that the quantity holds; a uniform number is below 1."""
     albedos, shares = at.alpha.values, at.xi.values
-    profiled, drawn = validity.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
+    profiled, drawn = bounds.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
     if name == cells.SAMPLE:
         return drawn & at.accepted
     return (np.any(drawn, axis=1, keepdims=True) if name == cells.PDF else profiled) & at.accepted
@@ -329,7 +329,7 @@ def _judged(named: LoadedLaw, name: str, arithmetic: str, axes: Axes, *given: An
     return Cells(named.label, named.law.entry.own, name, arithmetic, axes, *given, **known)
 
 
-def _holds(span: validity.Range | None, alpha: Floats) -> Mask:
+def _holds(span: bounds.Range | None, alpha: Floats) -> Mask:
     return span.holds(alpha) if span else np.zeros(alpha.shape, bool)
 
 

@@ -16,11 +16,11 @@ from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.entry import Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
-from profilefit.shader.check import bounds, validity
+from profilefit.shader.check import bounds
 from profilefit.shader.check.bounds import ROUNDING_SHARE
-from profilefit.shader.check.validity import Range
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentAxis, Cells, RoundedText, Verdict, absolute, axis, steps_down
 
@@ -39,7 +39,7 @@ UNSTATED = "no record states the error of this direction"
 
 def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
-    text, model, spans = in_reduced(named), bounds.of_map(named, folder), validity.of_map(named, folder)
+    text, model, spans = in_reduced(named), bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
