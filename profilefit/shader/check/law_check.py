@@ -141,21 +141,21 @@ def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Fol
             lambda loaded: dense_grid.reference(loaded.law.in_reduced(), dense_grid.arguments()), laws
         )
         for loaded, known in zip(laws, references, strict=True):
-            yield check_law(context, loaded, folder, known=known)
+            yield check_law(context, loaded, folder, exact=known)
 
 
 def check_law(
-    context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text: str = "", known: Values | None = None
+    context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text: str = "", exact: Values | None = None
 ) -> LawCheck:
     """Check a profile law with its constants. ShaderError if it does not compile.
 
-    text   in place of its own; known  the law in float64 on the grid, where that is known already
+    text   in place of its own; exact  the law in float64 on the grid, where that is known already
     """
     model, valid = bounds.model_of_profile(loaded, folder), bounds.valid_profile(loaded, folder)
     shader, at = ShaderLaw(context, loaded.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        right = known or dense_grid.reference(loaded.law.in_reduced(), at)
+        right = exact or dense_grid.reference(loaded.law.in_reduced(), at)
         profiled, drawn = (
             np.broadcast_to(mask, at.shape) for mask in bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
         )

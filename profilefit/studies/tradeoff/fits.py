@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
 from typing import Any
 
@@ -98,7 +98,10 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     compiling: dict[str, float] = {}
     for seed in track(range(sizes.seeds + 1), "fits"):  # the first compiles
         for photons in sizes.photons:
-            profiles, light = _light(photons, 1000 * seed + 700)
+            begin = time.perf_counter()
+            run = simulate_orders(Grid.from_edges(r=EDGES), photons, 1000 * seed + 700, workers=1, progress=False)
+            profiles = Profiles.from_orders(run, ALPHAS)
+            light = time.perf_counter() - begin
             for name in [name for name in ways if name != EMCEE or photons in sizes.chained]:
                 trial = _trial(ways[name], profiles, seed, light, limits[name], start)
                 if seed == 0:
@@ -112,14 +115,6 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
 def _panel(trials: Mapping[tuple[str, int], Sequence[Trial]], name: str, title: str, timed: str) -> Panel:
     points = tuple(point_of(name, *key, group) for key, group in trials.items())
     return Panel(name, title, f"time of {timed}, one core [s]", ERROR, points, joined=True)
-
-
-def _light(photons: int, seed: int) -> tuple[Profiles, float]:
-    """Return profiles with their covariance, and the time it took [s]."""
-    begin = time.perf_counter()
-    run = simulate_orders(Grid.from_edges(r=EDGES), photons, seed, workers=1, progress=False)
-    profiles = Profiles.from_orders(run, ALPHAS)
-    return profiles, time.perf_counter() - begin
 
 
 def _ways(start: Any, max_chain: int) -> dict[str, Way]:
@@ -136,13 +131,14 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
 
     def two_stages(profiles: Profiles, _: int) -> FittedConstants:
         points = staged.fit_per_albedo(profiles, start, 1.0, TRIMMED, EPSILON)
-        laws = staged.fit_coefficient_laws(points, start, HELD).values()
-        constants = {n: float(v) for law in laws for n, v in zip(law.names, law.solution.parameters, strict=True)}
-        errors = {
-            n: e for law in laws if law.covariance is not None for n, e in _errors(law.names, law.covariance).items()
-        }
-        results = {*points.results, *(law.solution.result for law in laws)} - {"converged"}
-        return FittedConstants(constants, errors, next(iter(sorted(results)), "converged"))
+        constants: dict[str, float] = {}
+        errors: dict[str, float] = {}
+        results = set(points.results)
+        for law in staged.fit_coefficient_laws(points, start, HELD).values():
+            constants |= dict(zip(law.names, map(float, law.solution.parameters), strict=True))
+            errors |= {} if law.covariance is None else _errors(law.names, law.covariance)
+            results.add(law.solution.result)
+        return FittedConstants(constants, errors, min(results - {"converged"}, default="converged"))
 
     def emcee(profiles: Profiles, seed: int) -> FittedConstants:
         chain = posterior(fitted(profiles), "statistical", seed, max_chain)
@@ -202,14 +198,13 @@ def standardised(result: FittedConstants, limit: FittedConstants) -> float:
 
 def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Point:
     """Return the point of one fit method at a number of photons, over all its trials."""
-    rows = np.array([(t.fit_seconds, t.light_seconds, t.rms, t.worst, t.standardised) for t in trials])
-    of_fit, light, rms, worst, away = rows.T
+    of_fit, light, rms, worst, away, done = np.array([astuple(one) for one in trials], float).T
     facts: dict[str, float | int | str] = {
         "photons": photons,
         "standardised": float(np.median(away)),
         "light_seconds": float(np.median(light)),
         "seeds": len(trials),
-        "converged": sum(t.converged for t in trials),
+        "converged": int(done.sum()),
     }
     seconds = of_fit if panel == "fit" else of_fit + light
     known = WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst)
@@ -219,9 +214,9 @@ def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Po
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
     """Return notes on fits that did not converge, and on the time of first fits."""
     failed = [
-        f"{sum(not t.converged for t in group)} of {len(group)} did not converge: {name}, {photons:.0e} photons"
+        f"{missed} of {len(group)} did not converge: {name}, {photons:.0e} photons"
         for (name, photons), group in trials.items()
-        if not all(t.converged for t in group)
+        if (missed := sum(not one.converged for one in group))
     ]
     compiled = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
     return (*failed, f"first fits, which compile, not in the times [s]: {compiled}")
