@@ -181,7 +181,7 @@ def as_json(found: Sequence[Verified]) -> list[dict]:
     ]
 
 
-def as_json(ratios: cost.Ratios) -> str:
+def ratios_json(ratios: cost.Ratios) -> str:
     """Return ratios as the JSON that `cost.shipped` reads."""
     content = {key: value for key, value in asdict(ratios).items() if key != "spread"}
     return json.dumps(content, indent=1) + "\n"
@@ -202,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"on {renderer(context)}")
             if options.ratios:
                 ratios = cost.measured(context, {**laws(SETTING), **laws(REFRACTING)})
-                options.ratios.write_text(as_json(ratios), encoding="utf-8")
+                options.ratios.write_text(ratios_json(ratios), encoding="utf-8")
                 return
             for name, scene in scenes(QUICK if options.quick else options.scenes, options.seed):
                 found.append(verified(context, name, scene))
