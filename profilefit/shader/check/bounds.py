@@ -97,8 +97,10 @@ def _stated(
     loaded: LoadedLaw, records: Records, laws: Callable[..., list[LoadedLaw]], measures: Sequence[str]
 ) -> ModelError:
     own = loaded.name, loaded.setting
-    others = (law for law in laws(records, matched=False) if law.records and (law.name, law.setting) == own)
-    owner = loaded if loaded.records else next(others, None)
+    owner: LoadedLaw | None = loaded
+    if not loaded.records:
+        same = (law for law in laws(records, matched=False) if law.records and (law.name, law.setting) == own)
+        owner = next(same, None)
     found = _recorded(owner.records if owner else (), measures, records, loaded.setting)
     return ModelError(found, " + ".join(owner.records) if owner and found else "measured here")
 
