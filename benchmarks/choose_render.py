@@ -23,8 +23,7 @@ from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
 from profilefit.scenes.stage.surface_integral import gathered
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
-from profilefit.studies.choose.error import passes
-from profilefit.studies.choose.response import ReferenceLight
+from profilefit.studies.choose.error import ReferenceLight, passes
 
 Floats = NDArray[np.float64]
 # How far the picture goes beyond the places that count, and above and below them [longest mean free path]: the first

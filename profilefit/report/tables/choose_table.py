@@ -13,9 +13,8 @@ from profilefit.report.tables.cells import column_table, on_the_point, significa
 from profilefit.studies.choose.case import is_filter
 from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
 from profilefit.studies.choose.cost import Ratios
-from profilefit.studies.choose.error import CHANNELS, Error, passes
+from profilefit.studies.choose.error import CHANNELS, Error, ReferenceLight, passes
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.response import ReferenceLight
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
     from profilefit.studies.choose.scenes import AtlasNeed, FurNeed, SeaNeed

@@ -35,7 +35,7 @@ from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, ULP, Bound, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, Count, ShaderCheck, Spread, bad_numbers
 from profilefit.shader.check.shader_law import ShaderLaw, ShaderMap, Values, half_extension
-from profilefit.shader.languages import translated
+from profilefit.shader.emit import translated
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -16,9 +16,8 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
-from profilefit.studies.choose.error import Error, error
+from profilefit.studies.choose.error import Error, ReferenceLight, error
 from profilefit.studies.choose.requirements import Range, Requirements
-from profilefit.studies.choose.response import ReferenceLight
 
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is

@@ -15,17 +15,22 @@ from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_poi
 from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
 from profilefit.studies.choose.choice import laws
 from profilefit.studies.choose.error import (
+    FARTHEST,
     LEAST_COSINE,
+    NEAR,
     OWN,
+    Beyond,
     OneGaussian,
+    ReferenceLight,
+    beyond,
     drawn,
     error,
     estimates,
     filtered,
     fitted,
     passes,
+    response,
 )
-from profilefit.studies.choose.response import FARTHEST, NEAR, Beyond, ReferenceLight, beyond, response
 from tests.physics.choose.conftest import DIFFUSE, MFP
 
 WITHIN = Within()
