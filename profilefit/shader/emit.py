@@ -4,8 +4,8 @@ The files in `glsl/` keep to what GLSL, HLSL and numpy can all say, besides comm
 structures of floats, functions of floats and structures, declarations with a value, assignments,
 `for (int i = 0; i < N; ++i) {`, return at the end, the functions in `NUMPY`, and PF_SELECT for a choice. Numbers have a
 point, and a condition is one comparison. GLSL is the text as it is, HLSL is made of it by a word, numpy line by line; a
-line that is none of these is an error here, not a surprise in somebody's engine. LAW_ stands for the law's prefix in each of their names, so
-that several laws live in one shader. What every law gives is listed in `glsl/README.md`.
+line that is none of these is an error here, not a surprise in somebody's engine. LAW_ stands for the law's prefix in
+each name, so that several laws live in one shader. What every law gives is listed in `glsl/README.md`.
 """
 
 from __future__ import annotations
