@@ -10,6 +10,7 @@ from profilefit.scenes.fur.source import source, strand_text
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.cells import RoundedText
+from tests.unit.shader.test_phase_text import functions
 
 TEXT = strand_text("python", "law")
 SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
@@ -31,12 +32,6 @@ STEPS = np.geomspace(1e-8, 1e-6, 100)
 AROUND = 1.0 + np.concatenate([-STEPS, np.linspace(-1e-6, 1e-6, 1001), STEPS])  # the root's edge, where acos fails
 ANGLES = np.radians(np.concatenate([np.linspace(0.0, 89.0, 90), [89.9]]))
 SIZES = np.array([0.0, 0.02, -0.02, 0.05, -0.05, 1.0, -1.0, 0.5, 1e-3, 60.0])  # of which degenerate rays are made
-
-
-def functions(text):
-    names: dict = {}
-    exec(text, names)
-    return names
 
 
 def rounded(*values):

@@ -10,6 +10,7 @@ from profilefit.scenes.sea import law
 from profilefit.scenes.sea.source import blur_text, export_blur, export_segment, segment_text
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
+from tests.unit.shader.test_phase_text import functions
 
 LOBES = ((0.7, 0.95), (0.3, 0.6))
 C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
@@ -24,12 +25,6 @@ void main() {{
 }}
 """
 WAY = np.append(0.0, np.geomspace(1e-4, 1e3, 4095))  # [m]
-
-
-def functions(text):
-    names: dict = {}
-    exec(text, names)
-    return names
 
 
 def test_the_segment_in_float64():
