@@ -106,7 +106,7 @@ def _heart(file: str, content: Table, quiet: bool) -> SceneNeed:
         from profilefit.report.tables.choose_table import atlas_content, atlas_line
         from profilefit.scenes.heart.scene import read
         from profilefit.shader import opened
-        from profilefit.studies.choose.atlas import atlas_need
+        from profilefit.studies.choose.scenes import atlas_need
 
     request = read(file, content)
     with working("summing what the screen does not see", quiet), opened() as context:
@@ -119,7 +119,7 @@ def _sea(file: str, content: Table, quiet: bool) -> SceneNeed:
         from mcml_sim.runs.progress import working
         from profilefit.report.tables.choose_table import sea_content, sea_lines
         from profilefit.scenes.sea.scene import read
-        from profilefit.studies.choose.sea import sea_need
+        from profilefit.studies.choose.scenes import sea_need
 
     request = read(file, content)
     with working("summing the haze", quiet):
@@ -132,7 +132,7 @@ def _fur(file: str, content: Table, quiet: bool) -> SceneNeed:
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables.choose_table import fur_content, fur_lines
         from profilefit.scenes.fur.scene import read
-        from profilefit.studies.choose.fur import ANGLES, fur_need
+        from profilefit.studies.choose.scenes import ANGLES, fur_need
 
     need = fur_need(read(file, content), tracked(ANGLES, "casting rays", "angles", quiet=quiet))
     return SceneNeed(fur_content(need), fur_lines(need), need.way is not None)

@@ -91,7 +91,7 @@ def test_a_sea_that_there_is_not(tmp_path):
 def fur(tmp_path, monkeypatch):
     """A file, and the study of one angle with few rays."""
     for name, value in {"PATCHES": 6, "RAYS": 100, "MOST": 16, "ANGLES": (75,)}.items():
-        monkeypatch.setattr(f"profilefit.studies.choose.fur.{name}", value)
+        monkeypatch.setattr(f"profilefit.studies.choose.scenes.{name}", value)
     path = tmp_path / "fur.toml"
     path.write_text('scene = "fur"\n[fur]\nlength = 5\n[technique]\ntolerance = 0.1\n', encoding="utf-8")
     return path

@@ -10,8 +10,7 @@ from profilefit.scenes import sea
 from profilefit.scenes.sea.law import segment_between, segment_integral
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import full_screen, program
-from profilefit.shader.emit import read_text
-from profilefit.shader.languages import translated
+from profilefit.shader.emit import read_text, translated
 
 TEXT = read_text("common") + read_text("near_zero") + (Path(sea.__file__).parent / "glsl/segment.glsl").read_text()
 HEIGHT, WIDTH = 128, 512
