@@ -16,8 +16,7 @@ from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
 from profilefit.convert.colour import LEAST_ROOT, TIGHTEST
 from profilefit.laws import published
-from profilefit.laws.chiang import Chiang
-from profilefit.laws.van_de_hulst import VanDeHulst
+from profilefit.laws.printed_maps import Chiang, VanDeHulst
 
 Floats = NDArray[np.float64]
 VAN_DE_HULST = VanDeHulst(Setting("diffuse"), **published.constants("van_de_hulst_albedo"))

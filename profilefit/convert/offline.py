@@ -13,7 +13,7 @@ from profilefit.convert.colour import reflectance_of
 from profilefit.convert.engine import ISOTROPIC, Engine, by, searchlight
 from profilefit.convert.lengths import scale_searchlight, transport, unreduced_path
 from profilefit.convert.maps import appleseed_colour, chiang_colour, van_de_hulst_colour
-from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.diffusion import BeamDiffusion
 
 Floats = NDArray[np.float64]
 

@@ -15,8 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.entry import NEAR_CLAMPS, RATIONAL, Entry, Range, Text
+from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 

@@ -21,8 +21,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Text
+from profilefit.laws.base import CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.rational import Normalisation
 
 MOST, DEFAULT = 8, 6

@@ -16,8 +16,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Text
+from profilefit.laws.base import CLAMPS, Entry, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.rational import Normalisation
 

@@ -14,8 +14,7 @@ import numpy as np
 from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.base import Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 

@@ -13,8 +13,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Range, Text
+from profilefit.laws.base import CLAMPS, Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES

@@ -17,8 +17,7 @@ from profilefit.errors import RecipeError
 from profilefit.fitting.estimate import Fit, ResidualFunction, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws import published
-from profilefit.laws.base import Constants
-from profilefit.laws.entry import Entry
+from profilefit.laws.base import Constants, Entry
 from profilefit.recipes import catalogue
 from profilefit.recipes.recipe import Recipe
 

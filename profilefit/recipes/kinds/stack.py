@@ -21,8 +21,8 @@ from mcml_sim import Medium, Setting, exact
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
-from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record, schema
 from profilefit.recipes.folder import STACKS, fits_folder, is_file

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, least_squares
-from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw
+from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes.run import PHOTONS, RecipeRun
 
 Floats = NDArray[np.float64]

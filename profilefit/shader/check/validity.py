@@ -1,7 +1,7 @@
 """Validity of a law: where it holds, and what its paper promises of its printed constants.
 
 What lies outside of where it holds is counted apart and breaks nothing. Promises are measured in float64, where
-rounding is no excuse; equation numbers are those of `laws.liang` and `laws.liang_albedo`.
+rounding is no excuse; equation numbers are those of `laws.liang` and `laws.printed_maps`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.entry import EVERYWHERE, Entry, Range
+from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Range
 from profilefit.laws.liang import Liang
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 from profilefit.recipes.catalogue import LoadedLaw, profile_laws
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound

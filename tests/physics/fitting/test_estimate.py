@@ -13,7 +13,7 @@ from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 
 REPLICATES = 200
 

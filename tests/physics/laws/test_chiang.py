@@ -10,7 +10,7 @@ import pytest
 from mcml_sim import Setting
 from profilefit.fitting.quality import albedo_quality
 from profilefit.laws import published
-from profilefit.laws.chiang import Chiang
+from profilefit.laws.printed_maps import Chiang
 
 LAW = Chiang(Setting("diffuse"), **published.constants("chiang_albedo"))
 

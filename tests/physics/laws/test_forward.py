@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.exact import single_scattering
-from profilefit.laws.forward import ForwardHalfSpace
+from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes.stack import photons
 from profilefit.recipes.stack.fit import stack_law
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 
 PRINTED = LiangAlbedo(Setting(), 5.67, 3.84, 0.84)
 

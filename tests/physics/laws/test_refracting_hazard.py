@@ -11,9 +11,8 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from profilefit import SettingError, load, profile_quality
 from profilefit.laws.hazard import cumulative, growth
-from profilefit.laws.refracting_hazard import RefractingHazard
 from profilefit.laws.refracting_rational import RefractingRational
-from profilefit.laws.two_parts import TwoPartSampler, drawn
+from profilefit.laws.two_parts import RefractingHazard, TwoPartSampler, drawn
 from tests.fixtures import slow
 
 ALPHA = 1 - np.linspace(1, 0, 41) ** 2

@@ -10,7 +10,7 @@ import pytest
 from mcml_sim import Setting
 from profilefit.fitting.quality import albedo_quality
 from profilefit.laws import published
-from profilefit.laws.van_de_hulst import VanDeHulst
+from profilefit.laws.printed_maps import VanDeHulst
 
 LAW = VanDeHulst(Setting("diffuse"), **published.constants("van_de_hulst_albedo"))
 

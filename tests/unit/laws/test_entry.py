@@ -13,8 +13,7 @@ import profilefit
 from mcml_sim import Setting
 from profilefit import laws
 from profilefit.errors import InputError
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.base import Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record, starts

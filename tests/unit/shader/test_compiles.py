@@ -8,7 +8,7 @@ import pytest
 
 from profilefit.errors import ShaderError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.diffusion import BeamDiffusion
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
 from profilefit.shader.context import program
