@@ -27,8 +27,8 @@ from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TAB
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
+from profilefit.recipes.stack.fit import Tracing
 from profilefit.recipes.stack.gaussians import SumLight, constant_names, errors, quality
-from profilefit.recipes.stack.photons import Tracing
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 PIPELINE = "gaussians"

@@ -15,9 +15,6 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue, pipelines, starts
 from profilefit.recipes.catalogue import find_law as find
-from profilefit.recipes.paper.protocol import ExactTruth, TallyTruth, Truth
-from profilefit.recipes.paper.reproduction import readings
-from profilefit.recipes.paper.table1 import printed_halves, table1
 from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
     Pipeline,
@@ -32,8 +29,10 @@ from profilefit.recipes.pipelines import (
 )
 from profilefit.recipes.recipe import Recipe, RingLayout
 from profilefit.recipes.record import Records
+from profilefit.recipes.reproduction import ExactTruth, TallyTruth, Truth, readings
 from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.summary import curves, errors_by_name
+from profilefit.recipes.table1 import printed_halves, table1
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]

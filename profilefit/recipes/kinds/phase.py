@@ -17,8 +17,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
-from profilefit.recipes.phases.data import PhaseData, read_phase
-from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
+from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
 from profilefit.recipes.run import LAWS, RecipeRun, Work
 from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS, Fields
 

@@ -30,7 +30,7 @@ from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
-from profilefit.recipes.stack.photons import USUAL, TracedRings, Tracing
+from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
 from profilefit.recipes.toml_tables import Table, Tables
 
 Floats = NDArray[np.float64]

@@ -19,8 +19,8 @@ from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.stack import fit, photons
-from profilefit.recipes.stack.photons import USUAL, Tracing
+from profilefit.recipes.stack import fit
+from profilefit.recipes.stack.fit import USUAL, Tracing
 
 Floats = NDArray[np.float64]
 NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
@@ -80,8 +80,8 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES,
     first = medium.layers[0]
     unit = first.similar.mfp
     if any(layer.g > 0 for layer in medium.layers):
-        edges = photons.ring_edges(first, medium.layers)
-        rings = tracing.rings(medium, illumination, edges, photons.STACK_PHOTONS, OFFSET)
+        edges = fit.ring_edges(first, medium.layers)
+        rings = tracing.rings(medium, illumination, edges, fit.STACK_PHOTONS, OFFSET)
         counts = rings.weight > 0
         first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
         inside = slice(first_ring, last_ring + 1)

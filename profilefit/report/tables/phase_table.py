@@ -13,7 +13,7 @@ from profilefit.laws.phases import FORMS
 from profilefit.recipes import record
 from profilefit.recipes.folder import PHASES
 from profilefit.recipes.kinds.phase import FREE, HELD, load, table_lines
-from profilefit.recipes.phases.fit import BANDS
+from profilefit.recipes.phases import BANDS
 from profilefit.report.records import largest_error, numbered_errors
 from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table

@@ -13,8 +13,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, backscattered, haltrin
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import phase as record
-from profilefit.recipes.phases.data import read_phase
-from profilefit.recipes.phases.fit import MOMENTS, fit_phase
+from profilefit.recipes.phases import MOMENTS, fit_phase, read_phase
 from profilefit.recipes.run import RecipeRun, alone
 from tests.fixtures import slow
 

@@ -8,10 +8,13 @@ import pytest
 
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.paper.protocol import ExactTruth, Protocol7, cut_radius, fit_coefficients
-from profilefit.recipes.paper.reproduction import (
+from profilefit.recipes.reproduction import (
     CORRECTED_B0,
     PUBLISHED,
+    ExactTruth,
+    Protocol7,
+    cut_radius,
+    fit_coefficients,
     judge,
     law_energy,
     printed_coefficients,

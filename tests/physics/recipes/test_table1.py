@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from profilefit.materials import BY_NAME
-from profilefit.recipes.paper.table1 import (
+from profilefit.recipes.table1 import (
     NORMALIZED_DIFFUSION,
     mean_squared_errors,
     normalized_diffusion,

@@ -17,8 +17,8 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import KINDS, Kind, KindModule, gaussians, phase, records_of, stack
 from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
-from profilefit.recipes.stack import photons
-from profilefit.recipes.stack.photons import Tracing
+from profilefit.recipes.stack import fit as stacks
+from profilefit.recipes.stack.fit import Tracing
 from profilefit.shader.law_file import export_subject
 from tests.unit.cli.conftest import command
 from tests.unit.recipes.stack.test_record import RUN, made
@@ -181,7 +181,7 @@ def results_of(module, work):
 def test_traced_light_is_that_of_its_run(monkeypatch):
     """Number of photons, seed and store; a store for each medium, light and seed."""
     calls = []
-    monkeypatch.setattr(photons, "traced", lambda *given: calls.append(given))
+    monkeypatch.setattr(stacks, "traced", lambda *given: calls.append(given))
     edges = np.array([0.0, 1.0])
     for medium, light, offset in ((1, "diffuse", 0), (2, "diffuse", 0), (1, "searchlight", 0), (1, "diffuse", 3)):
         Tracing.of(GIVEN, "skin-0", EXACT).rings(medium, light, edges, 2**20, offset)

@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 from profilefit.fitting.profiles import Profiles
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, Material
-from profilefit.recipes.paper.protocol import ExactTruth, Truth, cut_radius
-from profilefit.recipes.paper.reproduction import CORRECTED_B0, PUBLISHED, law_energy, printed_coefficients
+from profilefit.recipes.reproduction import (
+    CORRECTED_B0,
+    PUBLISHED,
+    ExactTruth,
+    Truth,
+    cut_radius,
+    law_energy,
+    printed_coefficients,
+)
 
 Floats = NDArray[np.float64]
 PRINTED_B0 = PUBLISHED["(13)"]["b0"]
