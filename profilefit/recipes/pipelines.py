@@ -18,14 +18,14 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws import published
 from profilefit.laws.base import Constants
-from profilefit.recipes import catalogue, record, starts
+from profilefit.recipes import catalogue, record
 from profilefit.recipes import recipe as recipe_file
-from profilefit.recipes.crosscheck import crosscheck
+from profilefit.recipes.checks import crosscheck, random_starts
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import Albedos, Recipe
 from profilefit.recipes.run import COMPARISONS, LAWS, MAPS, RecipeRun, RecordContent, Work
 from profilefit.recipes.summary import described
-from profilefit.recipes.targets import albedo_values, truth_of
+from profilefit.recipes.targets import albedo_values, free, law_class, require_known, starting_law, truth_of
 
 Floats = NDArray[np.float64]
 Pipeline = Callable[[Recipe, RecipeRun, Orders | None], RecordContent]
@@ -42,7 +42,7 @@ def request(name: str, pipelines: Mapping[str, Pipeline]) -> Recipe | None:
     found = recipe_file.find(name, fits_folder())
     if found.pipeline not in pipelines:
         return None
-    starts.require_known(found)
+    require_known(found)
     return found
 
 
@@ -154,10 +154,10 @@ def described_fit(
     recipe: Recipe, run: RecipeRun, light: Orders | None
 ) -> tuple[Fit, Profiles, dict[str, Any], dict[str, Any]]:
     """Fit a recipe's law, and check the fit: it, what it was fitted to, and what every record says, with its arrays."""
-    profiles, start, checks = truth_of(recipe, light), starts.starting_law(recipe, run.out), dict[str, Any]()
+    profiles, start, checks = truth_of(recipe, light), starting_law(recipe, run.out), dict[str, Any]()
     result = fit_from(recipe, profiles, start)
     if recipe.random_starts:
-        tried = starts.random_starts(result, start, recipe.random_starts, run.seed)
+        tried = random_starts(result, start, recipe.random_starts, run.seed)
         checks["starts"] = tried.content()
         if tried.beats_own:  # rounding decides which of them find it: constants must not depend on that
             run.say(f"{recipe.name}: {tried.result}")
@@ -179,7 +179,7 @@ def fit_from(recipe: Recipe, profiles: Profiles, start: Constants, used: NDArray
     weighting = recipe.weighting
     shares = (np.arange(weighting.shares) + 0.5) / max(weighting.shares, 1) * weighting.last_share
     limits = (weighting.energy_limit, weighting.source_limit, weighting.rising)
-    return fit(profiles, start, weighting.objective, starts.free(recipe, start), used, limits, tuple(shares))
+    return fit(profiles, start, weighting.objective, free(recipe, start), used, limits, tuple(shares))
 
 
 def description(
@@ -192,14 +192,14 @@ def description(
 
 def printed_sets(recipe: Recipe) -> dict[str, dict[str, float]]:
     """Return the printed constants of a recipe's law and setting by name; the first counts as the published one."""
-    printed = starts.law_class(recipe).entry.printed
+    printed = law_class(recipe).entry.printed
     sets = [s for s in published.SETS if (s.law, s.setting) == (printed, recipe.setting)]
     return {s.name if i else "published": dict(s.constants) for i, s in enumerate(sets)}
 
 
 def printed_laws(recipe: Recipe, run: RecipeRun) -> dict[str, Any]:
     """Return the laws that the printed constants make."""
-    kind: Any = starts.law_class(recipe)
+    kind: Any = law_class(recipe)
     given: dict[str, Any] = {"setting": recipe.setting}
     if recipe.pipeline != "albedo":
         given["albedo"] = catalogue.normalisation(recipe.setting, run.out)

@@ -13,7 +13,7 @@ from profilefit.errors import RecipeError
 from profilefit.fitting import staged
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes import catalogue, pipelines, starts
+from profilefit.recipes import catalogue, pipelines
 from profilefit.recipes.catalogue import find_law as find
 from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
@@ -33,7 +33,7 @@ from profilefit.recipes.reproduction import ExactTruth, TallyTruth, Truth, readi
 from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.summary import curves, errors_by_name
 from profilefit.recipes.table1 import printed_halves, table1
-from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
+from profilefit.recipes.targets import albedo_values, ring_edges, starting_law, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
@@ -71,7 +71,7 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
     rings = recipe.rings
     if rings is None:
         raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
-    start = starts.starting_law(recipe, run.out)
+    start = starting_law(recipe, run.out)
     truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
     points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
     profiles, unit = truths[1.0], points[1.0]

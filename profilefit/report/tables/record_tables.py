@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.recipes.checks import SAME_COST
 from profilefit.recipes.kinds.stack import PIPELINE as STACK
-from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
     TOTAL,
     Content,

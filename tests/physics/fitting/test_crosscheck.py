@@ -11,7 +11,7 @@ from profilefit import load
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import crosscheck
-from profilefit.recipes.crosscheck import AGREE, DIFFER, compared, mahalanobis
+from profilefit.recipes.checks import AGREE, DIFFER, compared, mahalanobis
 
 pytestmark = pytest.mark.slow
 

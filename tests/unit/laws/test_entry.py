@@ -16,9 +16,10 @@ from profilefit.errors import InputError
 from profilefit.laws.base import Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational
-from profilefit.recipes import catalogue, recipe, record, starts
+from profilefit.recipes import catalogue, recipe, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
+from profilefit.recipes.targets import require_known, starting_law
 from profilefit.shader import emit
 
 CLASSES = {**{f"map {name}": kind for name, kind in laws.map_classes().items()}, **laws.profile_classes()}
@@ -171,8 +172,8 @@ def toy(monkeypatch, tmp_path):
 def test_a_law_is_added_by_one_line_of_the_table(toy):
     """From its recipe by a fit to a record, from that to a law by name, and from that to a text."""
     chosen = recipe.find("toy", toy)
-    starts.require_known(chosen)
-    start = starts.starting_law(chosen, toy)
+    require_known(chosen)
+    start = starting_law(chosen, toy)
     assert start.constants() == {"q0": 1.0, "q1": 1.0}
     edges = np.append(0.0, np.geomspace(0.1, 20.0, 12))
     found = profilefit.fit(profilefit.Profiles.from_exact(np.linspace(0.3, 0.9, 4), edges), start, jackknife=False)

@@ -12,7 +12,7 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Solution
 from profilefit.laws import published
 from profilefit.laws.refracting_rational import RefractingRational
-from profilefit.recipes import catalogue, recipe, starts
+from profilefit.recipes import catalogue, checks, recipe, targets
 from profilefit.recipes.targets import truth_of
 
 FITS = catalogue.fits_folder()
@@ -20,9 +20,9 @@ FITS = catalogue.fits_folder()
 
 def test_random_constants_spread_as_the_rule_says():
     constants = np.array([2.0, -0.01, 0.0])
-    found = starts.spread_out(constants, 20_000, seed=3)
-    assert np.array_equal(found, starts.spread_out(constants, 20_000, seed=3))
-    assert not np.array_equal(found, starts.spread_out(constants, 20_000, seed=4))
+    found = checks.spread_out(constants, 20_000, seed=3)
+    assert np.array_equal(found, checks.spread_out(constants, 20_000, seed=3))
+    assert not np.array_equal(found, checks.spread_out(constants, 20_000, seed=4))
     factor = found[:, :2] / constants[:2]
     assert np.all(factor > 0)
     # Two of three within a factor of two: the normal's 0.6827, its error here 0.0033.
@@ -45,8 +45,8 @@ NAMES = ("a", "b")
 def test_outcomes_are_told_apart():
     near, far, failed = solution([1, 2], 1e-6), solution([5, 1], 2e-6), "no convergence in 500 steps: fix a constant"
     found = [near, far, near, solution([9, 9], 5e-6, failed), far, near, solution([np.inf, 1], np.nan, "not finite: x")]
-    told = starts.summarised(near, found, NAMES, seed=1, rule="so")
-    assert told.result == starts.OWN_IS_BEST
+    told = checks.summarised(near, found, NAMES, seed=1, rule="so")
+    assert told.result == checks.OWN_IS_BEST
     assert not told.beats_own
     assert told.share_best == pytest.approx(3 / 7)
     assert [outcome.count for outcome in told.outcomes] == [3, 2, 1, 1]
@@ -61,15 +61,15 @@ def test_outcomes_are_told_apart():
 
 def test_a_better_optimum_than_the_recipes_own_is_told():
     near, far = solution([1, 2], 1e-6), solution([5, 1], 2e-6)
-    told = starts.summarised(far, [far, near, far], NAMES, 1, "so")
+    told = checks.summarised(far, [far, near, far], NAMES, 1, "so")
     assert told.beats_own
     assert told.best == pytest.approx([1, 2])
     assert told.share_best == pytest.approx(1 / 3)
     failed = solution([1, 2], 1e-7, "no convergence in 500 steps")
-    assert not starts.summarised(far, [failed, far], NAMES, 1, "so").beats_own, "where it stopped is no optimum"
-    assert starts.summarised(failed, [near], NAMES, 1, "so").beats_own
-    none = starts.summarised(failed, [failed], NAMES, 1, "so")
-    assert (none.result, none.best, none.share_best) == (starts.NONE_CONVERGED, None, 0.0)
+    assert not checks.summarised(far, [failed, far], NAMES, 1, "so").beats_own, "where it stopped is no optimum"
+    assert checks.summarised(failed, [near], NAMES, 1, "so").beats_own
+    none = checks.summarised(failed, [failed], NAMES, 1, "so")
+    assert (none.result, none.best, none.share_best) == (checks.NONE_CONVERGED, None, 0.0)
     assert none.outcomes[0].cost_ratio == 1.0
 
 
@@ -83,15 +83,15 @@ def test_what_is_one_optimum():
         ([1.0, 1.1e-5], 1e-6, False),
         ([1.0, 1e-9], 1e-6 * (1 + 1.1e-6), False),
     ):
-        told = starts.summarised(own, [solution(parameters, cost)], NAMES, 1, "so")
+        told = checks.summarised(own, [solution(parameters, cost)], NAMES, 1, "so")
         assert told.share_best == same, (parameters, cost)
 
 
 def test_many_outcomes_are_counted_but_not_all_listed():
     found = [solution([1, 2 + i], 1e-6 * (1 + i)) for i in range(20)]
-    told = starts.summarised(found[0], found, NAMES, 1, "so")
-    assert len(told.outcomes) == starts.MOST_OUTCOMES
-    assert told.others == 20 - starts.MOST_OUTCOMES
+    told = checks.summarised(found[0], found, NAMES, 1, "so")
+    assert len(told.outcomes) == checks.MOST_OUTCOMES
+    assert told.others == 20 - checks.MOST_OUTCOMES
 
 
 @pytest.mark.slow
@@ -104,8 +104,8 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
     )
     begin = replace(normalisation, **type(normalisation).entry.start)
     own = fit(profiles, begin, "reflectance")
-    told = starts.random_starts(own, begin, 10, seed=5)
-    assert told.result == starts.OWN_IS_BEST
+    told = checks.random_starts(own, begin, 10, seed=5)
+    assert told.result == checks.OWN_IS_BEST
     assert told.share_best == 1.0
     assert len(told.outcomes) == 1
     assert told.best == pytest.approx(own.solution.parameters, rel=1e-12)
@@ -115,10 +115,10 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
 def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
     chosen = replace(recipe.find("burley-whole", FITS), setting=Setting("diffuse", n=1.4))
-    law = starts.starting_law(chosen, tmp_path)
+    law = targets.starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
-    mapped = starts.starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
+    mapped = targets.starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
     assert mapped.setting == Setting(n=1.4)
     assert mapped.constants() == RefractingRational.entry.start
 
@@ -136,7 +136,7 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
 )
 def test_what_a_recipe_must_name(change, words):
     with pytest.raises(RecipeError, match=words):
-        starts.require_known(replace(recipe.find("burley-whole", FITS), **change))
+        targets.require_known(replace(recipe.find("burley-whole", FITS), **change))
 
 
 @pytest.mark.slow
@@ -144,10 +144,10 @@ def test_random_starts_beat_the_printed_start_of_the_papers_inverse():
     """A known case: from (20) as printed, the search ends in the second-best optimum."""
     from_exact = replace(recipe.find("liang-inverse-whole", FITS), truth="exact")
     profiles = truth_of(from_exact, None)
-    start = starts.starting_law(from_exact, FITS)
+    start = targets.starting_law(from_exact, FITS)
     xi = tuple((np.arange(64) + 0.5) / 64 * 0.99)
-    own = fit(profiles, start, "share", starts.free(from_exact, start), xi=xi)
-    told = starts.random_starts(own, start, 50, seed=1)
+    own = fit(profiles, start, "share", targets.free(from_exact, start), xi=xi)
+    told = checks.random_starts(own, start, 50, seed=1)
     assert told.beats_own
     better = fit(profiles, start.with_vector(own.free, list(told.best)), "share", own.free, xi=xi)
     assert better.solution.cost < 0.8 * own.solution.cost

@@ -1,29 +1,31 @@
-"""Starts of fits: the constants that a recipe names, and random ones around them, to see whether optima are better."""
+"""Checks of a fit: repeated from random constants, and on the tracer's photons in place of the exact half space.
+
+Random starts show whether optima are better than that of the recipe's own start. The cross-check makes the same
+objective small, with its working weights and not the inverse covariance of the photons, on the same rings and albedos:
+what rests on too few photons is left out of both fits. A law that is not the truth has another optimum for every
+weighting, so only then is the photons' noise all that can part them.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
-from profilefit import laws
-from profilefit.errors import RecipeError
-from profilefit.fitting.estimate import Fit, ResidualFunction, judged, misfit_covariance
+from mcml_sim import Orders
+from profilefit.fitting.estimate import Fit, ResidualFunction, fit, judged, misfit_covariance
+from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
-from profilefit.laws import published
-from profilefit.laws.base import Constants, Entry
-from profilefit.recipes import catalogue
-from profilefit.recipes.recipe import Recipe
+from profilefit.laws.base import Constants
 
 Floats = NDArray[np.float64]
-# Where a law with published constants begins at those of its entry: one without such constants always does.
-OWN_START = "none"
 # A random start multiplies each constant by e^(SPREAD * normal): two of three within a factor of two. It keeps its
 # sign, since most laws are not defined beyond; a constant that is 0 starts at SPREAD * normal.
 SPREAD = float(np.log(2.0))
@@ -35,76 +37,12 @@ MOST_OUTCOMES = 12
 OWN_IS_BEST = "no random start found a better optimum than the recipe's own start"
 OWN_IS_BEATEN = "a random start found a better optimum than the recipe's own start, where the fit stays: begin there"
 NONE_CONVERGED = "no start converged"
-
-
-def law_class(recipe: Recipe) -> type[Constants]:
-    """Return the class that a recipe's law names; RecipeError if there is none."""
-    known = _laws(recipe)
-    if recipe.law not in known:
-        raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
-    kind: type[Constants] = laws.at(known[recipe.law], recipe.setting)
-    return kind
-
-
-def require_known(recipe: Recipe) -> None:
-    """Raise RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
-    kind, objective = law_class(recipe), recipe.weighting.objective
-    if objective and not kind.seen_by(objective):
-        seeing = [name for name, one in _laws(recipe).items() if one.seen_by(objective) and ":" not in name]
-        got = f"must be {' or '.join(seeing)}, got {recipe.law!r}"
-        raise RecipeError(f"{recipe.path}: law of pipeline {recipe.pipeline!r} {got}")
-    if not _start_constants(recipe) and recipe.pipeline != "evidence":
-        accepted = [*_published_names(kind.entry), *([OWN_START] if kind.entry.start else [])]
-        raise RecipeError(
-            f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
-        )
-    spans = kind.at_one_index() != kind.constant_names()
-    if recipe.indices and not spans:
-        raise RecipeError(
-            f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}"
-        )
-    if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
-        raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
-    if recipe.cosines and not kind.entry.g.holds(recipe.setting.g):
-        raise RecipeError(f"{recipe.path}: cosines are for a law with g, got {recipe.law!r}")
-    if objective and not free(recipe, kind):
-        raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
-    unknown = [name for name in recipe.held if name not in kind.constant_names()]
-    if unknown:
-        raise RecipeError(f"{recipe.path}: held must name constants of {recipe.law}, got {', '.join(unknown)}")
-
-
-def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
-    """Return the constants that a recipe moves; of a law that spans indices, at one index those that it tells apart."""
-    seen = kind.seen_by(recipe.weighting.objective)
-    told = seen if recipe.indices else kind.at_one_index()
-    return tuple(name for name in seen if name in told and name not in recipe.held)
-
-
-def starting_law(recipe: Recipe, folder: Path) -> Any:
-    """Return the law that a fit starts from, in the recipe's setting; constants named in `held` keep their values.
-
-    Constants of another setting are numbers to start from like any others. `folder` holds the records of A.
-    """
-    given: dict[str, Any] = {"setting": recipe.setting, **_start_constants(recipe)}
-    if recipe.pipeline != "albedo":
-        given["albedo"] = catalogue.normalisation(recipe.setting, folder)
-    return law_class(recipe)(**given)
-
-
-def _laws(recipe: Recipe) -> Mapping[str, type[Constants]]:
-    return laws.map_classes() if recipe.pipeline == "albedo" else laws.profile_classes()
-
-
-def _published_names(entry: Entry) -> list[str]:
-    return [s.name for s in published.SETS if s.law == entry.printed]
-
-
-def _start_constants(recipe: Recipe) -> dict[str, float]:
-    entry = law_class(recipe).entry
-    if recipe.start == OWN_START or not _published_names(entry):
-        return dict(entry.start)
-    return published.constants(entry.printed, recipe.start)
+# Directions of the constants' correlation below this share of the largest are rounding, not photons: the derivative
+# of the optimum loses as many digits as its condition number, up to 1e7, has.
+SMALLEST_SHARE = 1e-7
+LARGEST_CUT = 0.1  # of a standard error of A: what the end of the longest paths may take away
+LEAST_CHANCE = 0.0027  # of a difference by noise alone that is none: three standard errors of a single constant
+AGREE, DIFFER = "the fits agree", "the fits differ by more than the photons' noise"
 
 
 @dataclass(frozen=True)
@@ -222,3 +160,96 @@ def _as_cheap(one: Solution, other: Solution) -> bool:
 
 def _cost(one: Solution) -> float:
     return one.cost if np.isfinite(one.cost) else np.inf
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """Constants from photons beside those from the exact half space.
+
+    names               (p,) of the constants
+    exact, photons      (p,) constants from either, on the rings and albedos that count in both
+    statistical_error   (p,) of those from photons, by the sandwich; z their difference in units of it
+    chi2                of the whole difference under the sandwich covariance, within the `rank` directions it knows
+    chance              that photon noise alone gives a larger chi2 [-]
+    traced              photons; rings_left_out and albedos_left_out rest on too few of them
+    result              whether the fits agree, or which one failed and how
+    """
+
+    names: tuple[str, ...]
+    exact: Floats
+    photons: Floats
+    statistical_error: Floats
+    chi2: float
+    rank: int
+    chance: float
+    traced: int
+    rings_left_out: int
+    albedos_left_out: int
+    result: str
+
+    @property
+    def z(self) -> Floats:
+        return (self.photons - self.exact) / self.statistical_error
+
+    def content(self) -> dict[str, Any]:
+        """Return what a record says of it."""
+        columns = zip(self.names, self.exact, self.photons, self.statistical_error, self.z, strict=True)
+        keys = ("exact", "photons", "statistical_error", "z")
+        facts = ("chi2", "rank", "chance", "rings_left_out", "albedos_left_out", "result")
+        return {
+            "constants": {name: dict(zip(keys, values, strict=True)) for name, *values in columns},
+            "photons": self.traced,
+            **{name: getattr(self, name) for name in facts},
+        }
+
+
+def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
+    """Repeat the fit `own`, which was to `exact`, on photons of the same setting."""
+    run, xi = light.merged(exact.r_edges), tuple(np.asarray(own.rings.xi))
+    photons = Profiles.from_orders(run, exact.alpha)
+    seen = np.asarray(own.rings.used) > 0
+    used = seen & photons.trusted & (photons.energy > 0)
+    # Albedos that rest on enough photons, none of which were cut to an extent that matters.
+    error = np.asarray(run.reflectance(photons.alpha).standard_error)
+    uncut = np.asarray(run.cut(photons.alpha)) <= LARGEST_CUT * error
+    counted = uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
+    limits = tuple(np.asarray(own.rings.limits))
+    one, other = (
+        fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
+        for profiles in (exact, photons)
+    )
+    return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))
+
+
+def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos_left_out: int) -> CrossCheck:
+    """Compare two fits of the same constants, in units of the photons' noise."""
+    one, other = exact.solution.parameters, photons.solution.parameters
+    covariance = np.asarray(photons.statistical)
+    if problem := _problem(exact, photons):
+        result, covariance = problem, np.full((one.size,) * 2, np.nan)
+        distance, rank, chance = np.nan, 0, np.nan
+    else:
+        distance, rank = mahalanobis(other - one, covariance)
+        chance = float(chi2.sf(distance, rank))
+        result = AGREE if chance >= LEAST_CHANCE else DIFFER
+    error = np.sqrt(np.diag(covariance))
+    left_out = rings_left_out, albedos_left_out
+    return CrossCheck(exact.free, one, other, error, distance, rank, chance, traced, *left_out, result)
+
+
+def _problem(exact: Fit, photons: Fit) -> str | None:
+    for name, one in (("exact", exact), ("photon", photons)):
+        if not one.solution.converged:
+            return f"the {name} fit failed: {one.result}"
+    if photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
+        return "the photon fit has no finite errors: leave out radial bins that hold next to no light"
+    return None
+
+
+def mahalanobis(difference: Floats, covariance: Floats) -> tuple[float, int]:
+    """Return chi2 of a difference (p,) under a covariance (p, p), and the number of directions that count."""
+    error = np.sqrt(np.diag(covariance))
+    share, axes = np.linalg.eigh(covariance / np.outer(error, error))
+    known = share > SMALLEST_SHARE * share.max()
+    along = axes.T[known] @ (difference / error)
+    return float(np.sum(along**2 / share[known])), int(known.sum())
