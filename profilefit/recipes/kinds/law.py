@@ -19,8 +19,10 @@ from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
     Pipeline,
     by_index,
+    curves,
     described_fit,
     description,
+    errors_by_name,
     fit_from,
     inversion_error,
     judged,
@@ -31,7 +33,6 @@ from profilefit.recipes.recipe import Recipe, RingLayout
 from profilefit.recipes.record import Records
 from profilefit.recipes.reproduction import ExactTruth, TallyTruth, Truth, readings
 from profilefit.recipes.run import RecipeRun, RecordContent
-from profilefit.recipes.summary import curves, errors_by_name
 from profilefit.recipes.table1 import printed_halves, table1
 from profilefit.recipes.targets import albedo_values, ring_edges, starting_law, truth_of
 
