@@ -21,8 +21,8 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws import published
 from profilefit.laws.base import Constants
-from profilefit.recipes import catalogue, record
 from profilefit.recipes import recipe as recipe_file
+from profilefit.recipes import record
 from profilefit.recipes.checks import crosscheck, discretisation_error, random_starts
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import Albedos, Recipe
