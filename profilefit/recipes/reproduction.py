@@ -11,8 +11,7 @@ Nothing starts a search at a printed constant: on a surface with a kink the sear
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +19,12 @@ from scipy.interpolate import CubicSpline
 
 from mcml_sim import exact
 from mcml_sim.media.setting import Setting
-from mcml_sim.results.orders import Orders
 from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.fitting.solver import CONVERGED, Solution, least_squares, solve_batch
 from profilefit.laws import published
 
 Floats = NDArray[np.float64]
 EPSILON = 0.005  # of the trimming (6)
-SEARCHLIGHT = Setting()
 # MCML's usual hundredth of a mean free path; beyond 25 mfp (6) never walks for alpha <= .9986 [mfp].
 RING_WIDTH, LAST_RADIUS = 0.01, 30.0
 
@@ -72,16 +69,8 @@ class Coefficients:
 def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
     """Return the same rings for some of the albedos only; `alpha` must be among them."""
     rows = np.searchsorted(profiles.alpha, alpha)
-    return Profiles(
-        profiles.alpha[rows],
-        profiles.r_edges,
-        profiles.energy[rows],
-        profiles.standard_error[rows],
-        profiles.effective_samples[rows],
-        profiles.beyond[rows],
-        profiles.source,
-        profiles.setting,
-    )
+    names = ("alpha", "energy", "standard_error", "effective_samples", "beyond")
+    return replace(profiles, **{name: getattr(profiles, name)[rows] for name in names})
 
 
 def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
@@ -126,64 +115,20 @@ def _rational_misfit(p, item):
     return used * ((p[0] * r + p[1]) / (r + p[2]) - data)
 
 
-class Truth(Protocol):
-    """Source of reflectances and fine even rings."""
+def even_rings(alpha: Floats, last: float = LAST_RADIUS) -> Profiles:
+    """Return exact light in even rings up to `last` [mfp], by Simpson's rule on a spline of ln(2 pi r R_d).
 
-    def reflectance(self, alpha: Floats) -> Floats:
-        """Return the total diffuse reflectance A (m,) [-] at albedos alpha (m,)."""
-
-    def profiles(self, alpha: Floats) -> Profiles:
-        """On even rings from 0."""
-
-
-@dataclass(frozen=True)
-class ExactTruth:
-    """The half space without noise, on rings of `ring_width` up to `last_radius` [mfp]."""
-
-    ring_width: float = RING_WIDTH
-    last_radius: float = LAST_RADIUS
-    setting: Setting = SEARCHLIGHT
-
-    def reflectance(self, alpha: Floats) -> Floats:
-        return np.asarray(exact.reflectance(alpha, setting=self.setting))
-
-    def profiles(self, alpha: Floats) -> Profiles:
-        """Ring energies by Simpson's rule on a spline of ln(2 pi r R_d): within 1e-5 of the exact integrals."""
-        half = np.arange(2 * round(self.last_radius / self.ring_width) + 1) * self.ring_width / 2
-        nodes = np.geomspace(half[1] / 2, half[-1], 120)
-        values = 2 * np.pi * nodes * np.asarray(exact.profile(nodes, alpha[:, None], setting=self.setting))
-        density = np.exp(CubicSpline(np.log(nodes), np.log(values), axis=1)(np.log(np.maximum(half, nodes[0]))))
-        energy = self.ring_width / 6 * (density[:, :-2:2] + 4 * density[:, 1::2] + density[:, 2::2])
-        inside = np.asarray(exact.cdf(half[2], alpha, setting=self.setting))  # r ln r at the source defeats Simpson
-        energy[:, 0] = self.reflectance(alpha) * inside
-        beyond = self.reflectance(alpha) - energy.sum(axis=1)
-        none = np.zeros_like(energy)
-        return Profiles(alpha, half[::2], energy, none, none + np.inf, beyond, "exact", self.setting)
-
-
-@dataclass(frozen=True)
-class TallyTruth:
-    """Reflectances and rings of photons: an order-resolved run on fine even rings up to 25 mfp or more."""
-
-    orders: Orders
-
-    def reflectance(self, alpha: Floats) -> Floats:
-        return np.asarray(self.orders.reflectance(alpha).value)
-
-    def profiles(self, alpha: Floats) -> Profiles:
-        # Without the covariance between albedos, which no reading uses and sixty albedos would wait minutes for.
-        energy = self.orders.energy(alpha)
-        return Profiles(
-            alpha,
-            self.orders.grid.r_edges,
-            np.asarray(energy.value),
-            np.asarray(energy.standard_error),
-            np.asarray(energy.effective_samples),
-            np.asarray(self.orders.overflow(alpha).value),
-            "orders",
-            self.orders.setting,
-            self.orders.photons,
-        )
+    Energies are within 1e-5 of the exact integrals.
+    """
+    half = np.arange(2 * round(last / RING_WIDTH) + 1) * RING_WIDTH / 2
+    nodes = np.geomspace(half[1] / 2, half[-1], 120)
+    values = 2 * np.pi * nodes * np.asarray(exact.profile(nodes, alpha[:, None]))
+    density = np.exp(CubicSpline(np.log(nodes), np.log(values), axis=1)(np.log(np.maximum(half, nodes[0]))))
+    energy = RING_WIDTH / 6 * (density[:, :-2:2] + 4 * density[:, 1::2] + density[:, 2::2])
+    whole = np.asarray(exact.reflectance(alpha))
+    energy[:, 0] = whole * np.asarray(exact.cdf(half[2], alpha))  # r ln r at the source defeats Simpson
+    none = np.zeros_like(energy)
+    return Profiles(alpha, half[::2], energy, none, none + np.inf, whole - energy.sum(axis=1), "exact", Setting())
 
 
 # A law is reproduced when its curve is within 5 % rms of the printed one over the albedos, and each constant too.
@@ -297,15 +242,14 @@ def samplings() -> dict[str, Floats]:
     }
 
 
-def readings(truth: Truth | None = None) -> tuple[Reading, ...]:
-    """Every reading of every equation, the winners and their serious competitors, recomputed from `truth`."""
-    source = truth or ExactTruth()
+def readings() -> tuple[Reading, ...]:
+    """Every reading of every equation, the winners and their serious competitors, of exact light."""
     grids = samplings()
-    profiles = source.profiles(np.unique(np.concatenate(list(grids.values()))))
+    profiles = even_rings(np.unique(np.concatenate(list(grids.values()))))
     return (
-        *_albedo_readings(source, grids),
+        *_albedo_readings(grids),
         *_coefficient_readings(profiles, grids),
-        *_length_readings(source.profiles(np.array([0.5, 0.9, 0.99]))),
+        *_length_readings(even_rings(np.array([0.5, 0.9, 0.99]))),
         *_inverse_readings(profiles, grids),
     )
 
@@ -360,12 +304,12 @@ def _held(columns: list[Floats], data: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
 
 
-def _albedo_readings(source: Truth, grids: dict[str, Floats]) -> list[Reading]:
+def _albedo_readings(grids: dict[str, Floats]) -> list[Reading]:
     """(8), a fit of alpha(A): where the albedos stand, and how residuals count."""
     found = []
     hundred = np.arange(1, 100) / 100
     for name, alpha in {**grids, "alpha even, .01 to .99": hundred}.items():
-        reflectance = source.reflectance(alpha)
+        reflectance = np.asarray(exact.reflectance(alpha))
         weights = {"alpha": np.ones_like(alpha), "alpha, relative": 1 / alpha}
         if alpha is hundred:  # to first order a residual in A, without the kink where (8) has no inverse
             weights = {"A": np.gradient(reflectance, alpha)}

@@ -90,6 +90,8 @@ def require_known(recipe: Recipe) -> None:
         raise RecipeError(
             f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
         )
+    if recipe.pipeline == "evidence" and recipe.truth != "exact":
+        raise RecipeError(f"{recipe.path}: truth of pipeline 'evidence' must be 'exact', got {recipe.truth!r}")
     spans = kind.at_one_index() != kind.constant_names()
     if recipe.indices and not spans:
         raise RecipeError(

@@ -29,15 +29,14 @@ from profilefit.recipes.pipelines import (
     printed_laws,
     read,
 )
-from profilefit.recipes.recipe import Recipe, RingLayout
+from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.record import Records
-from profilefit.recipes.reproduction import ExactTruth, TallyTruth, Truth, readings
+from profilefit.recipes.reproduction import readings
 from profilefit.recipes.run import RecipeRun, RecordContent
 from profilefit.recipes.table1 import printed_halves, table1
-from profilefit.recipes.targets import albedo_values, ring_edges, starting_law, truth_of
+from profilefit.recipes.targets import albedo_values, starting_law, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
-EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 
 
 def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
@@ -105,12 +104,8 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
 
 
 def _evidence(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
-    if recipe.truth == "orders" and light is not None:
-        truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
-    else:
-        truth = ExactTruth()
     laws = _compared_laws(run)
-    found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
+    found = {"readings": readings(), "table1": table1(laws), "halves": printed_halves()}
     return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 
