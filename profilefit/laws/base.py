@@ -220,9 +220,11 @@ class ProfileLaw(Constants):
     """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy.
 
     own_reflectance  whether it has a total reflectance of its own, and none by a map `albedo`
+    sampler_class    of the map that draws radii, made of the law
     """
 
     own_reflectance: ClassVar[bool] = False
+    sampler_class: ClassVar[type[Sampler]]
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -258,9 +260,9 @@ class ProfileLaw(Constants):
         return float(self.source_strength(jnp.array(0.5))) == 0.0
 
     @property
-    @abc.abstractmethod
-    def sampler(self) -> Sampler:
+    def sampler(self) -> Any:
         """Draws radii for this law."""
+        return self.sampler_class(self)
 
     @property
     def samplers(self) -> dict[str, Sampler]:

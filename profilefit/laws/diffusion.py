@@ -34,6 +34,41 @@ HALVINGS, NEWTON_STEPS = 20, 3
 TEXT_PARTS, TEXT_ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
 
 
+class DiffusionSampler(Sampler):
+    """x with cdf(x) = xi, by halving a bracket of ln x and then Newton's method inside it; draws the law itself.
+
+    To 1e-14 in xi in float64 between the nearest radius and the farthest: no closed inverse is known.
+    """
+
+    law: DiffusionLaw
+
+    @eqx.filter_jit  # the halvings are a loop, which would compile anew at each call
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        xi, alpha = _arrays(xi, alpha)
+        target = xi * self.law.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
+
+        def step(i, state):
+            low, high, y = state
+            x = jnp.exp(y)
+            excess = self.law.shape_energy(x, alpha) - target
+            slope = 2.0 * jnp.pi * x**2 * self.law.shape_profile(x, alpha)
+            low, high = jnp.where(excess < 0, y, low), jnp.where(excess < 0, high, y)
+            newton = jnp.clip(y - excess / jnp.maximum(slope, jnp.finfo(y.dtype).tiny), low, high)
+            return low, high, jnp.where(i < HALVINGS, 0.5 * (low + high), newton)
+
+        zero = jnp.zeros_like(target)
+        start = zero + NEAREST, zero + FARTHEST, zero + 0.5 * (NEAREST + FARTHEST)
+        x = jnp.exp(lax.fori_loop(0, HALVINGS + NEWTON_STEPS, step, start)[2])
+        return jnp.where(xi > 0, jnp.where(xi < 1, x, jnp.inf), 0.0)
+
+    @eqx.filter_jit
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        x, alpha = _arrays(x, alpha)
+        x = jnp.maximum(_finite(x), jnp.finfo(x.dtype).tiny ** 0.5)  # the limits at both ends are reached there
+        radial = 2.0 * jnp.pi * x * self.law.shape_profile(x, alpha)
+        return radial / self.law.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
+
+
 class DiffusionLaw(ProfileLaw):
     """A law without constants, whose energy is its own and not A(alpha): R_d = t c(alpha) `shape_profile`.
 
@@ -44,6 +79,7 @@ class DiffusionLaw(ProfileLaw):
     setting: Setting = eqx.field(static=True)
     albedo: Normalisation | None = eqx.field(static=True, default=None)
     own_reflectance = True
+    sampler_class = DiffusionSampler
 
     def __check_init__(self) -> None:
         if self.setting.illumination != "searchlight" or self.setting.g != 0.0:
@@ -92,46 +128,6 @@ class DiffusionLaw(ProfileLaw):
 
     def source_strength(self, alpha: Array) -> Array:
         return jnp.zeros_like(alpha)
-
-    @property
-    def sampler(self) -> DiffusionSampler:
-        """The cdf inverted numerically."""
-        return DiffusionSampler(self)
-
-
-class DiffusionSampler(Sampler):
-    """x with cdf(x) = xi, by halving a bracket of ln x and then Newton's method inside it; draws the law itself.
-
-    To 1e-14 in xi in float64 between the nearest radius and the farthest: no closed inverse is known.
-    """
-
-    law: DiffusionLaw
-
-    @eqx.filter_jit  # the halvings are a loop, which would compile anew at each call
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        xi, alpha = _arrays(xi, alpha)
-        target = xi * self.law.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
-
-        def step(i, state):
-            low, high, y = state
-            x = jnp.exp(y)
-            excess = self.law.shape_energy(x, alpha) - target
-            slope = 2.0 * jnp.pi * x**2 * self.law.shape_profile(x, alpha)
-            low, high = jnp.where(excess < 0, y, low), jnp.where(excess < 0, high, y)
-            newton = jnp.clip(y - excess / jnp.maximum(slope, jnp.finfo(y.dtype).tiny), low, high)
-            return low, high, jnp.where(i < HALVINGS, 0.5 * (low + high), newton)
-
-        zero = jnp.zeros_like(target)
-        start = zero + NEAREST, zero + FARTHEST, zero + 0.5 * (NEAREST + FARTHEST)
-        x = jnp.exp(lax.fori_loop(0, HALVINGS + NEWTON_STEPS, step, start)[2])
-        return jnp.where(xi > 0, jnp.where(xi < 1, x, jnp.inf), 0.0)
-
-    @eqx.filter_jit
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        x, alpha = _arrays(x, alpha)
-        x = jnp.maximum(_finite(x), jnp.finfo(x.dtype).tiny ** 0.5)  # the limits at both ends are reached there
-        radial = 2.0 * jnp.pi * x * self.law.shape_profile(x, alpha)
-        return radial / self.law.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
 
 
 def _arrays(x, alpha) -> tuple[Array, Array]:

@@ -88,6 +88,51 @@ def once_shape(reflectance: Array, here: RefractingSurface, h: Number, a: Number
     return Shape(reflectance, *(jnp.asarray(each) + jnp.zeros_like(reflectance) for each in numbers))
 
 
+class TwoPartSampler(Sampler):
+    """xi below the share of light scattered once draws a radius of that light, another one of the rest.
+
+    Within a part xi is stretched to [0, 1] again, and -ln S(x) = t = -ln(1 - xi) solved by a guess and `steps` steps.
+    The guess is right to first order at t = 0 and far away. Step: sqrt(t) is the smooth function of x in both parts;
+    its slope around x is taken for f / (1 + y), a straight line in 1/f, and the integral for a cubic.
+
+    Error in xi within a part, at every alpha, xi and n: one step 6e-5, two steps 1e-8.
+    """
+
+    law: Any  # a `TwoPartHazard`, or another law of these `Parts`
+    steps: int = eqx.field(static=True, default=1)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        of = self.law.parts(alpha)
+        is_once = xi < of.share
+        high, width = jnp.where(is_once, of.share, 1.0), jnp.where(is_once, of.share, of.rest)
+        least = jnp.finfo(jnp.result_type(xi, float)).tiny
+        left = jnp.maximum((high - xi) / jnp.maximum(width, least), least)
+        left = jnp.minimum(left, 1.0)
+        t = -jnp.log(left)
+        x = drawn(t, (1.0 - left) / (left * jnp.maximum(t, NEAREST)), of, is_once, self.steps)
+        return jnp.where(xi < 1.0, x, jnp.inf)
+
+    def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
+        """Each part draws every radius once."""
+        of = self.law.parts(alpha)
+        once, again = (-jnp.expm1(-cumulative(x, shape)) for shape in (of.once, of.multiple))
+        first, second = of.share * once, of.share + of.rest * again
+        return jnp.where(jnp.abs(first - xi) < jnp.abs(second - xi), first, second)
+
+    def jump(self, alpha: Array) -> Array:
+        """Return the share of light scattered once."""
+        return self.law.parts(alpha).share
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        """Density of this very map: each part's own."""
+        of = self.law.parts(alpha)
+
+        def own(shape: Shape, is_once: bool) -> Array:
+            return map_density(x, shape, lambda t: drawn(t, growth(t), of, is_once, self.steps))
+
+        return of.share * own(of.once, True) + of.rest * own(of.multiple, False)
+
+
 class TwoPartHazard(EscapeLaw):
     """Law of two hazard curves: light scattered once, and more often.
 
@@ -112,6 +157,7 @@ class TwoPartHazard(EscapeLaw):
     setting: Setting = eqx.field(static=True)
     albedo: eqx.AbstractVar[FoldedRational]
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
+    sampler_class = TwoPartSampler
 
     @abc.abstractmethod
     def coefficients(self) -> ShapeCoefficients:
@@ -175,59 +221,9 @@ class TwoPartHazard(EscapeLaw):
         return self.here().source * alpha
 
     @property
-    def sampler(self) -> TwoPartSampler:
-        """A part of the light by chance, and the inverse of its cdf, to 6e-5 in xi, in a fixed number of operations."""
-        return TwoPartSampler(self)
-
-    @property
     def samplers(self) -> dict[str, Sampler]:
         """One step of the inversion, or two for an error below float32's."""
         return {"one step": self.sampler, "two steps": TwoPartSampler(self, 2)}
-
-
-class TwoPartSampler(Sampler):
-    """xi below the share of light scattered once draws a radius of that light, another one of the rest.
-
-    Within a part xi is stretched to [0, 1] again, and -ln S(x) = t = -ln(1 - xi) solved by a guess and `steps` steps.
-    The guess is right to first order at t = 0 and far away. Step: sqrt(t) is the smooth function of x in both parts;
-    its slope around x is taken for f / (1 + y), a straight line in 1/f, and the integral for a cubic.
-
-    Error in xi within a part, at every alpha, xi and n: one step 6e-5, two steps 1e-8.
-    """
-
-    law: Any  # a `TwoPartHazard`, or another law of these `Parts`
-    steps: int = eqx.field(static=True, default=1)
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        of = self.law.parts(alpha)
-        is_once = xi < of.share
-        high, width = jnp.where(is_once, of.share, 1.0), jnp.where(is_once, of.share, of.rest)
-        least = jnp.finfo(jnp.result_type(xi, float)).tiny
-        left = jnp.maximum((high - xi) / jnp.maximum(width, least), least)
-        left = jnp.minimum(left, 1.0)
-        t = -jnp.log(left)
-        x = drawn(t, (1.0 - left) / (left * jnp.maximum(t, NEAREST)), of, is_once, self.steps)
-        return jnp.where(xi < 1.0, x, jnp.inf)
-
-    def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
-        """Each part draws every radius once."""
-        of = self.law.parts(alpha)
-        once, again = (-jnp.expm1(-cumulative(x, shape)) for shape in (of.once, of.multiple))
-        first, second = of.share * once, of.share + of.rest * again
-        return jnp.where(jnp.abs(first - xi) < jnp.abs(second - xi), first, second)
-
-    def jump(self, alpha: Array) -> Array:
-        """Return the share of light scattered once."""
-        return self.law.parts(alpha).share
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        """Density of this very map: each part's own."""
-        of = self.law.parts(alpha)
-
-        def own(shape: Shape, is_once: bool) -> Array:
-            return map_density(x, shape, lambda t: drawn(t, growth(t), of, is_once, self.steps))
-
-        return of.share * own(of.once, True) + of.rest * own(of.multiple, False)
 
 
 def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int) -> Array:
@@ -482,6 +478,7 @@ class ForwardHalfSpace(ProfileLaw):
     c: float
     entry = Entry("forward", text=replace(SOURCE, clamps=""))
     own_reflectance = True
+    sampler_class = TwoPartSampler
 
     def parts(self, alpha: Array) -> Parts:
         """Both curves."""
@@ -514,11 +511,6 @@ class ForwardHalfSpace(ProfileLaw):
     def source_strength(self, alpha: Array) -> Array:
         of = self.parts(alpha)
         return of.once.reflectance * of.once.source
-
-    @property
-    def sampler(self) -> TwoPartSampler:
-        """Sampler like that of `TwoPartHazard`: a part of the light by chance, and the inverse of its cdf."""
-        return TwoPartSampler(self)
 
     def text_shape(self) -> dict[str, float]:
         """Return the constants of the shader source of `TwoPartHazard`."""
