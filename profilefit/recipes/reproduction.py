@@ -47,10 +47,8 @@ class Protocol7:
     fitted: str = "r R_d"
 
     def describe(self, ring_width: float) -> str:
-        return (
-            f"{self.fitted} on rings of {self.rings * ring_width:g} l, centre {self.centre}; (6) on {self.trimmed}, "
-            f"stop at the {self.stop}"
-        )
+        rings = f"rings of {self.rings * ring_width:g} l, centre {self.centre}"
+        return f"{self.fitted} on {rings}; (6) on {self.trimmed}, stop at the {self.stop}"
 
 
 @dataclass(frozen=True)
@@ -201,34 +199,15 @@ def judge(constant_distance: float, curve_distance: float) -> str:
     return "reproduced" if constant_distance <= CONSTANT_TOLERANCE else "curve only"
 
 
-def albedo_law(reflectance, p):
-    """(8): alpha [-] at A [-]."""
-    return p[0] * reflectance / (reflectance**2 + p[1] * reflectance + p[2])
-
-
-def a_law(alpha, p):
-    """(9)-(11): a [1/mfp]."""
-    return p[0] * alpha + p[1] * 10.0 ** (p[2] * (alpha - 1.0))
-
-
-def b_law(alpha, p):
-    """(12)-(13): b [-]."""
-    return p[0] * alpha ** ((p[1] * (alpha - p[2]) ** 2 + p[3]) * alpha + p[4])
-
-
-def c_law(alpha, p):
-    """(14)-(15): c [mfp]."""
-    return p[0] * np.e ** (p[1] * alpha) + p[2]
-
-
-def k1_law(alpha, p):
-    """(20): k1 [mfp]."""
-    return p[0] * alpha ** (p[1] * alpha ** p[2] + p[3])
-
-
-def k2_law(alpha, p):
-    """(20): k2 [mfp]."""
-    return p[0] * alpha ** (p[1] * alpha + p[2])
+# The paper's closed forms: alpha [-] of A by (8); of alpha a [1/mfp], b [-], c [mfp] of (7), and k1, k2 [mfp] of (19).
+FORMS: dict[str, Callable] = {
+    "(8)": lambda x, p: p[0] * x / (x**2 + p[1] * x + p[2]),
+    "a": lambda alpha, p: p[0] * alpha + p[1] * 10.0 ** (p[2] * (alpha - 1.0)),  # (9)-(11)
+    "b": lambda alpha, p: p[0] * alpha ** ((p[1] * (alpha - p[2]) ** 2 + p[3]) * alpha + p[4]),  # (12)-(13)
+    "c": lambda alpha, p: p[0] * np.e ** (p[1] * alpha) + p[2],  # (14)-(15)
+    "k1": lambda alpha, p: p[0] * alpha ** (p[1] * alpha ** p[2] + p[3]),  # (20)
+    "k2": lambda alpha, p: p[0] * alpha ** (p[1] * alpha + p[2]),  # (20)
+}
 
 
 def samplings() -> dict[str, Floats]:
@@ -263,7 +242,7 @@ def law_energy(r: Floats, alpha: Floats, b0: float) -> Floats:
 def printed_coefficients(alpha: Floats, b0: float = PUBLISHED["(13)"]["b0"]) -> tuple[Floats, Floats, Floats]:
     """Return a [1/mfp], b [-], c [mfp] of (9)-(15) with printed constants, except b0, which is given."""
     exponents = list(PUBLISHED["(13)"].values())[1:]
-    return a_law(alpha, _printed("(11)")), b_law(alpha, [b0, *exponents]), c_law(alpha, _printed("(15)"))
+    return FORMS["a"](alpha, _printed("(11)")), FORMS["b"](alpha, [b0, *exponents]), FORMS["c"](alpha, _printed("(15)"))
 
 
 def _printed(equation: str) -> Floats:
@@ -285,18 +264,18 @@ def _reading(
     return Reading(equation, choices, constants, dict(printed), *distances, verdict, evidence, result)
 
 
-# One function object a law, so that each compiles once.
+# One function object a form, so that each compiles once.
 _MISFITS = {
-    law: lambda p, item, law=law: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
-    for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)
+    name: lambda p, item, form=form: item[2] * (form(item[0], p) - item[1])  # item: x, data, weight
+    for name, form in FORMS.items()
 }
 
 
-def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:
-    """Fit a law by least squares, residuals in units of the largest datum."""
+def _fit(form: str, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:
+    """Fit a form by least squares, residuals in units of the largest datum."""
     weights = np.broadcast_to(weight / np.max(np.abs(data)), data.shape)
     # Some have optima far off: steps are measured by the size of what is printed, not by slopes there.
-    return least_squares(_MISFITS[law], start, (x, data, weights), scale=np.where(start, np.abs(start), 1.0))
+    return least_squares(_MISFITS[form], start, (x, data, weights), scale=np.where(start, np.abs(start), 1.0))
 
 
 def _held(columns: list[Floats], data: Floats) -> Floats:
@@ -314,9 +293,9 @@ def _albedo_readings(grids: dict[str, Floats]) -> list[Reading]:
         if alpha is hundred:  # to first order a residual in A, without the kink where (8) has no inverse
             weights = {"A": np.gradient(reflectance, alpha)}
         for residual, weight in weights.items():
-            constants = _fit(albedo_law, reflectance, alpha, [4.0, 2.5, 0.7], weight).parameters
-            misfit = np.abs(albedo_law(reflectance, _printed("(8)")) - alpha)[reflectance <= 0.75].max()
-            curves = albedo_law(REFLECTANCE_RANGE, constants), albedo_law(REFLECTANCE_RANGE, _printed("(8)"))
+            constants = _fit("(8)", reflectance, alpha, [4.0, 2.5, 0.7], weight).parameters
+            misfit = np.abs(FORMS["(8)"](reflectance, _printed("(8)")) - alpha)[reflectance <= 0.75].max()
+            curves = FORMS["(8)"](REFLECTANCE_RANGE, constants), FORMS["(8)"](REFLECTANCE_RANGE, _printed("(8)"))
             evidence = f"the printed (8) is within {misfit:.4f} of these alphas up to A = .75"
             found.append(_reading("(8)", f"{name}; residual in {residual}", constants, curves, evidence))
     return found
@@ -342,25 +321,26 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
     a3, c2 = PUBLISHED["(11)"]["a3"], PUBLISHED["(15)"]["c2"]
     a1, a2 = _held([alpha, 10.0 ** (a3 * (alpha - 1))], a)
     c1, c3 = _held([np.exp(c2 * alpha), np.ones_like(alpha)], c)
-    b_free = _fit(b_law, alpha, b, [0.08, 4.0, 0.3, 2.0, 1.0])
+    b_free = _fit("b", alpha, b, [0.08, 4.0, 0.3, 2.0, 1.0])
     corrected = {**PUBLISHED["(13)"], "b0": CORRECTED_B0}
     cases = [
-        ("(11)", a_law, a, [a1, a2, a3], "exponent held", PUBLISHED["(11)"]),
-        ("(13)", b_law, b, b_free, "all free", PUBLISHED["(13)"]),
-        ("(13) with b0 = .0641", b_law, b, b_free, "all free", corrected),
-        ("(15)", c_law, c, [c1, c2, c3], "exponent held", PUBLISHED["(15)"]),
+        ("(11)", "a", a, [a1, a2, a3], "exponent held", PUBLISHED["(11)"]),
+        ("(13)", "b", b, b_free, "all free", PUBLISHED["(13)"]),
+        ("(13) with b0 = .0641", "b", b, b_free, "all free", corrected),
+        ("(15)", "c", c, [c1, c2, c3], "exponent held", PUBLISHED["(15)"]),
     ]
     if exponent_free:
-        a_free, c_free = _fit(a_law, alpha, a, [-0.005, 0.002, 20.0]), _fit(c_law, alpha, c, [0.02, 3.0, 0.1])
-        cases.append(("(11)", a_law, a, a_free, "exponent free", PUBLISHED["(11)"]))
-        cases.append(("(15)", c_law, c, c_free, "exponent free", PUBLISHED["(15)"]))
+        a_free, c_free = _fit("a", alpha, a, [-0.005, 0.002, 20.0]), _fit("c", alpha, c, [0.02, 3.0, 0.1])
+        cases.append(("(11)", "a", a, a_free, "exponent free", PUBLISHED["(11)"]))
+        cases.append(("(15)", "c", c, c_free, "exponent free", PUBLISHED["(15)"]))
     cuts = f"r'_max {points.cut.min():.2f} to {points.cut.max():.2f} l"
     return [_law_reading(*case, alpha, choices, cuts) for case in cases]
 
 
-def _law_reading(equation, law, data, found, held, print_set, alpha, choices, cuts) -> Reading:
+def _law_reading(equation, form, data, found, held, print_set, alpha, choices, cuts) -> Reading:
     constants, result = (found.parameters, found.result) if isinstance(found, Solution) else (found, CONVERGED)
     printed = np.array(list(print_set.values()))
+    law = FORMS[form]
     ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
     evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
     return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result)
@@ -442,7 +422,7 @@ def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
 
 def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading:
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
-    fits = _fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])
+    fits = _fit("k1", alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit("k2", alpha, k2, [3.0, 2.5, 0.4])
     found = np.concatenate([one.parameters for one in fits])
     # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
     printed = _printed("(20)")
@@ -453,7 +433,7 @@ def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading
 
 
 def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
-    return k1_law(alpha, p[:4]), k2_law(alpha, p[4:])
+    return FORMS["k1"](alpha, p[:4]), FORMS["k2"](alpha, p[4:])
 
 
 def _bracket(p: Floats) -> Floats:
