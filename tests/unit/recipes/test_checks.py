@@ -1,4 +1,4 @@
-"""Where fits begin: the law of a recipe, random constants around it, and what became of them."""
+"""Random constants around where a fit begins, and what became of fits from there."""
 
 from dataclasses import replace
 
@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.errors import RecipeError
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Solution
-from profilefit.laws import published
-from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.recipes import catalogue, checks, recipe, targets
 from profilefit.recipes.targets import truth_of
 
@@ -110,33 +107,6 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
     assert len(told.outcomes) == 1
     assert told.best == pytest.approx(own.solution.parameters, rel=1e-12)
     assert told.outcomes[0].constants["b"] == pytest.approx(own.law.b, rel=1e-4)
-
-
-def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
-    """Printed constants of the searchlight are numbers to start from elsewhere too."""
-    chosen = replace(recipe.find("burley-whole", FITS), setting=Setting("diffuse", n=1.4))
-    law = targets.starting_law(chosen, tmp_path)
-    assert law.constants() == published.constants("burley", "published")
-    assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
-    mapped = targets.starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
-    assert mapped.setting == Setting(n=1.4)
-    assert mapped.constants() == RefractingRational.entry.start
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"start": "old"}, r"start must be one of published, diffuse.*, got 'old'"),
-        ({"start": "none"}, r"start must be one of published, diffuse.*, got 'none'"),
-        ({"law": "rational"}, r"law must be one of liang, burley.*, got 'rational'"),
-        ({"held": ("s0", "s1", "s2", "s3")}, r"held leaves no constant of burley free"),
-        ({"held": ("q",)}, r"held must name constants of burley, got q"),
-    ],
-    ids=str,
-)
-def test_what_a_recipe_must_name(change, words):
-    with pytest.raises(RecipeError, match=words):
-        targets.require_known(replace(recipe.find("burley-whole", FITS), **change))
 
 
 @pytest.mark.slow
