@@ -104,15 +104,6 @@ def lights_of(
     return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].similar.mfp) for medium in media)
 
 
-def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
-    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack, over rings even in ln r.
-
-    A is the stack's own. InputError as of `stack_law`, and on another count.
-    """
-    (found,) = shared_gaussians((medium,), illumination, count)
-    return found
-
-
 def shared_gaussians(
     media: Sequence[Medium], illumination: str = "searchlight", count: int = 6
 ) -> tuple[MediumGaussians, ...]:
