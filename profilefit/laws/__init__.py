@@ -29,10 +29,7 @@ REFRACTING = {
     "hazard.Hazard": "two_parts.RefractingHazard",
     "rational.Rational": "refracting_rational.RefractingRational",
 }
-FORWARD = {
-    "hazard.Hazard": "two_parts.ForwardHazard",
-    "rational.Rational": "refracting_rational.ForwardRational",
-}
+FORWARD = {"hazard.Hazard": "two_parts.ForwardHazard", "rational.Rational": "refracting_rational.ForwardRational"}
 
 
 def profile_classes() -> "dict[str, Any]":

@@ -300,11 +300,7 @@ class PhaseFit:
 
 
 def fit_phase(
-    data: PhaseData,
-    form: str,
-    hold: Sequence[str] = (),
-    angles: tuple[float, float] = ALL_ANGLES,
-    seed: int = SEED,
+    data: PhaseData, form: str, hold: Sequence[str] = (), angles: tuple[float, float] = ALL_ANGLES, seed: int = SEED
 ) -> PhaseFit:
     """Fit the form nearest to a table, all rows alike in ln p (or by sigma, where the table has it), but for one at 0.
 

@@ -289,8 +289,7 @@ FEW = np.array([0.1, 0.6, 0.99, 0.9999])[:, None]
 
 
 @pytest.mark.parametrize(
-    ("g", "rel"),
-    [(0.05, 0.015), (0.8, 0.0175), *slow((0.2, 0.0125), (0.5, 0.0125), (0.9, 0.02), (0.95, 0.025))],
+    ("g", "rel"), [(0.05, 0.015), (0.8, 0.0175), *slow((0.2, 0.0125), (0.5, 0.0125), (0.9, 0.02), (0.95, 0.025))]
 )
 @pytest.mark.parametrize("light", LIGHTS)
 def test_near_exact_light_with_g(light, g, rel):

@@ -153,10 +153,7 @@ def test_a_method_keeps_its_name_and_words():
         ({"r": np.array([1j]), "alpha": 0.5}, r"r must be a number or an array of numbers, got array\(\[0.\+1.j\]\)"),
         ({"r": 10**400, "alpha": 0.5}, "r must be a number or an array of numbers, got one of 401 digits"),
         ({"r": [[1.0], [1.0, 2.0]], "alpha": 0.5}, r"r must be a number or an array of numbers, got \[\[1.0\], "),
-        (
-            {"r": np.array([0.5, None]), "alpha": 0.5},
-            r"r must be a number .*, got array\(.* dtype=object\)",
-        ),
+        ({"r": np.array([0.5, None]), "alpha": 0.5}, r"r must be a number .*, got array\(.* dtype=object\)"),
         ({"r": np.ma.masked_greater([0.5, 9.0], 1.0), "alpha": 0.5}, "r must be .*, got an array with masked values"),
     ],
 )

@@ -266,11 +266,7 @@ NOT_SHOWN = [
     ("interfaces", GONE, r"interfaces must be a table, got nothing"),
     ("interfaces/green", GONE, r"interfaces.green must be a table, got nothing"),
     ("interfaces/blue/quality/0/rel", GONE, r"interfaces.blue.quality.0.rel must be a list of numbers, got nothing"),
-    (
-        "interfaces/blue/quality/0/ks",
-        [0.1, 0.2],
-        r"blue.quality must have thickness, rel, ks, delta_A of one length",
-    ),
+    ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"blue.quality must have thickness, rel, ks, delta_A of one length"),
     ("interfaces/red/fit/0", GONE, r"interfaces.red.fit must be 1, one an interface, got 0"),
     ("interfaces/red/starts/0/count", 0.5, r"interfaces.red.starts.0.count must be a whole number, got 0.5"),
     ("layers/1/mu_a", 1, r"layers.1.mu_a must be a list of numbers, got 1"),

@@ -38,18 +38,10 @@ def made_sums(media, illumination, tracing=None):
         f"{channel}_{key}": value
         for channel, a in zip(CHANNELS, whole, strict=True)
         for key, value in zip(
-            sums.ARRAYS,
-            (EDGES * shift, energy * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])),
-            strict=True,
+            sums.ARRAYS, (EDGES * shift, energy * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])), strict=True
         )
     }
-    return {
-        "constants": constants,
-        "reflectance": whole,
-        "share": [0.25] * 3,
-        "by_count": by_count,
-        "arrays": arrays,
-    }
+    return {"constants": constants, "reflectance": whole, "share": [0.25] * 3, "by_count": by_count, "arrays": arrays}
 
 
 @pytest.fixture
@@ -103,11 +95,7 @@ DAMAGE = [
     ("constants/diffuse.6.v2/regenerated", "x", r"constants.diffuse.6.v2.regenerated must be a number, got \"x\""),
     ("constants/diffuse.6.v2/regenerated", 1e-9, r"constants.diffuse.6.v1 and on must rise from above 0"),
     ("constants/diffuse.1.v1/regenerated", -1.0, r"constants.diffuse.1.v1 and on must rise from above 0"),
-    (
-        "constants/diffuse.6.red.w2/regenerated",
-        0.9,
-        r"diffuse.6: weights of a colour must be >= 0 and sum to 1",
-    ),
+    ("constants/diffuse.6.red.w2/regenerated", 0.9, r"diffuse.6: weights of a colour must be >= 0 and sum to 1"),
     ("constants/diffuse.6.v1/jackknife_error", "x", r"constants.diffuse.6.v1.jackknife_error must be a number or null"),
     ("layers", "x", r"layers must be a list, got \"x\""),
     ("layers/1/thickness", 2.0, r"the last layer must be infinitely thick, got 2"),
