@@ -24,7 +24,7 @@ from profilefit.errors import DamagedRecord, InputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
-from profilefit.recipes import catalogue, record, schema
+from profilefit.recipes import record, schema
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
@@ -45,14 +45,17 @@ TRACED_NOTE = (
     "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
     "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
 )
-# What shader sources and pictures take from a record besides its laws, by dotted key.
+# What shader sources and pictures take from a record besides its laws, by dotted key; what a report shows, too.
+QUALITY: Fields = {
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
+    "quality.regenerated.delta_A": NUMBER,
+}
 USED: Fields = {
     **dict.fromkeys(("unit", "equations", "note"), TEXT),
     "layers": LIST,
     "half_spaces": TABLE,
     **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     "data_digest": DIGEST,
 }
 # Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
@@ -76,8 +79,7 @@ SHOWN: Fields = {
     **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
     **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
     **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
     **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
 }
@@ -106,15 +108,7 @@ class StackRequest:
 
 @dataclass(frozen=True)
 class StackRecord:
-    """Record of a stack.
-
-    Attributes:
-        name: name of the record.
-        stack: layers of the stack.
-        laws: laws of red, green and blue.
-        content: everything that the record says.
-        digest: SHA-256 of the record's file.
-    """
+    """Record of a stack: its layers, laws of red, green and blue, all that it says, and SHA-256 of its file."""
 
     name: str
     stack: LayerStack
@@ -441,22 +435,19 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
     if len(recorded) != len(medium.layers):
         raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
     if any(layer.g > 0 for layer in medium.layers):
-        own = [replace(setting, g=layer.g) for layer in medium.layers]
-        similar = [layer.similar for layer in medium.layers]
-        laws = [
-            ForwardHalfSpace(each, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
-            for each, values in zip(own, recorded, strict=True)
-        ]
-        return [
-            LayerLaw(each, law, layer.alpha, layer.mfp) for each, law, layer in zip(own, laws, similar, strict=True)
-        ]
-    hazard = catalogue.load("hazard", setting=setting)
-    today = hazard.constants()
+        tops = []
+        for layer, values in zip(medium.layers, recorded, strict=True):
+            own, similar = replace(setting, g=layer.g), layer.similar
+            law = ForwardHalfSpace(own, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
+            tops.append(LayerLaw(own, law, similar.alpha, similar.mfp))
+        return tops
+    tops = stacks.isotropic_tops(medium, setting)
+    today = tops[0].law.constants()
     for constants in recorded:
         same = constants.keys() == today.keys()
         if not (same and np.allclose([constants[name] for name in today], list(today.values()), rtol=EQUAL)):
             raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
-    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+    return tops
 
 
 def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequence[LayerLaw]) -> StackLaw:

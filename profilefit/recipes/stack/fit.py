@@ -213,13 +213,17 @@ def fitted(
     require_illumination(illumination)
     setting = setting_of(medium, illumination)
     if all(layer.g == 0 for layer in medium.layers):
-        hazard = catalogue.load("hazard", setting=setting)
-        tops = [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
-        return _fitted(medium, tops, tracing, starts=starts)
+        return _fitted(medium, isotropic_tops(medium, setting), tracing, starts=starts)
     similar = replace(medium, layers=tuple(layer.similar for layer in medium.layers))
     _, initial_fits = fitted(similar, illumination, tracing=tracing)
     tops = [traced_half_space(layer, setting, tracing, place) for place, layer in enumerate(medium.layers)]
     return _fitted(medium, tops, tracing, initial_fits)
+
+
+def isotropic_tops(medium: Medium, setting: Setting) -> list[LayerLaw]:
+    """Return the hazard laws of the half spaces that layers of isotropic scattering would be alone."""
+    hazard = catalogue.load("hazard", setting=setting)
+    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
 
 
 def _fitted(

@@ -116,16 +116,14 @@ def shared_gaussians(
     require_illumination(illumination)
     lights = lights_of(media, illumination)
     found = joint(lights, count)
-    units = [medium.layers[0].similar.mfp for medium in media]
-    return tuple(
-        MediumGaussians(
-            fit.setting_of(medium, illumination),
-            light.whole,
-            tuple((found.variances / unit**2).tolist()),
-            tuple(weight),
-        )
-        for medium, light, unit, weight in zip(media, lights, units, found.weights.tolist(), strict=True)
-    )
+    each = zip(media, lights, found.weights, strict=True)
+    return tuple(medium_sum(one, illumination, light.whole, found.variances, own) for one, light, own in each)
+
+
+def medium_sum(medium: Medium, illumination: str, whole: float, variances: Floats, weights: Floats) -> MediumGaussians:
+    """Return the sum of variances (N,) [length^2] and weights (N,) [-], in the medium's own mean free paths."""
+    scaled = tuple((variances / medium.layers[0].similar.mfp ** 2).tolist())
+    return MediumGaussians(fit.setting_of(medium, illumination), whole, scaled, tuple(weights.tolist()))
 
 
 def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
