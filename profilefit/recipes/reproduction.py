@@ -10,7 +10,7 @@ Nothing starts a search at a printed constant: on a surface with a kink the sear
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,8 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.fitting.solver import CONVERGED, Solution, least_squares, solve_batch
 from profilefit.laws import published
+from profilefit.laws.base import ProfileLaw
+from profilefit.materials import BY_NAME, CHANNELS, Material
 
 Floats = NDArray[np.float64]
 EPSILON = 0.005  # of the trimming (6)
@@ -94,15 +96,11 @@ def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:
         low = quantity <= EPSILON * np.max(quantity)
         return float(r[np.argmax(low)]) if low.any() else float(r[-1])
     end = trimmed_radius(r, quantity, EPSILON)
-    visited = walk(float(r[-1]))
-    return float(visited[visited < end - 1e-9][-1]) if stop == "stride before" else end
+    return max(x for x in walk(float(r[-1])).tolist() if x < end - 1e-9) if stop == "stride before" else end
 
 
 def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
-    """Return a, b, c from y (r + c) = a r + b, which is linear in all three.
-
-    A plain guess is returned where that gives no pole left of zero.
-    """
+    """Return a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that has a pole right of 0."""
     columns = np.stack([r, np.ones_like(r), -y], axis=1)[used]
     found = np.linalg.lstsq(columns, (y * r)[used], rcond=None)[0]
     return np.asarray(found if found[2] > 0 else [-0.05, 0.5, 0.5], np.float64)
@@ -114,10 +112,7 @@ def _rational_misfit(p, item):
 
 
 def even_rings(alpha: Floats, last: float = LAST_RADIUS) -> Profiles:
-    """Return exact light in even rings up to `last` [mfp], by Simpson's rule on a spline of ln(2 pi r R_d).
-
-    Energies are within 1e-5 of the exact integrals.
-    """
+    """Return exact light in even rings up to `last` [mfp], to 1e-5: Simpson's rule on a spline of ln(2 pi r R_d)."""
     half = np.arange(2 * round(last / RING_WIDTH) + 1) * RING_WIDTH / 2
     nodes = np.geomspace(half[1] / 2, half[-1], 120)
     values = 2 * np.pi * nodes * np.asarray(exact.profile(nodes, alpha[:, None]))
@@ -130,8 +125,7 @@ def even_rings(alpha: Floats, last: float = LAST_RADIUS) -> Profiles:
 
 
 # A law is reproduced when its curve is within 5 % rms of the printed one over the albedos, and each constant too.
-CURVE_TOLERANCE = 0.05
-CONSTANT_TOLERANCE = 0.05
+CURVE_TOLERANCE = CONSTANT_TOLERANCE = 0.05
 INVERSE_EPSILON = 0.01  # of (19)
 LENGTH = "(10), (12), (14)"  # how a, b, c depend on l
 _PRINTED = {**published.constants("liang_albedo"), **published.constants("liang")}
@@ -190,10 +184,7 @@ class Reading:
 
 
 def judge(constant_distance: float, curve_distance: float) -> str:
-    """Return the verdict on a reading.
-
-    The curve decides; the constants say whether the data could pin them.
-    """
+    """Return the verdict on a reading: the curve decides, the constants say whether the data could pin them."""
     if not curve_distance <= CURVE_TOLERANCE:
         return "not reproduced"
     return "reproduced" if constant_distance <= CONSTANT_TOLERANCE else "curve only"
@@ -278,8 +269,7 @@ def _fit(form: str, x: Floats, data: Floats, start, weight: Floats | float = 1.0
     return least_squares(_MISFITS[form], start, (x, data, weights), scale=np.where(start, np.abs(start), 1.0))
 
 
-def _held(columns: list[Floats], data: Floats) -> Floats:
-    """Amplitudes of a law whose exponent is held at its printed value."""
+def _held(columns: list[Floats], data: Floats) -> Floats:  # amplitudes, exponents as printed
     return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
 
 
@@ -339,8 +329,7 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
 
 def _law_reading(equation, form, data, found, held, print_set, alpha, choices, cuts) -> Reading:
     constants, result = (found.parameters, found.result) if isinstance(found, Solution) else (found, CONVERGED)
-    printed = np.array(list(print_set.values()))
-    law = FORMS[form]
+    law, printed = FORMS[form], np.array(list(print_set.values()))
     ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
     evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
     return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result)
@@ -350,19 +339,19 @@ def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -
     """b0 alone, printed exponents held: which number is it, and does (17) then hold the energy it must?"""
     alpha, b = points.alpha, points.values[:, 1]
     shape = printed_coefficients(alpha, 1.0)[1]
-    fitted = float(shape @ b / (shape @ shape))
-    total = profiles.reflectance
     a_factor = float(np.mean(points.values[:, 0] / printed_coefficients(alpha)[0]))
     found = []
     for why, candidate in B0_CANDIDATES.items():
         r_max = -candidate * shape / printed_coefficients(alpha)[0]
-        share = law_energy(r_max, alpha, candidate) / total
+        share = law_energy(r_max, alpha, candidate) / profiles.reflectance
         evidence = (
             f"cdf(r_max) of (17), which must be 1: {share.min():.3f} to {share.max():.3f}; r_max {r_max.min():.1f} to "
             f"{r_max.max():.1f} l; a of the same fits is {a_factor:.3f} of print: no factor missing"
         )
         curves = (b, candidate * shape)
-        found.append(_reading("(13) b0", f"{why}; {choices}", fitted, curves, evidence, {"b0": candidate}))
+        found.append(
+            _reading("(13) b0", f"{why}; {choices}", shape @ b / (shape @ shape), curves, evidence, {"b0": candidate})
+        )
     return found
 
 
@@ -393,9 +382,13 @@ def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Read
     edges = profiles.r_edges
     cuts = fit_coefficients(profiles, Protocol7()).at(chosen).cut
     even = np.arange(1, 100) / 100
+
+    def within(shares: Floats, keep: NDArray[np.bool_]) -> tuple[Floats, Floats]:  # r = 0 left out
+        return shares[1:][keep[1:]], edges[1:][keep[1:]]
+
     by_share = [(even, np.interp(even, row, edges)) for row in rows]
-    by_ring = [_within(row, edges, row <= 0.95) for row in rows]
-    by_cut = [_within(row, edges, edges <= cut) for row, cut in zip(rows, cuts, strict=True)]
+    by_ring = [within(row, row <= 0.95) for row in rows]
+    by_cut = [within(row, edges <= cut) for row, cut in zip(rows, cuts, strict=True)]
     by_law = [_law_quantiles(float(a), even) for a in chosen]
     cases = (
         ("rings to cdf = .95", by_ring, "r, relative"),
@@ -405,11 +398,6 @@ def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Read
         ("(17) with b0 = .0641 for truth, xi even, .01 to .99", by_law, "xi"),
     )
     return [_inverse_reading(chosen, points, residual, name) for name, points, residual in cases]
-
-
-def _within(shares: Floats, radii: Floats, keep: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Shares and radii of the edges kept, r = 0 left out."""
-    return shares[1:][keep[1:]], radii[1:][keep[1:]]
 
 
 def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
@@ -424,8 +412,7 @@ def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
     fits = _fit("k1", alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit("k2", alpha, k2, [3.0, 2.5, 0.4])
     found = np.concatenate([one.parameters for one in fits])
-    # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
-    printed = _printed("(20)")
+    printed = _printed("(20)")  # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
     curves, laws = (_bracket(found), _bracket(printed)), _both_k(alpha, printed)
     off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), laws, strict=True)]
     evidence = f"alpha .1 to .9 by .1, .95, .99: k1, k2 at each one are {off[0]:.3f}, {off[1]:.3f} rms from (20)"
@@ -436,8 +423,7 @@ def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
     return FORMS["k1"](alpha, p[:4]), FORMS["k2"](alpha, p[4:])
 
 
-def _bracket(p: Floats) -> Floats:
-    """k1 xi - k2 of (19), (alphas, shares)."""
+def _bracket(p: Floats) -> Floats:  # k1 xi - k2 of (19), (alphas, shares)
     k1, k2 = _both_k(INVERSE_ALPHAS, p)
     return k1[:, None] * INVERSE_SHARES - k2[:, None]
 
@@ -447,3 +433,168 @@ def _inverse_amplitudes(xi: Floats, r: Floats, residual: str) -> Floats:
     shape = np.sqrt(xi) * np.log(1 + INVERSE_EPSILON - xi)
     weight = {"r": np.ones_like(r), "r, relative": 1 / r, "xi": np.gradient(xi, r)}[residual]
     return _held([xi * shape * weight, -shape * weight], r * weight)
+
+
+# Table 1
+PRINTED_B0 = PUBLISHED["(13)"]["b0"]
+NORMALIZED_DIFFUSION = "normalized diffusion"
+# model name -> (b0 of (13), whether (18) divides)
+RATIONAL_MODELS = {
+    "paper as printed": (PRINTED_B0, False),
+    "paper as printed, with (18)": (PRINTED_B0, True),
+    "paper, b0 = .0641": (CORRECTED_B0, False),
+    "paper, b0 = .0641, with (18)": (CORRECTED_B0, True),
+}
+# The materials of table 1 and which of ours they may be.
+CANDIDATES = {"ketchup": ("ketchup",), "apple": ("apple",), "marble": ("marble",), "skin": ("skin1", "skin2")}
+# material, model -> MSE of r <= 1/2, of r > 1/2 and of all [1/mm^2], then R^2 of the same [-]
+PRINTED = {
+    ("ketchup", "diffusion"): ((9.7448e-8, 4.5326e-9, 5.0975e-8), (0.9898, 0.5027, 0.9934)),
+    ("ketchup", "paper"): ((7.1351e-8, 1.1414e-8, 4.1373e-8), (0.9916, 0.8809, 0.9942)),
+    ("apple", "diffusion"): ((2.5702e-5, 1.7925e-6, 1.3741e-5), (0.9801, 0.5010, 0.9853)),
+    ("apple", "paper"): ((6.8160e-6, 7.7950e-7, 3.7812e-6), (0.9941, 0.8581, 0.9954)),
+    ("marble", "diffusion"): ((2.4810e-5, 1.7023e-6, 1.3256e-5), (0.9789, 0.5012, 0.9844)),
+    ("marble", "paper"): ((6.7710e-6, 7.2461e-7, 3.7478e-6), (0.9936, 0.8476, 0.9950)),
+    ("skin", "diffusion"): ((1.8591e-6, 4.5615e-8, 9.5236e-7), (0.9855, 0.5038, 0.9912)),
+    ("skin", "paper"): ((7.7719e-7, 1.5203e-7, 4.6461e-7), (0.9944, 0.8982, 0.9960)),
+}
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Table1Row:
+    """One model of one channel over one range: r'_max `range_mm` [mm], and how it was chosen; rings of the truth.
+
+    mse  of r <= r'_max / 2, of the rest, of all [1/mm^2], and over the printed ones [-]
+    r2   of the same three, and less the printed ones, by definition: "determination" 1 - SSE/SST, "explained"
+         SSR / (SSR + SSE), "correlation" squared
+    """
+
+    material: str
+    channel: str
+    model: str
+    range_choice: str
+    range_mm: float
+    mse: Triple
+    r2: dict[str, Triple]
+    mse_over_printed: Triple
+    r2_minus_printed: dict[str, Triple]
+
+
+@dataclass(frozen=True)
+class HalvesCheck:
+    """Return whether two printed halves average to the printed whole: a test of print alone.
+
+    off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
+    """
+
+    material: str
+    model: str
+    off: float
+    second_half_needed: float
+
+
+def table1(regenerated: Mapping[str, ProfileLaw]) -> tuple[Table1Row, ...]:
+    """Return the paper's table of errors, recomputed: MSE and R^2 of r R_d for two halves of the range and all.
+
+    Every candidate material, channel, range and model; `regenerated` are further models by name. Table 1 states neither
+    channel, range, ring width, nor which R^2, and "skin" is one of two materials: each choice is a
+    row, and nothing decides between them but the distance to print.
+    """
+    found: list[Table1Row] = []
+    for printed, names in CANDIDATES.items():
+        for material in map(BY_NAME.__getitem__, names):
+            profiles = even_rings(np.array(material.alpha))
+            for channel in range(len(CHANNELS)):
+                found += _channel_rows(printed, material, channel, profiles, regenerated)
+    return tuple(found)
+
+
+def printed_halves() -> tuple[HalvesCheck, ...]:
+    """Check that printed halves, of equally many rings (give or take one), average to the printed whole."""
+    return tuple(
+        HalvesCheck(material, model, (mse[0] + mse[1]) / 2 / mse[2] - 1, 2 * mse[2] - mse[0])
+        for (material, model), (mse, _) in PRINTED.items()
+    )
+
+
+def mean_squared_errors(law: Floats, data: Floats) -> Triple:
+    """Return values of the first half of the samples, the second half and all."""
+    first, second, whole = (float(np.mean((law[s] - data[s]) ** 2)) for s in _halves(data.size))
+    return first, second, whole
+
+
+def r_squared(law: Floats, data: Floats) -> dict[str, Triple]:
+    """R^2 by three definitions, equal for a linear regression and for nothing else, halves and all."""
+    by_part = [_r_squared_of(law[s], data[s]) for s in _halves(data.size)]
+    return {name: (by_part[0][name], by_part[1][name], by_part[2][name]) for name in by_part[0]}
+
+
+def normalized_diffusion(r: Floats, reflectance: float, mfp: float) -> Floats:
+    """Return r R_d [1/length] of Christensen and Burley (2015) under a pencil beam: s = 1.85 - A + 7 |A - .8|^3."""
+    s = 1.85 - reflectance + 7 * abs(reflectance - 0.8) ** 3
+    return reflectance * s / (8 * np.pi * mfp) * (np.exp(-s * r / mfp) + np.exp(-s * r / (3 * mfp)))
+
+
+def rational(r: Floats, alpha: float, reflectance: float, mfp: float, b0: float, corrected: bool) -> Floats:
+    """Return r R_d [1/length] of (7), zero beyond r_max, divided by cdf(r_max) of (18) if `corrected`."""
+    a, b, c = printed_coefficients(np.array(alpha), b0)
+    x = r / mfp
+    value = np.maximum((a * x + b) / (x + c), 0.0) / mfp
+    return value * reflectance / law_energy(-b / a, np.array(alpha), b0) if corrected else value
+
+
+def _channel_rows(
+    printed: str, material: Material, channel: int, profiles: Profiles, regenerated: Mapping[str, ProfileLaw]
+) -> list[Table1Row]:
+    alpha, mfp = material.alpha[channel], material.mfp[channel]
+    r = profiles.r * mfp
+    data = profiles.value[channel] * profiles.r / mfp
+    reflectance = float(profiles.reflectance[channel])
+    laws = {NORMALIZED_DIFFUSION: normalized_diffusion(r, reflectance, mfp)}
+    for model, (b0, corrected) in RATIONAL_MODELS.items():
+        laws[model] = rational(r, alpha, reflectance, mfp, b0, corrected)
+    laws |= {model: r * np.asarray(law.profile(r, alpha, mfp)) for model, law in regenerated.items()}
+    ranges = {
+        "(6) on r R_d": cut_radius(r, data, "walk"),
+        "one stride before (6)": cut_radius(r, data, "stride before"),
+        "diffusion's MSE nearest to print": _nearest_range(r, laws[NORMALIZED_DIFFUSION], data, printed),
+    }
+    return [
+        _row(printed, material.name, CHANNELS[channel], model, choice, end, law[r <= end], data[r <= end])
+        for choice, end in ranges.items()
+        for model, law in laws.items()
+    ]
+
+
+def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Table1Row:
+    mse, r2 = mean_squared_errors(law, data), r_squared(law, data)
+    printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
+    (first, second, whole), (a, b, c) = mse, printed_mse
+    gaps = {name: (x - u, y - v, z - w) for name, (x, y, z) in r2.items() for u, v, w in [printed_r2]}
+    return Table1Row(material, channel, model, choice, end, mse, r2, (first / a, second / b, whole / c), gaps)
+
+
+def _nearest_range(r: Floats, law: Floats, data: Floats, printed: str) -> float:
+    """Return the range r'_max [mm], whole or below 5 mm half, whose three diffusion MSEs are nearest to print."""
+    ends = np.append(np.arange(0.5, 5.0, 0.5), np.arange(5.0, 31.0))
+    ends = ends[ends <= r[-1]]
+    target = np.log(PRINTED[printed, "diffusion"][0])
+    misfits = [np.sum((np.log(mean_squared_errors(law[r <= e], data[r <= e])) - target) ** 2) for e in ends]
+    return float(ends[np.argmin(misfits)])
+
+
+def _r_squared_of(law: Floats, data: Floats) -> dict[str, float]:
+    residual = np.sum((law - data) ** 2)
+    explained = np.sum((law - data.mean()) ** 2)
+    joint = np.sum((law - law.mean()) * (data - data.mean())) ** 2
+    spread = np.sum((law - law.mean()) ** 2) * np.sum((data - data.mean()) ** 2)
+    return {
+        "determination": float(1 - residual / np.sum((data - data.mean()) ** 2)),
+        "explained": float(explained / (explained + residual)),
+        "correlation": float(joint / spread) if spread > 0 else 0.0,
+    }
+
+
+def _halves(size: int) -> tuple[slice, slice, slice]:
+    return slice(0, size // 2), slice(size // 2, size), slice(0, size)

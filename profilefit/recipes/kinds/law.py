@@ -31,9 +31,8 @@ from profilefit.recipes.pipelines import (
 )
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.record import Records
-from profilefit.recipes.reproduction import readings
+from profilefit.recipes.reproduction import printed_halves, readings, table1
 from profilefit.recipes.run import RecipeRun, RecordContent
-from profilefit.recipes.table1 import printed_halves, table1
 from profilefit.recipes.targets import albedo_values, starting_law, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]

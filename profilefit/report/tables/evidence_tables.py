@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from profilefit.recipes.table1 import NORMALIZED_DIFFUSION
+from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
 from profilefit.report.records import Content
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 

@@ -9,10 +9,11 @@ import pytest
 from mcml_sim import Setting, exact
 from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.materials import BY_NAME
-from profilefit.recipes import table1
+from profilefit.recipes import reproduction
 from profilefit.recipes.reproduction import (
     CORRECTED_B0,
     FORMS,
+    NORMALIZED_DIFFUSION,
     PUBLISHED,
     Protocol7,
     cut_radius,
@@ -20,10 +21,11 @@ from profilefit.recipes.reproduction import (
     fit_coefficients,
     judge,
     law_energy,
+    mean_squared_errors,
     printed_coefficients,
+    r_squared,
     readings,
 )
-from profilefit.recipes.table1 import NORMALIZED_DIFFUSION, mean_squared_errors, r_squared
 
 PRINTED_B0 = PUBLISHED["(13)"]["b0"]
 R = (np.arange(3000) + 0.5) * 0.01
@@ -178,7 +180,7 @@ def test_diffuse_light_is_no_reading_of_the_albedo_map(found):
 
 @pytest.fixture(scope="module")
 def rows():
-    return table1.table1()
+    return reproduction.table1({})
 
 
 def _row(rows, material, model, choice="one stride before (6)"):
@@ -207,8 +209,8 @@ def test_definitions_of_r_squared_agree_for_a_regression_only():
 
 def test_models_hold_their_energy_and_materials_are_those_of_the_table():
     r = (np.arange(400000) + 0.5) * 1e-3
-    assert 2 * np.pi * 1e-3 * table1.normalized_diffusion(r, 0.5, 2.0).sum() == pytest.approx(0.5, rel=1e-4)
-    energy = 2 * np.pi * 1e-3 * table1.rational(r, 0.9, 0.415, 2.0, 0.0641, True).sum()
+    assert 2 * np.pi * 1e-3 * reproduction.normalized_diffusion(r, 0.5, 2.0).sum() == pytest.approx(0.5, rel=1e-4)
+    energy = 2 * np.pi * 1e-3 * reproduction.rational(r, 0.9, 0.415, 2.0, 0.0641, True).sum()
     assert energy == pytest.approx(0.415, rel=1e-4)
     assert BY_NAME["potato"].mfp[0] == pytest.approx(1 / 0.6824)
     assert BY_NAME["ketchup"].alpha == pytest.approx([0.7469, 0.0673, 0.0203], abs=1e-4)
@@ -237,6 +239,6 @@ def test_printed_r_squared_is_explained_over_explained_and_residual(rows):
 
 
 def test_one_printed_half_contradicts_its_whole():
-    off = {(c.material, c.model): c.off for c in table1.printed_halves()}
+    off = {(c.material, c.model): c.off for c in reproduction.printed_halves()}
     assert off.pop(("apple", "paper")) > 0.004
     assert max(map(abs, off.values())) < 0.0005
