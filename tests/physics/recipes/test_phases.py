@@ -14,8 +14,8 @@ from profilefit.laws.phases import FORMS, backscattered, haltrin
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import phase as record
 from profilefit.recipes.phases import MOMENTS, fit_phase, read_phase
-from profilefit.recipes.run import RecipeRun, alone
-from tests.fixtures import slow
+from profilefit.recipes.run import RecipeRun
+from tests.fixtures import recorded, slow
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = shipped("fits") / "phases"
@@ -219,7 +219,7 @@ def test_shipped_record():
 @pytest.mark.slow
 def test_the_record_comes_out_again(tmp_path):
     said = []
-    again = record.load(alone(record.fit(FOLDER / "petzold.csv", RUN), tmp_path, say=said.append))
+    again = record.load(recorded(record.fit(FOLDER / "petzold.csv", RUN), tmp_path, say=said.append))
     assert said[:-1] == record.table_lines(again.content["data"])
     assert len(said) == 4
     for name, one in SHIPPED.content["constants"].items():

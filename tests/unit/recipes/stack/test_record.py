@@ -22,8 +22,8 @@ from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds import stack as stacks
 from profilefit.recipes.kinds.stack import StackRequest, find, load, matching, read, request
 from profilefit.recipes.regenerate import requests_of
-from profilefit.recipes.run import RecipeRun, alone
-from tests.fixtures import slow
+from profilefit.recipes.run import RecipeRun
+from tests.fixtures import recorded, slow
 
 RUN = RecipeRun("quick", 1, Path(), None, None)
 STACK = """\
@@ -117,7 +117,7 @@ def file(tmp_path):
 @pytest.fixture
 def written(at_once, file, tmp_path):
     """The record of the stack above."""
-    return alone(stacks.fit(request(file()), RUN), tmp_path / "mine")
+    return recorded(stacks.fit(request(file()), RUN), tmp_path / "mine")
 
 
 def by_hand(of: StackRequest, channel: int) -> StackLaw:
@@ -135,7 +135,7 @@ def by_hand(of: StackRequest, channel: int) -> StackLaw:
 def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path, text):
     said: list[str] = []
     of = request(file(text=text))
-    path = alone(stacks.fit(of, RUN), tmp_path / "mine", say=said.append)
+    path = recorded(stacks.fit(of, RUN), tmp_path / "mine", say=said.append)
     assert path == tmp_path / "mine" / "stacks" / "heart.json"
     assert [re.sub(r"[\d.]+ s", "SECONDS", line) for line in said] == [f"stacks/heart: SECONDS, {of.title}"]
     found = load(path)
@@ -151,7 +151,7 @@ def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path,
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
-    again = alone(stacks.fit(of, RUN), tmp_path / "again")
+    again = recorded(stacks.fit(of, RUN), tmp_path / "again")
     assert again.read_bytes() == path.read_bytes()
 
 
@@ -160,7 +160,7 @@ def test_grey_layers_are_fitted_once(monkeypatch, file, tmp_path):
     monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
     grey = [("[0.05, 0.20, 0.35]", "0.2"), ("[1.8, 2.2, 2.6]", "2"), ("[0.20, 0.80, 1.2]", "0.8")]
     grey += [("[1.13, 1.2, 1.3]", "1.2")]
-    path = alone(stacks.fit(request(file(*(one for pair in grey for one in pair))), RUN), tmp_path)
+    path = recorded(stacks.fit(request(file(*(one for pair in grey for one in pair))), RUN), tmp_path)
     assert len(asked) == 1
     red, green, blue = load(path).laws
     assert red.constants() == green.constants() == blue.constants()
@@ -171,7 +171,7 @@ def test_starts_of_the_file_are_those_of_its_colours(monkeypatch, file, tmp_path
     monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
     rows = {name: [0.2, -0.1, *[1.0] * 6, float(place)] for place, name in enumerate(CHANNELS, start=1)}
     text = "\n[start]\n" + "\n".join(f"{name} = [{row}]" for name, row in rows.items())
-    alone(stacks.fit(request(file(text=STACK + text)), RUN), tmp_path)
+    recorded(stacks.fit(request(file(text=STACK + text)), RUN), tmp_path)
     assert [given[2][0].tolist() for given in asked] == list(rows.values())
 
 
@@ -355,7 +355,7 @@ def test_what_no_law_is_for_is_refused_before_any_fit(monkeypatch, file, tmp_pat
     monkeypatch.setattr(stacks, "_channel", lambda *_: pytest.fail("nothing is to be fitted"))
     of = request(file(*pieces))
     with pytest.raises(InputError, match=message):
-        alone(stacks.fit(of, RUN), tmp_path / "mine")
+        recorded(stacks.fit(of, RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
 
 
@@ -370,19 +370,19 @@ def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
     of = request(file())
     monkeypatch.setattr(stacks, "_channel", fails)
     with pytest.raises(FloatingPointError, match="blue diverges"):
-        alone(stacks.fit(of, RUN), tmp_path / "mine")
+        recorded(stacks.fit(of, RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
     monkeypatch.setattr(stacks, "_channel", made)
-    path = alone(stacks.fit(of, RUN), tmp_path / "mine")
+    path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
     before = path.read_bytes()
     monkeypatch.setattr(stacks, "_channel", fails)
     with pytest.raises(FloatingPointError, match="blue diverges"):
-        alone(stacks.fit(replace(of, title="another"), RUN), tmp_path / "mine")
+        recorded(stacks.fit(replace(of, title="another"), RUN), tmp_path / "mine")
     assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
     (tmp_path / "full").write_text("in the way")
     monkeypatch.setattr(stacks, "_channel", made)
     with pytest.raises(OutputError, match=r"cannot write into .*full"):
-        alone(stacks.fit(of, RUN), tmp_path / "full")
+        recorded(stacks.fit(of, RUN), tmp_path / "full")
 
 
 def test_a_record_is_found_by_path_and_by_name(written, tmp_path):
@@ -449,7 +449,7 @@ def test_a_record_matches_an_image_of_thicknesses(at_once, file, tmp_path):
     of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
     mean = of.stack.media[0].layers[0].thickness
     assert mean != float(f"{mean:.12g}")
-    path = alone(stacks.fit(of, RUN), tmp_path / "mine")
+    path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
     found = matching(of, tmp_path / "mine")
     assert found is not None
     assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)

@@ -11,9 +11,9 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
-from profilefit.recipes.run import alone
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
+from tests.fixtures import recorded
 from tests.unit.recipes.stack.test_record import GONE, RUN, STACK, refused, spoil
 
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
@@ -49,7 +49,7 @@ def written(monkeypatch, tmp_path):
     """The record of a stack whose fit takes no time."""
     monkeypatch.setattr(sums, "_of_light", made_sums)
     (tmp_path / "heart.toml").write_text(STACK, encoding="utf-8")
-    return alone(sums.fit(request(str(tmp_path / "heart.toml")), RUN), tmp_path / "mine")
+    return recorded(sums.fit(request(str(tmp_path / "heart.toml")), RUN), tmp_path / "mine")
 
 
 def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
@@ -72,7 +72,7 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
             assert [one.whole, one.inside] == known["arrays"][f"{channel}_ends"].tolist()
     first, second = (found.laws(light)[0].variance for light in ILLUMINATIONS)
     assert first != second
-    again = alone(sums.fit(of, RUN), tmp_path / "again")
+    again = recorded(sums.fit(of, RUN), tmp_path / "again")
     assert again.read_bytes() == written.read_bytes()
     assert again.with_suffix(".npz").read_bytes() == written.with_suffix(".npz").read_bytes()
 
@@ -138,7 +138,7 @@ def test_what_no_sums_are_for_is_refused_before_any_fit(monkeypatch, tmp_path):
     path = tmp_path / "heart.toml"
     path.write_text(STACK.replace("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), encoding="utf-8")
     with pytest.raises(InputError, match="layers must have one n for a law of a stack"):
-        alone(sums.fit(request(str(path)), RUN), tmp_path / "mine")
+        recorded(sums.fit(request(str(path)), RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
 
 
