@@ -326,7 +326,6 @@ LAST_TAKEN = 12.0
 # As mcml_sim.exact.single_scattering: a trapezoid in ln(k - k_c), whose error is e^{-pi^2 / step}.
 K_STEP = 0.35
 CRITICAL_NEAREST, CRITICAL_FARTHEST = -22.0, 30.0
-FINER = 3  # halves of the nodes that `finer` takes: none in common with the law's own
 
 
 class BeamDiffusion(DiffusionLaw):
@@ -343,7 +342,7 @@ class BeamDiffusion(DiffusionLaw):
 
     Source: R. Habel, P. Christensen and W. Jarosz, Photon beam diffusion, EGSR 2013, as M. Pharr, W. Jakob and G.
     Humphreys, Physically Based Rendering, 3rd edition, 2016, sec. 15.5, transcribe it (equation numbers are theirs).
-    Both integrate over a few sampled depths; here quadrature does: profiles to 1e-12, shares to 1e-8 (`finer`).
+    Both integrate over a few sampled depths; here quadrature does: profiles to 1e-12, shares to 1e-8.
     """
 
     halves: int = eqx.field(static=True, default=2)
@@ -354,11 +353,6 @@ class BeamDiffusion(DiffusionLaw):
         text="law must have a closed form to become a shader, got beam_diffusion: its share within r is a quadrature "
         "of 20 by 48 nodes; better_dipole is its near relative",
     )
-
-    @property
-    def finer(self) -> BeamDiffusion:
-        """Law with half as many nodes again in each quadrature: the change is the error of the quadratures."""
-        return BeamDiffusion(self.setting, self.albedo, FINER)
 
     def prefactor(self, alpha: Array) -> Array:
         return alpha

@@ -46,11 +46,6 @@ class LiangSampler(Sampler):
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         return jnp.minimum(jnp.abs(self.unclipped(xi, alpha)), self.law.largest_radius(alpha))
 
-    @evaluated
-    def atom(self, alpha) -> Array:
-        """Share of the samples that the clip puts at r_max exactly [-]."""
-        return 1.0 - self._share_below(self.law.largest_radius(alpha), alpha)
-
     @eqx.filter_jit  # the halvings are loops, which would compile anew at each call
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = jnp.broadcast_arrays(x, alpha)
@@ -104,10 +99,6 @@ class LiangSampler(Sampler):
         start = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
         return lax.fori_loop(0, BISECTIONS, halve, start)[0]
 
-    def _share_below(self, x, alpha) -> Array:
-        """Share of xi whose radius is below x, for x beyond the dip of the negative branch."""
-        eps, one = jnp.full_like(alpha, self.law.eps), jnp.ones_like(alpha)
-        return jnp.where(x < self._radius(one, alpha), self._root(x, alpha, eps, one), 1.0)
 
 
 class Liang(ProfileLaw):
