@@ -20,7 +20,7 @@ from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, cumulat
 from profilefit.laws.rational import Rational
 from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.laws.surface import surfaces_of
-from profilefit.laws.two_parts import RefractingHazard, TwoPartSampler, drawn
+from profilefit.laws.two_parts import RefractingHazard, drawn
 from tests.fixtures import slow
 
 LIGHTS, INDICES = ("searchlight", "diffuse"), (1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
@@ -141,6 +141,23 @@ def test_another_index_is_seen(light):
     assert profile_quality(replace(mixed, surface=other.here()), [0.5]).rel[0] > 0.02
 
 
+@pytest.mark.slow
+def test_the_sampler_draws_its_own_density(law):
+    """Means over xi of functions of the radius are integrals of the density; that of the law instead is seen."""
+    xi = (np.arange(200_000) + 0.5) / 200_000
+    for alpha in (0.3, 0.95):
+        x = law.sampler.sample(xi, alpha)
+        weight = 2 * np.pi * x * law.profile(x, alpha) / law.total(alpha) / law.sampler.pdf(x, alpha)
+        assert np.mean(weight) == pytest.approx(1.0, abs=2e-5)
+        for edge in (0.1, 1.0):
+            assert np.mean(weight * (x < edge)) == pytest.approx(law.cdf(edge, alpha), abs=2e-5)
+    two = law.samplers["two steps"]
+    x = two.sample(xi[::500], 0.9)
+    own = 2 * np.pi * x * law.profile(x, 0.9) / law.total(0.9)
+    np.testing.assert_allclose(two.pdf(x, 0.9), own, rtol=1e-6)
+    assert np.max(np.abs(law.sampler.pdf(x, 0.9) / own - 1)) > 1e-5
+
+
 # Where nothing refracts
 
 
@@ -159,18 +176,6 @@ def test_inverse_in_a_fixed_number_of_steps(matched, steps, error):
     missed = np.abs(matched.cdf(sampler.sample(xi, ALPHA[:, None]), ALPHA[:, None]) - xi)
     assert np.max(missed) < error
     assert np.max(missed) > error / 1e4  # fewer steps than these are not exact, and the bound says something
-
-
-@pytest.mark.slow
-def test_density_of_the_sampler_is_its_own(matched):
-    """d xi / dx of the map itself, by differences; the law's own density differs from it by parts in a thousand."""
-    xi, step = np.linspace(0.01, 0.99, 99), 1e-6
-    for alpha in (0.3, 0.95):
-        slope = (matched.sampler.sample(xi + step, alpha) - matched.sampler.sample(xi - step, alpha)) / (2 * step)
-        pdf = matched.sampler.pdf(matched.sampler.sample(xi, alpha), alpha)
-        np.testing.assert_allclose(pdf * slope, 1.0, rtol=1e-5)
-        own = 2 * np.pi * matched.sampler.sample(xi, alpha) * matched.profile(matched.sampler.sample(xi, alpha), alpha)
-        assert 1e-5 < np.max(np.abs(own / matched.albedo.reflectance(alpha) / pdf - 1)) < 1e-2
 
 
 @pytest.mark.slow
@@ -243,23 +248,6 @@ def test_inverse_of_each_part_in_a_fixed_number_of_steps(steps, error):
                 x = drawn(t, growth(t), of, is_once, steps)
                 worst = max(worst, float(np.max(np.abs(np.exp(-cumulative(x, part)) - np.exp(-t)) * share)))
     assert error / 1e3 < worst < error
-
-
-@pytest.mark.slow
-def test_the_sampler_draws_its_own_density(law_n):
-    """Means over xi of functions of the radius are integrals of the density; that of the law instead is seen."""
-    xi = (np.arange(200_000) + 0.5) / 200_000
-    for alpha in (0.3, 0.95):
-        x = law_n.sampler.sample(xi, alpha)
-        weight = 2 * np.pi * x * law_n.profile(x, alpha) / law_n.total(alpha) / law_n.sampler.pdf(x, alpha)
-        assert np.mean(weight) == pytest.approx(1.0, abs=2e-5)
-        for edge in (0.1, 1.0):
-            assert np.mean(weight * (x < edge)) == pytest.approx(law_n.cdf(edge, alpha), abs=2e-5)
-    two = TwoPartSampler(law_n, 2)
-    x = two.sample(xi[::500], 0.9)
-    own = 2 * np.pi * x * law_n.profile(x, 0.9) / law_n.total(0.9)
-    np.testing.assert_allclose(two.pdf(x, 0.9), own, rtol=1e-6)
-    assert np.max(np.abs(law_n.sampler.pdf(x, 0.9) / own - 1)) > 1e-5
 
 
 def test_many_indices_at_once_are_each_alone(law_n):
