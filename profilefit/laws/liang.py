@@ -100,7 +100,6 @@ class LiangSampler(Sampler):
         return lax.fori_loop(0, BISECTIONS, halve, start)[0]
 
 
-
 class Liang(ProfileLaw):
     """r R_d = (a r + b) / (r + c) up to r_max = -b/a, scaled to the reflectance; lengths in units of l   (7), (18).
 

@@ -56,26 +56,14 @@ NONE = 1e-9  # width of a ring that holds nothing [of the next edge]: narrower t
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """End of some of the starts: how many, the cost over the best one's [-], constants, and what the solver said.
-
-    Of those that failed in the same way only the one of lowest cost is told.
-    """
-
-    count: int
-    cost_ratio: float
-    result: str
-    constants: dict[str, float]
-
-
-@dataclass(frozen=True)
 class RandomStarts:
     """Fits from random constants.
 
     count       of random starts; seed and rule say which
     share_best  of them that reach the best optimum [-]: its cost within 1e-6, and its constants as near as `_same` says
     result      whether one beats the recipe's own start
-    outcomes    the distinct ones, best first; `others` starts ended in still other ones
+    outcomes    the distinct ends, best first: count of starts, cost over the best one's [-], constants, and what the
+                solver said; of those that failed alike only that of lowest cost. `others` ended in still other ones
     best        (p,) constants of the best optimum, None if no start converged
     """
 
@@ -84,7 +72,7 @@ class RandomStarts:
     rule: str
     share_best: float
     result: str
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[dict[str, Any], ...]
     others: int
     best: Floats | None
 
@@ -127,8 +115,9 @@ def summarised(own: Solution, others: Sequence[Solution], names: tuple[str, ...]
     groups = _groups(others)
     unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *others)), ROUNDING)
     outcomes = [
-        Outcome(len(g), _cost(g[0]) / unit, g[0].result, dict(zip(names, map(float, g[0].parameters), strict=True)))
-        for g in groups
+        {"count": len(group), "cost_ratio": _cost(group[0]) / unit, "result": group[0].result}
+        | {"constants": dict(zip(names, map(float, group[0].parameters), strict=True))}
+        for group in groups
     ]
     reached = sum(_same(one, best) for one in others) if best is not None else 0
     return RandomStarts(
@@ -138,7 +127,7 @@ def summarised(own: Solution, others: Sequence[Solution], names: tuple[str, ...]
         reached / len(others),
         result,
         tuple(outcomes[:MOST_OUTCOMES]),
-        sum(outcome.count for outcome in outcomes[MOST_OUTCOMES:]),
+        sum(outcome["count"] for outcome in outcomes[MOST_OUTCOMES:]),
         None if best is None else best.parameters,
     )
 
@@ -172,49 +161,8 @@ def _cost(one: Solution) -> float:
     return one.cost if np.isfinite(one.cost) else np.inf
 
 
-@dataclass(frozen=True)
-class CrossCheck:
-    """Constants from photons beside those from the exact half space.
-
-    names               (p,) of the constants
-    exact, photons      (p,) constants from either, on the rings and albedos that count in both
-    statistical_error   (p,) of those from photons, by the sandwich; z their difference in units of it
-    chi2                of the whole difference under the sandwich covariance, within the `rank` directions it knows
-    chance              that photon noise alone gives a larger chi2 [-]
-    traced              photons; rings_left_out and albedos_left_out rest on too few of them
-    result              whether the fits agree, or which one failed and how
-    """
-
-    names: tuple[str, ...]
-    exact: Floats
-    photons: Floats
-    statistical_error: Floats
-    chi2: float
-    rank: int
-    chance: float
-    traced: int
-    rings_left_out: int
-    albedos_left_out: int
-    result: str
-
-    @property
-    def z(self) -> Floats:
-        return (self.photons - self.exact) / self.statistical_error
-
-    def content(self) -> dict[str, Any]:
-        """Return what a record says of it."""
-        columns = zip(self.names, self.exact, self.photons, self.statistical_error, self.z, strict=True)
-        keys = ("exact", "photons", "statistical_error", "z")
-        facts = ("chi2", "rank", "chance", "rings_left_out", "albedos_left_out", "result")
-        return {
-            "constants": {name: dict(zip(keys, values, strict=True)) for name, *values in columns},
-            "photons": self.traced,
-            **{name: getattr(self, name) for name in facts},
-        }
-
-
-def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
-    """Repeat the fit `own`, which was to `exact`, on photons of the same setting."""
+def crosscheck(own: Fit, exact: Profiles, light: Orders) -> dict[str, Any]:
+    """Repeat the fit `own`, which was to `exact`, on photons of the same setting; return what `compared` does."""
     run, xi = light.merged(exact.r_edges), tuple(np.asarray(own.rings.xi))
     photons = Profiles.from_orders(run, exact.alpha)
     seen = np.asarray(own.rings.used) > 0
@@ -231,8 +179,15 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> CrossCheck:
     return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))
 
 
-def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos_left_out: int) -> CrossCheck:
-    """Compare two fits of the same constants, in units of the photons' noise."""
+def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos_left_out: int) -> dict[str, Any]:
+    """Compare two fits of the same constants, in units of the photons' noise, as a record has it.
+
+    constants  by name from either, on the rings and albedos that count in both, statistical_error of those from photons
+               (the sandwich's), and z, their difference in units of it
+    chi2       of the whole difference under the sandwich covariance, within the `rank` directions that it knows
+    chance     that photon noise alone gives a larger chi2 [-];  photons  that were traced
+    result     whether the fits agree, or which one failed and how
+    """
     one, other = exact.solution.parameters, photons.solution.parameters
     covariance = np.asarray(photons.statistical)
     if problem := _problem(exact, photons):
@@ -243,8 +198,13 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
         chance = float(chi2.sf(distance, rank))
         result = AGREE if chance >= LEAST_CHANCE else DIFFER
     error = np.sqrt(np.diag(covariance))
-    left_out = rings_left_out, albedos_left_out
-    return CrossCheck(exact.free, one, other, error, distance, rank, chance, traced, *left_out, result)
+    rows = zip(exact.free, one, other, error, (other - one) / error, strict=True)
+    keys = ("exact", "photons", "statistical_error", "z")
+    return {
+        "constants": {name: dict(zip(keys, values, strict=True)) for name, *values in rows},
+        **{"photons": traced, "chi2": distance, "rank": rank, "chance": chance, "result": result},
+        **{"rings_left_out": rings_left_out, "albedos_left_out": albedos_left_out},
+    }
 
 
 def _problem(exact: Fit, photons: Fit) -> str | None:

@@ -170,7 +170,7 @@ def described_fit(recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple
             at_one = replace(recipe, indices=(), weighting=replace(recipe.weighting, rising=0.0))
             seen = truth_of(at_one, None)
             own = fit_from(at_one, seen, result.law)
-        checks["crosscheck"] = crosscheck(own, seen, light).content()
+        checks["crosscheck"] = crosscheck(own, seen, light)
     content, arrays = description(recipe, run, profiles, result)
     return result, profiles, content | checks, arrays
 

@@ -46,10 +46,10 @@ def test_outcomes_are_told_apart():
     assert told.result == checks.OWN_IS_BEST
     assert not told.beats_own
     assert told.share_best == pytest.approx(3 / 7)
-    assert [outcome.count for outcome in told.outcomes] == [3, 2, 1, 1]
-    assert [outcome.cost_ratio for outcome in told.outcomes] == pytest.approx([1, 2, 5, np.inf])
-    assert told.outcomes[1].constants == {"a": 5.0, "b": 1.0}
-    assert told.outcomes[2].result == failed
+    assert [outcome["count"] for outcome in told.outcomes] == [3, 2, 1, 1]
+    assert [outcome["cost_ratio"] for outcome in told.outcomes] == pytest.approx([1, 2, 5, np.inf])
+    assert told.outcomes[1]["constants"] == {"a": 5.0, "b": 1.0}
+    assert told.outcomes[2]["result"] == failed
     assert told.others == 0
     content = told.content()
     assert "best" not in content
@@ -67,7 +67,7 @@ def test_a_better_optimum_than_the_recipes_own_is_told():
     assert checks.summarised(failed, [near], NAMES, 1, "so").beats_own
     none = checks.summarised(failed, [failed], NAMES, 1, "so")
     assert (none.result, none.best, none.share_best) == (checks.NONE_CONVERGED, None, 0.0)
-    assert none.outcomes[0].cost_ratio == 1.0
+    assert none.outcomes[0]["cost_ratio"] == 1.0
 
 
 def test_what_is_one_optimum():
@@ -106,7 +106,7 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
     assert told.share_best == 1.0
     assert len(told.outcomes) == 1
     assert told.best == pytest.approx(own.solution.parameters, rel=1e-12)
-    assert told.outcomes[0].constants["b"] == pytest.approx(own.law.b, rel=1e-4)
+    assert told.outcomes[0]["constants"]["b"] == pytest.approx(own.law.b, rel=1e-4)
 
 
 @pytest.mark.slow
