@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import equinox as eqx
@@ -55,38 +54,8 @@ FACTORS, TRUSTED, ORDER = tuple(range(1, JACKKNIFE_GROUPS + 1)), (2, 3), 2
 NONE = 1e-9  # width of a ring that holds nothing [of the next edge]: narrower than any other, wide enough to divide by
 
 
-@dataclass(frozen=True)
-class RandomStarts:
-    """Fits from random constants.
-
-    count       of random starts; seed and rule say which
-    share_best  of them that reach the best optimum [-]: its cost within 1e-6, and its constants as near as `_same` says
-    result      whether one beats the recipe's own start
-    outcomes    the distinct ends, best first: count of starts, cost over the best one's [-], constants, and what the
-                solver said; of those that failed alike only that of lowest cost. `others` ended in still other ones
-    best        (p,) constants of the best optimum, None if no start converged
-    """
-
-    count: int
-    seed: int
-    rule: str
-    share_best: float
-    result: str
-    outcomes: tuple[dict[str, Any], ...]
-    others: int
-    best: Floats | None
-
-    @property
-    def beats_own(self) -> bool:
-        return self.result == OWN_IS_BEATEN
-
-    def content(self) -> dict[str, Any]:
-        """Return what a record says of it."""
-        return {name: value for name, value in vars(self).items() if name != "best"}
-
-
-def random_starts(own: Fit, start: Constants, count: int, seed: int) -> RandomStarts:
-    """Repeat the fit `own`, which began at `start`, from `count` random constants, all in one batch."""
+def random_starts(own: Fit, start: Constants, count: int, seed: int) -> dict[str, Any]:
+    """Repeat the fit `own`, which began at `start`, from `count` random constants in one batch; return `summarised`."""
     constants = start.vector(own.free)
     begins = spread_out(constants, count, seed)
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (count, *np.shape(leaf))), (start, own.rings))
@@ -103,8 +72,17 @@ def spread_out(constants: Floats, count: int, seed: int) -> Floats:
     return np.where(constants == 0, normal, constants * np.exp(normal))
 
 
-def summarised(own: Solution, others: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
-    """Group the solutions by where they ended, and say whether one is better than the recipe's own."""
+def summarised(
+    own: Solution, others: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str
+) -> dict[str, Any]:
+    """Group the solutions by where they ended, and say whether one is better than the recipe's own, as a record has it.
+
+    count       of random starts; seed and rule say which
+    share_best  of them that reach the best optimum [-]: its cost within 1e-6, and its constants as near as `_same` says
+    result      whether one beats the recipe's own start
+    outcomes    the distinct ends, best first: count of starts, cost over the best one's [-], constants, and what the
+                solver said; of those that failed alike only that of lowest cost. `others` ended in still other ones
+    """
     converged = [one for one in (own, *others) if one.converged]
     best = min(converged, key=lambda one: one.cost, default=None)
     if best is None:
@@ -114,22 +92,17 @@ def summarised(own: Solution, others: Sequence[Solution], names: tuple[str, ...]
         best = own if result == OWN_IS_BEST else best
     groups = _groups(others)
     unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *others)), ROUNDING)
-    outcomes = [
+    outcomes: list[dict[str, Any]] = [
         {"count": len(group), "cost_ratio": _cost(group[0]) / unit, "result": group[0].result}
         | {"constants": dict(zip(names, map(float, group[0].parameters), strict=True))}
         for group in groups
     ]
     reached = sum(_same(one, best) for one in others) if best is not None else 0
-    return RandomStarts(
-        len(others),
-        seed,
-        rule,
-        reached / len(others),
-        result,
-        tuple(outcomes[:MOST_OUTCOMES]),
-        sum(outcome["count"] for outcome in outcomes[MOST_OUTCOMES:]),
-        None if best is None else best.parameters,
-    )
+    return {
+        **{"count": len(others), "seed": seed, "rule": rule, "share_best": reached / len(others), "result": result},
+        "outcomes": outcomes[:MOST_OUTCOMES],
+        "others": sum(outcome["count"] for outcome in outcomes[MOST_OUTCOMES:]),
+    }
 
 
 def _groups(found: Sequence[Solution]) -> list[list[Solution]]:

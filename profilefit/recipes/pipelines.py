@@ -23,7 +23,7 @@ from profilefit.laws import published
 from profilefit.laws.base import Constants
 from profilefit.recipes import recipe as recipe_file
 from profilefit.recipes import record
-from profilefit.recipes.checks import crosscheck, discretisation_error, random_starts
+from profilefit.recipes.checks import OWN_IS_BEATEN, crosscheck, discretisation_error, random_starts
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import Albedos, Recipe
 from profilefit.recipes.run import COMPARISONS, LAWS, MAPS, RecipeRun, RecordContent, Work
@@ -158,10 +158,10 @@ def described_fit(recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple
     profiles, start, checks = truth_of(recipe, light), starting_law(recipe, run.out), dict[str, Any]()
     result = fit_from(recipe, profiles, start)
     if recipe.random_starts:
-        tried = random_starts(result, start, recipe.random_starts, run.seed)
-        checks["starts"] = tried.content()
-        if tried.beats_own:  # rounding decides which of them find it: constants must not depend on that
-            run.say(f"{recipe.name}: {tried.result}")
+        checks["starts"] = tried = random_starts(result, start, recipe.random_starts, run.seed)
+        if tried["result"] == OWN_IS_BEATEN:
+            # Rounding decides which of them find it: constants must not depend on that.
+            run.say(f"{recipe.name}: {tried['result']}")
     if recipe.check and light is not None:
         own, seen = result, profiles
         if recipe.indices:
