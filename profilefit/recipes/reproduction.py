@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, Material
 
 Floats = NDArray[np.float64]
+Content = dict[str, Any]  # a row of the record
 EPSILON = 0.005  # of the trimming (6)
 # MCML's usual hundredth of a mean free path; beyond 25 mfp (6) never walks for alpha <= .9986 [mfp].
 RING_WIDTH, LAST_RADIUS = 0.01, 30.0
@@ -161,28 +163,6 @@ REFLECTANCE_RANGE = np.linspace(0.02, 1.0, 99)
 INVERSE_ALPHAS, INVERSE_SHARES = np.linspace(0.1, 0.99, 90), np.linspace(0.02, 0.98, 97)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """One reading of one equation: what it chose, what came out, how far from print.
-
-    constant_distance  the largest |found / printed - 1| of a constant (|found - printed| for exponents of l) [-]
-    curve_distance     rms of found curve / printed curve - 1 over its range [-]; curve_maximum its largest
-    verdict            `judge` of the two distances
-    result             of the fit: "converged", or why its constants are not identified
-    """
-
-    equation: str
-    choices: str
-    constants: dict[str, float]
-    published: dict[str, float]
-    constant_distance: float
-    curve_distance: float
-    curve_maximum: float
-    verdict: str
-    evidence: str
-    result: str = CONVERGED
-
-
 def judge(constant_distance: float, curve_distance: float) -> str:
     """Return the verdict on a reading: the curve decides, the constants say whether the data could pin them."""
     if not curve_distance <= CURVE_TOLERANCE:
@@ -212,16 +192,23 @@ def samplings() -> dict[str, Floats]:
     }
 
 
-def readings() -> tuple[Reading, ...]:
-    """Every reading of every equation, the winners and their serious competitors, of exact light."""
+def readings() -> list[Content]:
+    """Return every reading of every equation, the winners and their serious competitors, of exact light.
+
+    Each says what it chose, what came out (`constants`, beside those `published`) and how far that is from print:
+    constant_distance  the largest |found / printed - 1| of a constant (|found - printed| for exponents of l) [-]
+    curve_distance     rms of found curve / printed curve - 1 over its range [-]; curve_maximum its largest
+    verdict            `judge` of the two distances
+    result             of the fit: "converged", or why its constants are not identified
+    """
     grids = samplings()
     profiles = even_rings(np.unique(np.concatenate(list(grids.values()))))
-    return (
+    return [
         *_albedo_readings(grids),
         *_coefficient_readings(profiles, grids),
         *_length_readings(even_rings(np.array([0.5, 0.9, 0.99]))),
         *_inverse_readings(profiles, grids),
-    )
+    ]
 
 
 def law_energy(r: Floats, alpha: Floats, b0: float) -> Floats:
@@ -242,7 +229,7 @@ def _printed(equation: str) -> Floats:
 
 def _reading(
     equation: str, choices: str, found, curves: tuple[Floats, Floats], evidence: str, printed=None, result=CONVERGED
-) -> Reading:
+) -> Content:
     """Measure `found` against print; `curves` are found and printed over the range."""
     printed = printed or PUBLISHED[equation]
     constants = dict(zip(printed, map(float, np.atleast_1d(found)), strict=True))
@@ -250,9 +237,11 @@ def _reading(
     gaps = [abs(v - printed[k]) if of_length else abs(v / printed[k] - 1) for k, v in constants.items()]
     off = np.abs(curves[0] / curves[1] - 1)
     gap, rms = float(max(gaps)), float(np.sqrt(np.mean(off**2)))
-    distances = gap, rms, float(off.max())
-    verdict = judge(gap, rms) if result == CONVERGED else "not reproduced"
-    return Reading(equation, choices, constants, dict(printed), *distances, verdict, evidence, result)
+    return {
+        **{"equation": equation, "choices": choices, "constants": constants, "published": dict(printed)},
+        **{"constant_distance": gap, "curve_distance": rms, "curve_maximum": float(off.max()), "evidence": evidence},
+        **{"verdict": judge(gap, rms) if result == CONVERGED else "not reproduced", "result": result},
+    }
 
 
 # One function object a form, so that each compiles once.
@@ -273,7 +262,7 @@ def _held(columns: list[Floats], data: Floats) -> Floats:  # amplitudes, exponen
     return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
 
 
-def _albedo_readings(grids: dict[str, Floats]) -> list[Reading]:
+def _albedo_readings(grids: dict[str, Floats]) -> list[Content]:
     """(8), a fit of alpha(A): where the albedos stand, and how residuals count."""
     found = []
     hundred = np.arange(1, 100) / 100
@@ -291,7 +280,7 @@ def _albedo_readings(grids: dict[str, Floats]) -> list[Reading]:
     return found
 
 
-def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
+def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Content]:
     """(11), (13), (15) under the plain protocol at every sampling, and every other protocol at the last one."""
     plain, width = fit_coefficients(profiles, Protocol7()), float(profiles.r_edges[1])
     choices = Protocol7().describe(width)
@@ -305,7 +294,7 @@ def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[
     return found + _misprint_readings(plain.at(alpha), f"{choices}; {last}", only)
 
 
-def _law_readings(points: Coefficients, choices: str, exponent_free: bool = False) -> list[Reading]:
+def _law_readings(points: Coefficients, choices: str, exponent_free: bool = False) -> list[Content]:
     """Return the readings of laws through one set of coefficients, printed exponents fixed and perhaps free as well."""
     alpha, (a, b, c) = points.alpha, points.values.T
     a3, c2 = PUBLISHED["(11)"]["a3"], PUBLISHED["(15)"]["c2"]
@@ -327,7 +316,7 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
     return [_law_reading(*case, alpha, choices, cuts) for case in cases]
 
 
-def _law_reading(equation, form, data, found, held, print_set, alpha, choices, cuts) -> Reading:
+def _law_reading(equation, form, data, found, held, print_set, alpha, choices, cuts) -> Content:
     constants, result = (found.parameters, found.result) if isinstance(found, Solution) else (found, CONVERGED)
     law, printed = FORMS[form], np.array(list(print_set.values()))
     ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
@@ -335,7 +324,7 @@ def _law_reading(equation, form, data, found, held, print_set, alpha, choices, c
     return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result)
 
 
-def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Reading]:
+def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Content]:
     """b0 alone, printed exponents held: which number is it, and does (17) then hold the energy it must?"""
     alpha, b = points.alpha, points.values[:, 1]
     shape = printed_coefficients(alpha, 1.0)[1]
@@ -355,7 +344,7 @@ def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -
     return found
 
 
-def _length_readings(profiles: Profiles) -> list[Reading]:
+def _length_readings(profiles: Profiles) -> list[Content]:
     """Exponents of l: strides of (6) stay as they are while the mean free path changes, rings scale with it."""
     lengths = np.geomspace(0.1, 10.0, 7)
     powers = {"r R_d": (-1, 0, 1), "R_d": (-2, -1, 1)}  # of l in a, b, c, by dimension
@@ -374,7 +363,7 @@ def _length_readings(profiles: Profiles) -> list[Reading]:
     return found
 
 
-def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
+def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Content]:
     """(19)-(20): where shares stand and what is made small; k1 and k2 by linear least squares at each albedo."""
     wanted = [*np.arange(1, 10) / 10, 0.95, 0.99]
     chosen = profiles.alpha[[np.argmin(np.abs(profiles.alpha - a)) for a in wanted]]
@@ -408,7 +397,7 @@ def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
     return xi, np.interp(xi, energy / energy[-1], r)
 
 
-def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading:
+def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Content:
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
     fits = _fit("k1", alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit("k2", alpha, k2, [3.0, 2.5, 0.4])
     found = np.concatenate([one.parameters for one in fits])
@@ -461,61 +450,41 @@ PRINTED = {
 Triple = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Table1Row:
-    """One model of one channel over one range: r'_max `range_mm` [mm], and how it was chosen; rings of the truth.
-
-    mse  of r <= r'_max / 2, of the rest, of all [1/mm^2], and over the printed ones [-]
-    r2   of the same three, and less the printed ones, by definition: "determination" 1 - SSE/SST, "explained"
-         SSR / (SSR + SSE), "correlation" squared
-    """
-
-    material: str
-    channel: str
-    model: str
-    range_choice: str
-    range_mm: float
-    mse: Triple
-    r2: dict[str, Triple]
-    mse_over_printed: Triple
-    r2_minus_printed: dict[str, Triple]
-
-
-@dataclass(frozen=True)
-class HalvesCheck:
-    """Return whether two printed halves average to the printed whole: a test of print alone.
-
-    off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
-    """
-
-    material: str
-    model: str
-    off: float
-    second_half_needed: float
-
-
-def table1(regenerated: Mapping[str, ProfileLaw]) -> tuple[Table1Row, ...]:
+def table1(regenerated: Mapping[str, ProfileLaw]) -> list[Content]:
     """Return the paper's table of errors, recomputed: MSE and R^2 of r R_d for two halves of the range and all.
 
     Every candidate material, channel, range and model; `regenerated` are further models by name. Table 1 states neither
     channel, range, ring width, nor which R^2, and "skin" is one of two materials: each choice is a
     row, and nothing decides between them but the distance to print.
+
+    range_mm  r'_max [mm], and how it was chosen; rings are those of the truth
+    mse       of r <= r'_max / 2, of the rest, of all [1/mm^2], and over the printed ones [-]
+    r2        of the same three, and less the printed ones, by definition: "determination" 1 - SSE/SST, "explained"
+              SSR / (SSR + SSE), "correlation" squared
     """
-    found: list[Table1Row] = []
+    found: list[Content] = []
     for printed, names in CANDIDATES.items():
         for material in map(BY_NAME.__getitem__, names):
             profiles = even_rings(np.array(material.alpha))
             for channel in range(len(CHANNELS)):
                 found += _channel_rows(printed, material, channel, profiles, regenerated)
-    return tuple(found)
+    return found
 
 
-def printed_halves() -> tuple[HalvesCheck, ...]:
-    """Check that printed halves, of equally many rings (give or take one), average to the printed whole."""
-    return tuple(
-        HalvesCheck(material, model, (mse[0] + mse[1]) / 2 / mse[2] - 1, 2 * mse[2] - mse[0])
+def printed_halves() -> list[Content]:
+    """Check that printed halves, of equally many rings (give or take one), average to the printed whole.
+
+    off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
+    """
+    return [
+        {
+            "material": material,
+            "model": model,
+            "off": (mse[0] + mse[1]) / 2 / mse[2] - 1,
+            "second_half_needed": 2 * mse[2] - mse[0],
+        }
         for (material, model), (mse, _) in PRINTED.items()
-    )
+    ]
 
 
 def mean_squared_errors(law: Floats, data: Floats) -> Triple:
@@ -546,7 +515,7 @@ def rational(r: Floats, alpha: float, reflectance: float, mfp: float, b0: float,
 
 def _channel_rows(
     printed: str, material: Material, channel: int, profiles: Profiles, regenerated: Mapping[str, ProfileLaw]
-) -> list[Table1Row]:
+) -> list[Content]:
     alpha, mfp = material.alpha[channel], material.mfp[channel]
     r = profiles.r * mfp
     data = profiles.value[channel] * profiles.r / mfp
@@ -567,12 +536,15 @@ def _channel_rows(
     ]
 
 
-def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Table1Row:
+def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Content:
     mse, r2 = mean_squared_errors(law, data), r_squared(law, data)
     printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
     (first, second, whole), (a, b, c) = mse, printed_mse
     gaps = {name: (x - u, y - v, z - w) for name, (x, y, z) in r2.items() for u, v, w in [printed_r2]}
-    return Table1Row(material, channel, model, choice, end, mse, r2, (first / a, second / b, whole / c), gaps)
+    return {
+        **{"material": material, "channel": channel, "model": model, "range_choice": choice, "range_mm": end},
+        **{"mse": mse, "r2": r2, "mse_over_printed": (first / a, second / b, whole / c), "r2_minus_printed": gaps},
+    }
 
 
 def _nearest_range(r: Floats, law: Floats, data: Floats, printed: str) -> float:
