@@ -117,14 +117,14 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
     law, own = stack_law(forward(medium, g), light), forward(medium, g)
     seconds = time.perf_counter() - begin
     rings = traced(own, light, ring_edges(own.layers[0], own.layers), count, TRACED_SEED)
-    found = of_rings(law, medium.layers[0].thickness, rings)
+    rel, noise, ks, off = of_rings(law, medium.layers[0].thickness, rings)
     counts, exactly = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.top.mfp), exact.solve(medium, light)
     apart = np.diff(np.asarray(exactly.cdf(rings.edges)) * exactly.reflectance)[counts] / rings.energy[counts] - 1
     similar = float(np.mean(np.abs(apart)))
-    figures = (found.rel, found.noise, similar, found.ks, abs(found.delta_A))
+    figures = (rel, noise, similar, ks, abs(off))
     cells = (f"{name}, {light}", f"{seconds:.0f}", *_short(*figures))
     print(*cells, flush=True)
-    return cells, Error(found.rel, similar, found.ks, found.delta_A)
+    return cells, Error(rel, similar, ks, off)
 
 
 def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], list[float]]:

@@ -259,24 +259,22 @@ ALL_ANGLES = (0.0, 180.0)
 class PhaseFit:
     """One form, fitted to a table.
 
-    held       moments that it keeps;  range  of the angles that were fitted [degrees]
+    held       moments that it keeps;  moments  mean cosine and backscattered share of the table [-]
     constants  (c,) [-];  errors  (c,) by the names that records have for them, None where one does not apply
     phase      the fitted phase function
-    rms        root mean square of ln(form / table) over those angles;  bands  the same between BANDS, NaN if empty
+    rms        root mean square of ln(form / table) over the angles that were fitted
+    bands      the same between BANDS, NaN if empty
     """
 
     form: PhaseForm
     held: tuple[str, ...]
-    range: tuple[float, float]
     best: Solution
     constants: Floats
     errors: dict[str, Floats | None]
     phase: Phase
     rms: float
     bands: tuple[float, ...]
-
     moments: tuple[float, float]
-    """Mean cosine and backscattered share of the table [-]."""
 
     @property
     def result(self) -> str:
@@ -336,7 +334,7 @@ def fit_phase(
     off = np.log(phase.pdf(np.cos(data.angles)) / data.values)
     bands = tuple(_rms(off[used & data.within(low, high - ROUNDING)]) for low, high in pairwise(BANDS))
     errors = _errors(own, held, best, arrays, data, used)
-    return PhaseFit(own, held, angles, best, constants, errors, phase, _rms(off[used]), bands, moments)
+    return PhaseFit(own, held, best, constants, errors, phase, _rms(off[used]), bands, moments)
 
 
 def built(form: PhaseForm, constants: Floats) -> Phase:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,19 +121,6 @@ class StackRecord:
         return self.laws[0].setting
 
 
-class StackQuality(NamedTuple):
-    """Errors of a law at one thickness.
-
-    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
-    delta_A  relative error of A [-]
-    """
-
-    rel: float
-    noise: float
-    ks: float
-    delta_A: float
-
-
 def find(name: str, folder: Path) -> StackRecord | None:
     """Return the laws of a stack by the path of its record or by its name in a folder; None where there is none."""
     path = record.named(name, folder / STACKS, PIPELINE)
@@ -200,8 +187,8 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
         ]
     else:
         measured = [_of_exact(interface, float(at)) for at in d]
-    kept = {name: [getattr(each, name) for each in measured] for name in ("rel", "ks", "delta_A")}
-    return {"thickness": d.tolist(), **kept}
+    rel, _, ks, delta_a = (list(values) for values in zip(*measured, strict=True))
+    return {"thickness": d.tolist(), "rel": rel, "ks": ks, "delta_A": delta_a}
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -306,8 +293,11 @@ def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, st
     }
 
 
-def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
-    """Measure a law by traced light; rel is of rings from a tenth of the first layer's mean free path."""
+def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> tuple[float, float, float, float]:
+    """Measure a law by traced light: rel, the noise that was taken off it in quadrature, ks, relative error of A [-].
+
+    rel is of rings from a tenth of the first layer's mean free path.
+    """
     within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
     counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
     rel = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
@@ -315,12 +305,10 @@ def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQualit
     noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
     light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
     ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
-    return StackQuality(
-        float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
-    )
+    return float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
 
 
-def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
+def _of_exact(interface: stacks.Interface, thickness: float) -> tuple[float, float, float, float]:
     law, medium = interface.law, interface.medium
     light = exact.solve(medium.with_first(thickness), law.setting.illumination, stacks.NODES)
     r = stacks.radii(medium)
@@ -328,7 +316,7 @@ def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
     near = r[share <= stacks.LAST_SHARE]
     relative = np.asarray(law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
     ks = float(np.max(np.abs(np.asarray(law.cdf(r, thickness)) - share)))
-    return StackQuality(float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1)
+    return float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1
 
 
 def _starts(tables: Tables, content: Table, stack: LayerStack) -> tuple[Floats, ...]:
