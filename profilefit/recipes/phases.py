@@ -4,7 +4,7 @@
 
 Cells are separated by commas; a # starts a comment. Values may have any scale: a density per steradian, 4 pi times
 that, or a volume scattering function in 1/(m sr). They are divided by their integral over all directions, which is
-then the scattering coefficient b. `Span` says how much of that integral lies at angles without rows.
+then the scattering coefficient b. `spans` say how much of that integral lies at angles without rows.
 """
 
 from __future__ import annotations
@@ -48,22 +48,7 @@ LONGEST_SHOWN = 40
 LEAST_DEGREES = 7.0  # more than 2 pi: a table that ends before is one in radians
 WIDEST = 20.0  # [degrees] between rows; wider gaps are named
 MOST_SHARE = 1e3  # beyond which a rule estimates nothing
-
-
-@dataclass(frozen=True)
-class Span:
-    """Angles without rows, and how much of a table's integral depends on how they are filled.
-
-    low, high  [degrees];  share  of the integral by the rule of `Tabulated` [-];  rule  in words
-    other      the same share by another rule that is as likely [-];  other_rule  in words
-    """
-
-    low: float
-    high: float
-    share: float
-    rule: str
-    other: float
-    other_rule: str
+SPAN = ("low", "high", "share", "rule", "other", "other_rule")
 
 
 @dataclass(frozen=True)
@@ -79,7 +64,8 @@ class PhaseData:
         integral: integral of the values as read, in `unit`.
         unit: unit of the integral, 1/m where the values had 1/(m sr), none where they had 1/sr or no unit.
         spans: angles without rows: below the first angle > 0, between rows more than `WIDEST` apart, and beyond the
-            last angle.
+            last angle: `low`, `high` [degrees]; `share` of the integral by the `rule` of `Tabulated`, in words, and
+            `other` by `other_rule`, which is as likely [-].
     """
 
     source: str
@@ -89,7 +75,7 @@ class PhaseData:
     sigma: Floats | None
     integral: float
     unit: str
-    spans: tuple[Span, ...]
+    spans: list[dict[str, Any]]
 
     @cached_property
     def table(self) -> Tabulated:
@@ -182,7 +168,7 @@ def read_phase(path: Path) -> PhaseData:
     )
 
 
-def _spans(angles: Floats, values: Floats) -> tuple[Span, ...]:
+def _spans(angles: Floats, values: Floats) -> list[dict[str, Any]]:
     """Spans without rows, of rows (n,) in [rad] and [1/sr] whose integral is 1."""
     u, f, t = 2 * np.sin(angles / 2) ** 2, 2 * np.pi * values, np.linspace(0.0, 1.0, 1001)
     below = Tabulated.through(angles, values).below(u)
@@ -204,10 +190,7 @@ def _spans(angles: Floats, values: Floats) -> tuple[Span, ...]:
         found.append(
             (angles[-1], np.pi, 1 - below[-1], "the last value", power, f"the power law of the last {WIDEST:g} degrees")
         )
-    return tuple(
-        Span(float(np.degrees(low)), float(np.degrees(high)), float(share), rule, float(other), other_rule)
-        for low, high, share, rule, other, other_rule in found
-    )
+    return [dict(zip(SPAN, (np.degrees(low), np.degrees(high), *rest), strict=True)) for low, high, *rest in found]
 
 
 def _header(path: Path, at: int, line: str) -> dict[str, str]:

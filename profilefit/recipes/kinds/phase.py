@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -181,7 +181,7 @@ def described(data: PhaseData) -> dict[str, Any]:
         "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
         "integral": data.integral,
         "unit": data.unit,
-        "spans": [asdict(span) for span in data.spans],
+        "spans": data.spans,
         "mean_cosine": data.mean_cosine,
         "backscattered": data.backscattered,
         "second": float(data.table.moment(2)),
