@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections import namedtuple
 from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
@@ -36,28 +37,13 @@ LEAST_STRETCH = 1e-3  # keeps the guess positive
 MOST_WHITE = 16.0  # keeps the guess finite in dark media, where the tail that it is made for is not reached
 
 
-class ShapeCoefficients(NamedTuple):
+class ShapeCoefficients(
+    namedtuple("ShapeCoefficients", "m0 m1 m2 a0 a1 a2 a3 b0 b1 b2 c0 c1 c2 once_h once_a once_b")  # each a Number
+):
     """A law at one index and g: m, a, b and c of the light scattered again, h, a and b of that scattered once.
 
     once_h [mfp], once_a [1/mfp], once_b [1/mfp^2]; the others as they stand in the class
     """
-
-    m0: Number
-    m1: Number
-    m2: Number
-    a0: Number
-    a1: Number
-    a2: Number
-    a3: Number
-    b0: Number
-    b1: Number
-    b2: Number
-    c0: Number
-    c1: Number
-    c2: Number
-    once_h: Number
-    once_a: Number
-    once_b: Number
 
 
 class Parts(NamedTuple):
