@@ -225,8 +225,7 @@ def _fit_phase(
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
         from profilefit.recipes.kinds.phase import content, fits_of, request
-        from profilefit.recipes.phases.data import read_phase
-        from profilefit.recipes.phases.fit import ALL_ANGLES
+        from profilefit.recipes.phases import ALL_ANGLES, read_phase
         from profilefit.report.kinds import phase_tables, premise_lines
 
     accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.media.fresnel import fresnel
 from profilefit.laws.stack import StackLaw
-from profilefit.recipes.stack.gaussians import medium_gaussians
+from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, of_gaussians, of_table, once
@@ -95,7 +95,7 @@ def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple
         return alone(kind, of_table(table, plates), request.mfp)
     name, _, count = kind.partition(":")
     if name == GAUSSIANS:
-        sums = [medium_gaussians(medium, light, int(count)) for medium in request.media]
+        sums = [shared_gaussians((medium,), light, int(count))[0] for medium in request.media]
         return alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     return technique(request.changed(technique={"kind": kind}), laws)
 

@@ -10,7 +10,7 @@ from functools import partial
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws import MAPS
-from profilefit.laws.entry import EVERYWHERE
+from profilefit.laws.base import EVERYWHERE
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records

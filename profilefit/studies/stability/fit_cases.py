@@ -23,7 +23,7 @@ from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.fitting.staged import fit_per_albedo
 from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.laws.liang import Liang
-from profilefit.recipes.starts import spread_out
+from profilefit.recipes.checks import spread_out
 
 Floats = NDArray[np.float64]
 ALBEDOS, RINGS = 8, 40

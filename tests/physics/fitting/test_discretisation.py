@@ -5,7 +5,7 @@ import pytest
 
 from profilefit.fitting.estimate import fit, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.summary import by_width, discretisation_error, widened
+from profilefit.recipes.checks import by_width, discretisation_error, widened
 
 pytestmark = pytest.mark.slow
 

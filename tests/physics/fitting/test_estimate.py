@@ -19,7 +19,7 @@ from profilefit.fitting.estimate import (
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 
 REPLICATES = 200
 

@@ -43,7 +43,7 @@ from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record
 from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.kinds import gaussians, phase, stack
-from profilefit.recipes.phases.data import read_phase
+from profilefit.recipes.phases import read_phase
 from profilefit.recipes.stack.file import read_layers
 from profilefit.report.page.document import write_page
 from profilefit.report.tables.claims_table import read_claims

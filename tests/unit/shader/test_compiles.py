@@ -8,7 +8,7 @@ import pytest
 
 from profilefit.errors import InputError, ShaderError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.diffusion import BeamDiffusion
 from profilefit.recipes import catalogue
 from profilefit.scenes.fur.source import strand_text
 from profilefit.scenes.sea.source import blur_text, segment_text

@@ -5,13 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit.laws.beam_diffusion import BeamDiffusion
 from profilefit.laws.burley import BurleyDiffuseMfp
-from profilefit.laws.diffusion import DiffusionLaw
+from profilefit.laws.diffusion import BeamDiffusion, DiffusionLaw
 from profilefit.laws.gaussians import law_class
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 from profilefit.laws.quantile import Quantile
 from profilefit.recipes import catalogue
 from profilefit.shader import emit

@@ -1,4 +1,7 @@
-"""Errors of sums of Gaussians, on light of known noise and misfit; weights that are 0; the quality of a sum."""
+"""Sums of Gaussians of a stack: a sum is found again, light is as near as more of them come, and errors are right.
+
+Errors are those on light of known noise and misfit; weights may be 0; and the quality of a sum.
+"""
 
 from dataclasses import replace
 
@@ -8,9 +11,14 @@ import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium
+from profilefit.errors import InputError
 from profilefit.recipes.stack import gaussians
-from profilefit.recipes.stack.gaussians import SumLight, joint, refitted, ring_shares
+from profilefit.recipes.stack.gaussians import SumLight, fitted, joint, refitted, ring_shares, shared_sum
 
+HEART, BLUE = (
+    Medium((Layer(1.4, mu_a, mu_s, 0.0, 0.3), Layer(1.4, below, scattered, 0.0)))
+    for mu_a, mu_s, below, scattered in ((0.20, 2.2, 0.80, 1.2), (0.35, 2.6, 1.2, 1.3))
+)
 MEDIA = tuple(Medium((Layer(1.4, mu_a, 1.0, 0.0, 0.5), Layer(1.4, 0.3, 1.0, 0.0))) for mu_a in (0.02, 0.1))
 EDGES = np.geomspace(0.02, 8.0, 61)
 VARIANCES = np.array([0.01, 0.3, 6.0])
@@ -32,6 +40,82 @@ def lights_of(variances=VARIANCES, weights=WEIGHTS, noise=0.0, random=None):
 
 def constants(found):
     return np.append(found.variances, found.weights)
+
+
+def off(light, variances, weights):
+    """Relative errors of rings."""
+    return ring_shares(light.edges, variances) @ weights * light.whole / light.energy - 1.0
+
+
+def test_a_sum_is_found_again():
+    light = lights_of()[0]
+    best = fitted([light], 3)
+    variances, (weights,) = shared_sum(best.parameters)
+    np.testing.assert_allclose(variances, VARIANCES, rtol=1e-4)
+    np.testing.assert_allclose(weights, WEIGHTS[0], rtol=1e-4)
+    assert fitted([light], 2).cost > 1e4 * best.cost  # two are not three
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("illumination", ["diffuse", "searchlight"])
+def test_more_of_them_are_nearer(illumination):
+    (light,), rel = gaussians.lights_of((HEART,), illumination), []
+    for count in (2, 4, 6):
+        variances, (weights,) = shared_sum(fitted([light], count).parameters)
+        assert sum(weights) == pytest.approx(1.0)
+        assert np.all(np.diff(variances) > 0)
+        rel.append(float(np.mean(np.abs(off(light, variances, weights)))))
+    assert rel[0] > 0.4 > rel[1] > 0.1 > rel[2] > 0.02
+
+
+@pytest.mark.slow
+def test_colours_share_their_variances():
+    """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
+    both = gaussians.shared_gaussians((HEART, BLUE), "diffuse", 4)
+    units = [medium.layers[0].mfp for medium in (HEART, BLUE)]
+    first, second = (np.array(one.variance) * unit**2 for one, unit in zip(both, units, strict=True))
+    np.testing.assert_allclose(first, second, rtol=1e-12)
+    for light, one in zip(gaussians.lights_of((HEART, BLUE), "diffuse"), both, strict=True):
+        alone = fitted([light], 4).cost
+        assert alone < np.sum((light.weight * off(light, first, np.array(one.weight))) ** 2) < 1.5 * alone
+
+
+def test_many_fixed_ones_are_exact_light():
+    """Of two colours at once, and far nearer than six that are fitted."""
+    lights = gaussians.lights_of((HEART, BLUE), "diffuse")
+    variances, weights = gaussians.dense(lights)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    assert np.all(weights >= 0)
+    assert variances.size < 30
+    for light, own in zip(lights, weights, strict=True):
+        apart = off(light, variances, own)
+        assert np.sqrt(np.mean(apart**2)) < 1e-3
+        assert np.abs(apart).max() < 3e-3
+    six = joint(lights, 6)
+    assert np.sqrt(np.mean(off(lights[0], six.variances, six.weights[0]) ** 2)) > 0.02
+
+
+def test_counts_are_checked():
+    for count in (0, 9, True, 2.5):
+        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
+            gaussians.shared_gaussians((HEART,), "diffuse", count)
+
+
+@pytest.mark.slow
+def test_light_that_is_traced():
+    """Of layers that scatter forward; the similar stack's sum is another."""
+    forward = Medium(tuple(Layer(1.4, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
+    light, similar = (gaussians.lights_of((medium,), "searchlight")[0] for medium in (forward, HEART))
+    assert np.mean(light.noise) < 0.05
+    best = fitted([light], 8)
+    counts = light.weight > 0
+    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
+    variances, (weights,) = shared_sum(fitted([similar], 8).parameters)
+    lost = ring_shares(light.edges, variances) @ weights * similar.whole / light.energy - 1.0
+    assert np.mean(np.abs(lost[counts])) > 0.5
+
+
+# Errors
 
 
 def test_derivatives_are_those_of_the_formula():
