@@ -22,8 +22,7 @@ from mcml_sim.exact.light import unreduced
 from mcml_sim.media.checks import checked_numbers
 from profilefit.errors import InputError
 from profilefit.laws import published
-from profilefit.laws.chiang import Chiang
-from profilefit.laws.van_de_hulst import VanDeHulst
+from profilefit.laws.printed_maps import Chiang, VanDeHulst
 
 Floats = NDArray[np.float64]
 # Below this A the root is sought in alpha, above it in sqrt(1 - alpha): each is where A has a finite slope.

@@ -49,7 +49,7 @@ from profilefit.convert.lengths import (
     transport,
     unreduced_path,
 )
-from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.diffusion import BeamDiffusion
 
 Floats = NDArray[np.float64]
 Colour = Callable[[Floats, float, float], Floats]  # of reduced albedo, index n of the surface, and g

@@ -44,8 +44,8 @@ from mcml_sim import exact
 from mcml_sim.exact import forwards
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.forwards import decay_rate
+from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated, unreduced
 from mcml_sim.files.npz import kept
 from mcml_sim.media.setting import FORWARD_N, Setting

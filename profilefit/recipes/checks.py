@@ -24,8 +24,16 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from mcml_sim import Orders
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, Fit, ResidualFunction, fit, judged, misfit_covariance
-from profilefit.fitting.objectives import Rings, rings_of
+from profilefit.fitting.estimate import (
+    JACKKNIFE_GROUPS,
+    Fit,
+    ResidualFunction,
+    Rings,
+    fit,
+    judged,
+    misfit_covariance,
+    rings_of,
+)
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws.base import Constants

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Orders, Setting, exact
-from profilefit.fitting import derived
 from profilefit.fitting.chains import LEVELS, Posterior, posterior
-from profilefit.fitting.discrepancy import discrepancy
+from profilefit.fitting.discrepancy import LawWithErrors, discrepancy
+from profilefit.fitting.discrepancy import summary as quantities
 from profilefit.fitting.estimate import Fit, fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import profile_quality
@@ -215,7 +215,8 @@ def description(recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit)
         "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
     }
     if result.solution.converged:
-        content["derived"] = derived.summary(derived.LawWithErrors.of_fit(result, off), profiles)
+        known = LawWithErrors(result.law, result.free, result.objective, result.statistical, off)
+        content["derived"] = quantities(known, profiles)
     if profiles.covariance is not None:
         content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
         # Of what rests on too few effective photons: rings, where the objective sees rings, and whole albedos.

@@ -1,7 +1,7 @@
 """Bounds of the error of float32, a tenth of the model's own, which its record states; where a law holds, and promises.
 
 What lies outside of where a law holds is counted apart and breaks nothing. What its paper promises of printed constants
-is measured in float64, where rounding is no excuse; equation numbers are those of `laws.liang` and `laws.liang_albedo`.
+is measured in float64, where rounding is no excuse; equation numbers are those of `laws.liang` and `laws.printed_maps`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
-from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.entry import EVERYWHERE, Entry, Range
+from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Range
 from profilefit.laws.liang import Liang
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records, record_setting

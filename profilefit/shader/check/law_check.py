@@ -26,8 +26,7 @@ from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
-from profilefit.laws.base import ProfileLaw
-from profilefit.laws.entry import Range
+from profilefit.laws.base import ProfileLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record import Folder

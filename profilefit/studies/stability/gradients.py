@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.laws.entry import Range
+from profilefit.laws.base import Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Cells, Mask, axis

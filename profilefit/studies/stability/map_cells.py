@@ -15,8 +15,7 @@ from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
-from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.entry import Range
+from profilefit.laws.base import AlbedoLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds

@@ -66,7 +66,7 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
 
 def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
-    chosen = replace(recipe.find("burley-whole", FITS), setting=Setting("diffuse", n=1.4))
+    chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
     law = starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
@@ -89,7 +89,7 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
 )
 def test_what_a_recipe_must_name(change, words):
     with pytest.raises(RecipeError, match=words):
-        require_known(replace(recipe.find("burley-whole", FITS), **change))
+        require_known(recipe.find("burley-whole", FITS).changed(**change))
 
 
 def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
@@ -106,15 +106,15 @@ def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
 
 def test_printed_sets_are_those_of_the_recipes_setting():
     burley = recipe.find("burley-whole", FITS)
-    searchlight, diffuse = printed_sets(burley), printed_sets(replace(burley, setting=Setting("diffuse")))
+    searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
     assert searchlight["published"]["s0"] == 1.85
     assert diffuse["published"]["s0"] == 1.9
-    assert printed_sets(replace(burley, setting=Setting(n=1.4))) == {}
+    assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
     assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
 
 
 def test_who_needs_photons():
-    orders, exactly = recipe.find("albedo-liang", FITS), replace(recipe.find("albedo-rational", FITS), check="")
+    orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
     assert needs_photons(orders)
     assert not needs_photons(exactly)
-    assert needs_photons(replace(exactly, check="orders"))
+    assert needs_photons(exactly.changed(check="orders"))
