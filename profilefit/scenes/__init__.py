@@ -58,7 +58,7 @@ SCENES = {
 SOURCES = {
     "sea-segment": ("of light in water", "profilefit.scenes.sea.source"),
     ".toml": ("of light in water", "profilefit.scenes.sea.source"),
-    "fur": ("of fur", "profilefit.scenes.fur.source"),
+    "fur": ("of fur", "profilefit.scenes.fur.law"),
 }
 
 __all__ = [

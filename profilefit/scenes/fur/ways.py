@@ -43,30 +43,15 @@ SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
 
 
-class SweptError(NamedTuple):
-    """Error of swept slabs: rms of the heights of hits over L = size y^steep q^thick, and errors of the constants.
-
-    y = |L tan(theta) - lean| sqrt(n) / N, how many strands' distances a ray moves aside in a slab;  q = r0 sqrt(n)
-    scatter  standard deviation that is left in the logarithm, over 63 furs and angles
-    """
-
-    size: float
-    steep: float
-    thick: float
-    errors: tuple[float, float, float]
-    scatter: float
-
-
-# By the strands that a slab tests. `python -m benchmarks.fur --only swept` fits them again.
-SWEPT_ERRORS = {
-    1: SweptError(0.0316, 1.70, -0.69, (0.0014, 0.08, 0.04), 0.25),
-    2: SweptError(0.0110, 2.36, -0.67, (0.0010, 0.13, 0.05), 0.30),
-}
+# Error of swept slabs by the strands that one tests: rms of the heights of hits over L = size y^steep q^thick, q =
+# r0 sqrt(n), y = |L tan(theta) - lean| sqrt(n) / N, how many strands' distances a ray moves aside in a slab. Over 63
+# furs and angles ln rms scatters by .25 and .30 (`python -m benchmarks.fur --only swept` fits them again).
+SWEPT_ERRORS = {1: (0.0316, 1.70, -0.69), 2: (0.0110, 2.36, -0.67)}
 ERRORS, THICK = (0.01, 0.1), (0.2, 0.6)  # rms and r0 sqrt(n) that they are fitted to
 
 
 def swept_layers(goal: float, density: float, radius: float, aside: float, tested: int = 1) -> int:
-    """Return the swept slabs for an error, by `SweptError`; scatter is a factor of 1.3 in error, 1.2 in layers.
+    """Return the swept slabs for an error, by `SWEPT_ERRORS`; scatter is a factor of 1.3 in error, 1.2 in layers.
 
     goal    root mean square error of the heights of hits over the length, 0.01 to 0.1 [-]
     aside   of a ray from the tips to the skin, |L tan(theta) - lean| > 0;  density [1/length^2], radius [length]
@@ -74,17 +59,15 @@ def swept_layers(goal: float, density: float, radius: float, aside: float, teste
 
     InputError where r0 sqrt(n) is beyond 0.2 to 0.6. Rays say it of any fur: `trial`, `least_layers`.
     """
-    of = SWEPT_ERRORS[checked_whole("tested", tested, 1, 2)]
-    numbers = {"goal": goal, "density": density, "radius": radius, "aside": aside}
-    for name, value in numbers.items():
+    size, steep, thick_power = SWEPT_ERRORS[checked_whole("tested", tested, 1, 2)]
+    for name, value in (("goal", goal), ("density", density), ("radius", radius), ("aside", aside)):
         if not (is_number(value) and 0 < value < np.inf):
             raise InputError(f"{name} must be a finite number > 0, got {shown(value)}")
     thick = float(radius * density**0.5)
     for what, value, (low, high) in (("goal", goal, ERRORS), ("radius sqrt(density)", thick, THICK)):
         if not low <= value <= high:
             raise InputError(f"{what} must be in [{low:g}, {high:g}], got {value:g}")
-    y = (goal / (of.size * thick**of.thick)) ** (1.0 / of.steep)
-    return int(np.ceil(aside * density**0.5 / y))
+    return int(np.ceil(aside * density**0.5 / (goal / (size * thick**thick_power)) ** (1.0 / steep)))
 
 
 @dataclass(frozen=True, eq=False)

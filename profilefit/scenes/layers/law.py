@@ -39,9 +39,7 @@ from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
-from profilefit.recipes.stack.fit import stack_law
-
-__all__ = ["Plate", "beams", "plate_of", "single_scattering", "stack_law"]
+from profilefit.recipes.stack.fit import stack_law as stack_law
 
 Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4

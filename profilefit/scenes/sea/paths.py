@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
-from profilefit.scenes.sea.hits import first_hit
 from profilefit.scenes.sea.truth import Photons, boxes
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves, refracted
+from profilefit.scenes.sea.waves import Waves, first_hit, newton_hit, refracted
 
 Floats = NDArray[np.float64]
 LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile
@@ -245,12 +244,7 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
         return found
     steep = surface.steepest * np.hypot(way[:, 0], way[:, 1]) > ONCE * np.abs(way[:, 2])
     once, often = np.flatnonzero(~steep), np.flatnonzero(steep)
-    k, start, along = found[once], place[once], way[once]
-    for _ in range(NEWTON):
-        x, y, z = (start + k[:, None] * along).T
-        slope = surface.slope(x, y)
-        gap, rate = z - surface.height(x, y), along[:, 2] - slope[0] * along[:, 0] - slope[1] * along[:, 1]
-        k = k - gap / rate
+    k = newton_hit(surface.height, surface.slope, place[once], way[once], found[once], NEWTON)
     found[once] = np.maximum(k, 0.0)
     if len(often):
         flip = np.array([1.0, 1.0, -rises])

@@ -22,12 +22,9 @@ Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
 PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
 MOST_SAMPLES = 2**23
 HALVINGS = 60  # of a bracket, until its ends are neighbours in floating point
-SUNS = 32  # directions within the sun's disc, in the plane of the waves
 # Central differences of eighth order (Fornberg, Mathematics of Computation 51, 1988, table 1).
 FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
-# Gauss's points and weights on [0, 1], of the flux between two samples.
-GAUSS = [(0.5 * (1.0 + point), 0.5 * weight) for point, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)]
 BRIGHT, DARK = 2.0, 0.6  # of the mean
 FEW, EXTREME = 0.01, 0.05  # shares of pixels: where fewer are bright, or dark, so many of the extremest count as that
 
@@ -54,7 +51,7 @@ def caustic_irradiance(
     The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
     Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
     """
-    rays = _Rays(surface, _finite("x", x), depth, tilt, n, slope, curvature, spacing)
+    rays = Rays(surface, _finite("x", x), depth, tilt, n, slope, curvature, spacing)
     where = np.asarray(x, float)
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)
@@ -64,41 +61,11 @@ def caustic_irradiance(
     return float(found) if found.ndim == 0 else found
 
 
-def caustic_boxes(
-    surface: Surface,
-    edges: ArrayLike,
-    depth: float,
-    tilt: float,
-    n: float,
-    *,
-    sun: float = 0.0,
-    slope: Surface | None = None,
-    curvature: Surface | None = None,
-    spacing: float | None = None,
-) -> Floats:
-    """Return that irradiance (m,) [-] averaged over pixels between edges (m + 1,); others as of `caustic_irradiance`.
+class Rays:
+    """Rays that a surface sends to a floor, between the places from where they can come to these x.
 
-    sun  half-width of its even disc in air, `SUN` of the real one [rad]: averaged over 32 directions of it in the
-         plane of the waves, weighted by the disc's chords (Chebyshev's points of the second kind)
-
-    Exact: the flux between two edges is that between the places whose rays come to them, so folds need no care.
+    aside  of the sun from `tilt` [rad], which may leave its range
     """
-    border = _finite("edges", edges)
-    if border.ndim != 1 or border.size < 2 or not np.all(np.diff(border) > 0):
-        raise InputError(f"edges must be two numbers or more, each above the one before [m], got {shown(edges)}")
-    if not is_number(sun) or not 0.0 <= sun < 0.1:
-        raise InputError(f"sun must be a half-width in radians, in [0, 0.1), got {shown(sun)}")
-    angles = np.pi * np.arange(1, SUNS + 1) / (SUNS + 1)
-    offsets, weights = (np.cos(angles), np.sin(angles) ** 2) if sun else (np.zeros(1), np.ones(1))
-    found = np.zeros(border.size - 1)
-    for offset, weight in zip(offsets.tolist(), (weights / weights.sum()).tolist(), strict=True):
-        rays = _Rays(surface, border, depth, tilt, n, slope, curvature, spacing, sun * offset)
-        found += weight * np.diff(rays.flux_before(border)) / np.diff(border)
-    return found
-
-
-class _Rays:
-    """Rays that a surface sends to a floor, between the places from where they can come to these x."""
 
     def __init__(
         self,
@@ -107,9 +74,9 @@ class _Rays:
         depth: float,
         tilt: float,
         n: float,
-        slope: Surface | None,
-        curvature: Surface | None,
-        spacing: float | None,
+        slope: Surface | None = None,
+        curvature: Surface | None = None,
+        spacing: float | None = None,
         aside: float = 0.0,
     ):
         self.depth, self.tilt, self.n = checked_sun(depth, tilt, n)
@@ -139,8 +106,6 @@ class _Rays:
         self.nodes = self._with_folds(nodes, stretch)
         self.landing = self.at(self.nodes)[0]
         self._before = np.maximum.accumulate(self._across(self.nodes))
-        through = self._through(self.nodes[:-1], self.nodes[1:])
-        self._cumulated = np.concatenate([[0.0], np.cumsum(through)])
 
     def at(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return where rays of places on the surface land [m], dX/dx [-], and flux per horizontal area [-]."""
@@ -188,29 +153,10 @@ class _Rays:
                     break
         return target, place, rises
 
-    def flux_before(self, x: Floats) -> Floats:
-        """Return flux that lands below each x, but for one constant [m]."""
-        target, place, rises = self.arrivals(x)
-        signed = np.where(rises, 1.0, -1.0) * self._sent(place)
-        return np.bincount(target, signed, x.size).astype(float)
-
     def is_lit(self, x: Floats) -> NDArray[np.bool_]:
         """Return whether no crest is in the way: the place is farther across the rays than all before it."""
         cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 1)
         return self._across(x) >= self._before[cell]
-
-    def _sent(self, x: Floats) -> Floats:
-        """Return flux through the surface from the first sample to x, what crests shade taken off [m]."""
-        cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 2)
-        return self._cumulated[cell] + self._through(self.nodes[cell], x)
-
-    def _through(self, near: Floats, far: Floats) -> Floats:
-        found = np.zeros_like(near)
-        for point, weight in GAUSS:
-            here = near + point * (far - near)
-            flux = self.at(here)[2]
-            found += weight * np.where(self.is_lit(here), flux, 0.0)
-        return found * (far - near)
 
     def _across(self, x: Floats) -> Floats:
         """Return the distance across the rays [m], the same all along one."""

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.fur.law import shadow, shell_shadow
-from profilefit.scenes.fur.source import strand_text
+from profilefit.scenes.fur.law import shadow, shell_shadow, strand_text
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, LayerTechnique, trial
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative

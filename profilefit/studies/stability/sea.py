@@ -7,17 +7,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
 from profilefit.scenes.sea.scene import PHASE, lobes_of
 from profilefit.scenes.sea.source import segment_text
-from profilefit.scenes.sea.waves import Waves, random_floor
+from profilefit.scenes.sea.waves import Waves, first_hit, random_floor, wrong_shares
 from profilefit.studies.stability.cells import NAME, Cells, RoundedText, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
 SHARE, BEAM, SEGMENT = "rays with a wrong hit", "beam, cw 0.1", "segment"  # quantities
-# Searches of a hit, as `hits.wrong_shares` calls them, 3 iterations each; the first three are ours.
+# Searches of a hit, as `waves.wrong_shares` calls them, 3 iterations each; the first three are ours.
 WAYS: dict[str, int | str] = {
     "16 steps": 16,
     "8 steps": 8,

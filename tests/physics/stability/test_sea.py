@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from profilefit.scenes.sea.hits import first_hit
+from profilefit.scenes.sea.waves import first_hit
 from profilefit.studies.stability import sea
 from profilefit.studies.stability.cells import Verdict
 from profilefit.studies.stability.regions import regions_of

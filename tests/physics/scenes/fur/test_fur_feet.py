@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from benchmarks.fur_feet import FEET, shared_shadow
 from benchmarks.fur_patches import spaced_patch, tufted_patch
 from profilefit.errors import InputError
-from profilefit.scenes.fur.law import feet_factor, shadow, shared_shadow, visibility
+from profilefit.scenes.fur.law import shadow, visibility
 from profilefit.scenes.fur.truth import (
     Patch,
     by_shells,
@@ -101,7 +102,7 @@ def test_factors_of_feet_are_those_of_rays():
     ):
         z = 0.6
         seen = np.mean([cast(p, theta, rays(p, 1500, i)) <= z for i, p in enumerate(map(make, range(8)))])
-        factor = feet_factor(feet, 0.05 * 8.0 * (1.0 - z))
+        factor = FEET[feet].factor(0.05 * 8.0 * (1.0 - z))
         assert -np.log(seen) == pytest.approx(-np.log(visibility(64.0 * factor, 0.05, 1.0, theta, z)), rel=0.08)
         assert abs(factor - 1.0) > 0.1
 
@@ -160,10 +161,6 @@ def test_alike_leans_are_one_lean():
         (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 0, 0.1), "each must be a whole number >= 1, got 0"),
         (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 3, -0.1), "spread must be a finite length >= 0, got -0.1"),
         (lambda: tufted_patch(1e9, 0.1, 1.0, 1.0, 3, 0.1), "density must be a number > 0 of 1048576 strands at most"),
-        (lambda: feet_factor("fog", 0.2), "feet must be one of apart, tufts, got 'fog'"),
-        (lambda: feet_factor("apart", 2.0), r"thick must be a number in \[0, 1\], got 2"),
-        (lambda: shared_shadow(0.05, 1.0, 0.3, 0.3, 4.0), r"turn must be an angle in \[0, pi\] radians, got 4"),
-        (lambda: shared_shadow(0.05, 1.0, 0.3, 2.0), r"theta must be an angle in \[0, pi / 2\) radians, got 2"),
         (lambda: Patch(np.zeros((3, 2)), 1.0, 0.1, 1.0, np.zeros((2, 2))), r"lean must be two numbers.*\(2, 2\)"),
     ],
 )

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.fur_feet import shared_shadow
 from profilefit.scenes.fur.ball import NOTHING, SKIN, FurView, random_ball
-from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow, shared_shadow
+from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow
 from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat, Shading
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera, Light

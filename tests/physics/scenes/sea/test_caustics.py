@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.sea_boxes import caustic_boxes
 from benchmarks.sea_filter import adaptive_filter, sigma
 from profilefit.errors import InputError
 from profilefit.scenes.sea.caustics import Caustics, Splat, caustic_map, focus, splat_for
-from profilefit.scenes.sea.hits import first_hit
-from profilefit.scenes.sea.truth import caustic_boxes, caustic_photons, misfit, photons
-from profilefit.scenes.sea.waves import SUN, Waves, random_floor, random_sea, refracted
+from profilefit.scenes.sea.truth import caustic_photons, misfit, photons
+from profilefit.scenes.sea.waves import SUN, Waves, first_hit, random_floor, random_sea, refracted
 from profilefit.scenes.stage.renderer import Renderer
 
 TILE, DEPTH, N = 10.0, 5.0, 1.34

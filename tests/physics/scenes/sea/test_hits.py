@@ -5,9 +5,18 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.scenes.sea import hits
-from profilefit.scenes.sea.hits import dense_hit, first_hit, newton_hit, shah_hit, steepness, to_plane, wrong_shares
-from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
+from profilefit.scenes.sea import waves
+from profilefit.scenes.sea.waves import (
+    Waves,
+    dense_hit,
+    first_hit,
+    newton_hit,
+    random_floor,
+    random_sea,
+    refracted,
+    to_plane,
+    wrong_shares,
+)
 from profilefit.scenes.stage.renderer import float_texture
 from profilefit.shader.context import program
 from profilefit.shader.emit import text_beside
@@ -27,7 +36,7 @@ def lit_floor(steep, count=2000, seed=0):
     x, y, _ = refracted(np.radians(63.0), random_sea(0.15, TILE, seed).slope(*place.T), 1.34)
     ray = np.column_stack([x, y, -np.ones(count)]) / np.sqrt(1.0 + x**2 + y**2)[:, None]
     floor = random_floor(1.0, TILE, DEPTH, seed + 1)
-    floor = floor.scaled(steep / steepness(floor.steepest, ray).max())
+    floor = floor.scaled(steep / np.max(floor.steepest * np.hypot(x, y)))
     origin = np.column_stack([place, np.full(count, max(0.0, floor.highest))])
     return floor, origin, ray
 
@@ -117,7 +126,7 @@ def test_newton_is_exact_while_the_ray_hits_once():
         assert np.abs(safe - true).max() < 1e-13 * DEPTH
         assert np.abs(without - true).max() < 1e-13 * DEPTH
     assert np.abs(newton_hit(floor.height, floor.slope, origin, ray, 1.0) - true).max() > DEPTH
-    assert np.abs(shah_hit(floor.height, origin, ray, start) - true).max() > 0.001 * DEPTH
+    assert np.abs(newton_hit(floor.height, None, origin, ray, start) - true).max() > 0.001 * DEPTH
 
 
 FEEDBACK = """
@@ -142,11 +151,10 @@ void main() {
 
 def by_vertices(context, floor, origin, ray):
     """Newton's distance and the first hit, (n, 2), as a vertex shader finds them."""
-    texts = (text_beside(hits.__name__, f"glsl/{name}.glsl") for name in ("waves", "hits"))
+    texts = (text_beside(waves.__name__, f"glsl/{name}.glsl") for name in ("waves", "hits"))
     vertex = "\n".join(["#version 330", *texts, FEEDBACK])
     compiled = program(context, "hits", "#version 330\nvoid main() {}", vertex, varyings=["distance"])
-    waves = floor.texels
-    table = float_texture(context, (waves.shape[1], 1), 4, waves)
+    table = float_texture(context, (floor.texels.shape[1], 1), 4, floor.texels)
     table.use(0)
     compiled["floor_waves"], compiled["tile"] = 0, floor.tile
     compiled["bed"] = floor.mean, floor.lowest, floor.highest

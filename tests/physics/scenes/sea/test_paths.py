@@ -9,11 +9,10 @@ from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.scenes.sea import paths
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
-from profilefit.scenes.sea.hits import dense_hit, newton_hit, to_plane
 from profilefit.scenes.sea.paths import Sunlight, followed, met, traced
 from profilefit.scenes.sea.scene import lobes_of
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
+from profilefit.scenes.sea.waves import Waves, dense_hit, newton_hit, random_floor, random_sea, refracted, to_plane
 
 TILE, N, LIKE_AIR = 5.0, 1.34, 1.0 + 1e-7  # a world's water must be denser than the air
 MILD = ((1.0, 0.8),)

@@ -16,20 +16,15 @@ def sea():
     return random_sea(0.15, TILE, seed=3)
 
 
-def test_slope_and_curvature_are_derivatives(sea):
+def test_slopes_are_derivatives(sea):
     x, y = np.random.default_rng(0).uniform(0.0, TILE, (2, 200))
     step = 1e-4
     east, west, north, south = (
-        (sea.height(x + dx, y + dy), sea.slope(x + dx, y + dy))
-        for dx, dy in np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]) * step
+        sea.height(x + dx, y + dy) for dx, dy in np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]) * step
     )
     zx, zy = sea.slope(x, y)
-    zxx, zxy, zyy = sea.curvature(x, y)
-    np.testing.assert_allclose(zx, (east[0] - west[0]) / (2 * step), atol=1e-8)
-    np.testing.assert_allclose(zy, (north[0] - south[0]) / (2 * step), atol=1e-8)
-    np.testing.assert_allclose(zxx, (east[1][0] - west[1][0]) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(zyy, (north[1][1] - south[1][1]) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(zxy, (north[1][0] - south[1][0]) / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(zx, (east - west) / (2 * step), atol=1e-8)
+    np.testing.assert_allclose(zy, (north - south) / (2 * step), atol=1e-8)
 
 
 def test_lattice_is_height_and_slope_at_all_pairs(sea):
