@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.exact_table import LEAST_ALPHA, log_profile
+from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
 
 Floats = NDArray[np.float64]
 LIGHTS = ("searchlight", "diffuse")

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from mcml_sim import Medium, exact
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
-from profilefit.scenes.stage.exact_table import Curves, held, hermite, knots
+from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
 Floats = NDArray[np.float64]
 Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A

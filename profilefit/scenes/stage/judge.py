@@ -12,12 +12,11 @@ from scipy.ndimage import uniform_filter
 
 from mcml_sim import Setting
 from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.exact_table import CurveTable
+from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_integral import exitance_of, own_error
+from profilefit.scenes.stage.surface import exitance_of, own_error
 from profilefit.scenes.stage.technique import TechniquePair
 from profilefit.scenes.stage.world import Scene
 

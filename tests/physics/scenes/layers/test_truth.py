@@ -9,7 +9,7 @@ from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.errors import InputError
 from profilefit.scenes.layers import truth
 from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, exact_table
+from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, exact_table
 
 X = np.geomspace(0.01, 10.0, 60)  # r over the first layer's mean free path
 SEEN = 0.995  # of the light: farther out are the faintest parts of a picture

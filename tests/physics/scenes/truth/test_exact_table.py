@@ -8,8 +8,7 @@ import pytest
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError, SettingError
 from profilefit.scenes.skin.law import Separable
-from profilefit.scenes.stage.exact_law import ExactLaw
-from profilefit.scenes.stage.exact_table import exact_table
+from profilefit.scenes.stage.exact_law import ExactLaw, exact_table
 
 REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
 SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])

@@ -8,11 +8,9 @@ import pytest
 from mcml_sim import exact
 from profilefit.errors import InputError
 from profilefit.scenes.stage import buffers
-from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.exact_table import exact_table
+from profilefit.scenes.stage.exact_law import DIFFUSE, exact_table
 from profilefit.scenes.stage.step_edge import step_response
-from profilefit.scenes.stage.surface import Surface, View, seen
-from profilefit.scenes.stage.surface_integral import exitance_of, gathered, own_share, refined
+from profilefit.scenes.stage.surface import Surface, View, exitance_of, gathered, own_share, refined, seen
 
 VIEW = View(*np.diag([1.0, 1.0, -1.0]), pixel=0.5)
 MFP = np.array([1.5, 0.8, 2.2])
