@@ -21,11 +21,12 @@ from matplotlib import image
 
 from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
-from mcml_sim import Medium, exact
+from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.text_file import read_toml
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.layers import chart, scene
+from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
@@ -85,9 +86,17 @@ def shares() -> list[tuple[str, ...]]:
 
 
 def matter() -> list[tuple[str, ...]]:
-    """Return the error of one half space over thickness and the mean free path below."""
-    errors = chart.one_half_space_errors(THICKNESSES, MFPS)
-    return [(f"{d:g}", *(f"{100 * value:.2g}" for value in row)) for d, row in zip(THICKNESSES, errors, strict=True)]
+    """Return the error of the half space nearest to two layers over the first one's thickness and the mfp below.
+
+    As a share of white, albedos of .95 and .98 and n = 1.4; root mean square near a step edge of diffuse light; exact.
+    """
+
+    def layer(alpha: float, mfp: float, thickness: float) -> Layer:
+        return Layer(1.4, (1.0 - alpha) / mfp, alpha / mfp, 0.0, thickness)
+
+    media = [[Medium((layer(0.95, 1.0, d), layer(0.98, mfp, np.inf))) for mfp in MFPS] for d in THICKNESSES]
+    errors = [[100 * one_half_space(medium).error for medium in row] for row in media]
+    return [(f"{d:g}", *(f"{value:.2g}" for value in row)) for d, row in zip(THICKNESSES, errors, strict=True)]
 
 
 def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Error against cost of each technique for layers, and error of one half space: points and maps for a report."""
+"""Error against cost of each technique for layers, and the shares of their light."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcml_sim import Layer, Medium, exact
+from mcml_sim import Medium, exact
 from mcml_sim.media.fresnel import fresnel
 from profilefit.laws.stack import StackLaw
 from profilefit.recipes.stack.gaussians import medium_gaussians
-from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, of_gaussians, of_table, once
 from profilefit.scenes.layers.scene import LayersRequest, laws_of, reference, technique
@@ -23,7 +21,6 @@ from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import TechniquePair, alone
 
-Floats = NDArray[np.float64]
 TABLE, GAUSSIANS = "exact table", "gaussians"
 
 
@@ -51,22 +48,6 @@ def split(medium: Medium, illumination: str = "searchlight") -> Split:
         first = float(once(medium, np.array([1.0]))[0])
         mirror = float(fresnel(medium.n_above, medium.layers[0].n, 1.0)[0])
     return Split(first, max(light.reflectance - first, 0.0), mirror)
-
-
-def one_half_space_errors(
-    thicknesses: Sequence[float], mfps: Sequence[float], above: float = 0.95, below: float = 0.98, n: float = 1.4
-) -> Floats:
-    """Return the error of the one half space nearest to two layers, as a share of white: (thicknesses, mfps).
-
-    thicknesses  of the first layer, mfps of what lies below, both in mean free paths of the first
-    above, below  albedos [-];  n  of both. Root mean square near a step edge of diffuse light; exact.
-    """
-    return np.array(
-        [
-            [one_half_space(Medium((_layer(n, above, 1.0, d), _layer(n, below, mfp, np.inf)))).error for mfp in mfps]
-            for d in thicknesses
-        ]
-    )
 
 
 def ways(
@@ -99,7 +80,3 @@ def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple
         sums = [medium_gaussians(medium, light, int(count)) for medium in request.media]
         return alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     return technique(replace(request, kind=kind), laws)
-
-
-def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:
-    return Layer(n, (1.0 - alpha) / mfp, alpha / mfp, 0.0, thickness)

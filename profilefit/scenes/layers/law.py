@@ -48,15 +48,16 @@ STEP = 1e-6  # of ln of a constant, for derivatives
 
 
 class Beam(NamedTuple):
-    """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-]."""
+    """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-].
+
+    sine, cosine  of its angle to the normal in the layer; sine is above 1 where no light of that direction gets there
+    down, up      share that passes the layer's top on its way down, and its bottom on its way up, as often as it does
+    """
 
     sine: Floats
-    """Sine of its angle to the normal in the layer; above 1 where no light of that direction gets there."""
     cosine: Floats
     down: Floats
-    """Share that passes the layer's top on its way down, as often as it does."""
     up: Floats
-    """Share that passes the layer's bottom on its way up, as often as it does."""
 
 
 def single_scattering(

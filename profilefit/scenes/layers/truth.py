@@ -44,11 +44,6 @@ class StackTable:
     reflectance: tuple[CubicSpline, ...]
     kappa: tuple[float, ...]
 
-    def colour(self, values: ArrayLike) -> Floats:
-        """Return A [-] of red, green and blue along a last axis, at values in [0, 1] of any shape."""
-        u = self._place(np.asarray(values, float))
-        return np.stack([spline(u) for spline in self.reflectance], axis=-1)
-
     def curves(self, values: ArrayLike, /) -> Curves:
         """Return the curves, as `CurveTable.curves`."""
         given, y = np.asarray(values, float), knots()

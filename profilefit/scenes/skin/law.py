@@ -29,7 +29,6 @@ from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
 
 Floats = NDArray[np.float64]
-CHANNELS = ("red", "green", "blue")
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,7 @@ D_EON = SkinGaussians(
         (0.078, 0.0, 0.0),
     ),
 )
-FALLOFF = (1.0, 0.37, 0.3)
-"""Default of the authors' code for red, green, blue."""
+FALLOFF = (1.0, 0.37, 0.3)  # default of the authors' code for red, green, blue
 
 
 def separable(falloff: tuple[float, float, float] = FALLOFF) -> SkinGaussians:
@@ -89,8 +87,6 @@ REACH, SHORT_REACH, MANY = 3.0, 2.0, 20
 # What the five Gaussians of the kernel hold of the red skin profile; the sixth and narrowest is light that comes
 # straight back.
 STRENGTH = float(np.sum(D_EON.weights, axis=0)[0] - D_EON.weights[0][0])
-PUBLISHED_STRENGTH = (0.48, 0.41, 0.28)
-"""The default of the authors' code for red, green, blue: an artist's choice, too weak for a width to be matched."""
 DARKEST = 1e-4  # an albedo below has no light to blur; its width is that of this one
 # Share of a tap that its depth takes, per depth in units of the kernel: the authors' 300 / tan(10 degrees) times a
 # width of 0.0125 scene units, the middle of their slider, of which the kernel's unit is a third.

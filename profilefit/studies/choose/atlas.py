@@ -8,8 +8,7 @@ import moderngl
 import numpy as np
 
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
-from profilefit.scenes.heart.chart import SURE
-from profilefit.scenes.heart.law import occlusion_error
+from profilefit.scenes.heart.chart import SURE, occlusion_error
 from profilefit.scenes.heart.meshes import CHARTS_END, off_edges
 from profilefit.scenes.heart.passes import ATLAS, Balanced
 from profilefit.scenes.heart.scene import HeartRequest, light_of, staged

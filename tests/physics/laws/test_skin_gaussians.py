@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from profilefit.scenes.skin.law import CHANNELS, D_EON, separable
+from profilefit.materials import CHANNELS
+from profilefit.scenes.skin.law import D_EON, separable
 
 # d'Eon and Luebke, GPU Gems 3, ch. 14: variance [mm^2], weights of red, green, blue.
 PRINTED = """
