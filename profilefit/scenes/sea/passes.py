@@ -17,7 +17,7 @@ from profilefit.scenes.sea.law import water_gaussians
 from profilefit.scenes.sea.water import World
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass, Read, Renderer
-from profilefit.scenes.stage.world import Camera, unit
+from profilefit.scenes.stage.world import Camera, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 Floats = NDArray[np.float64]
@@ -34,11 +34,9 @@ CONE = 512  # angles of that light to the vertical
 class SeaIrradiance(NamedTuple):
     """Light of red, green and blue (3,).
 
-    Attributes:
-        sun, sky: that come in, per horizontal area.
-        sky_on_floor: share of the sky's that comes to the floor [-].
-        interreflection: irradiance of the floor by its own light, which the surface mirrors.
-        exitance: mean radiant exitance of the floor.
+    sun, sky      that come in, per horizontal area;  sky_on_floor  share of the sky's that comes to the floor [-]
+    interreflection  irradiance of the floor by its own light, which the surface mirrors
+    exitance      mean radiant exitance of the floor
     """
 
     sun: Floats
@@ -51,10 +49,8 @@ class SeaIrradiance(NamedTuple):
 class SeaPasses:
     """Passes of one world in maps of a renderer.
 
-    Attributes:
-        world: what light meets.
-        reach: how far one sees at most [m].
-        light: passes of the floor's map and its levels of detail, and of the maps in depths, by their names.
+    reach  how far one sees at most [m]
+    light  passes of the floor's map and its levels of detail, and of the maps in depths, by their names
     """
 
     def __init__(
@@ -68,13 +64,8 @@ class SeaPasses:
     ) -> None:
         """Draw hits once, and lay out the maps.
 
-        Args:
-            renderer: that has the maps.
-            world: what light meets.
-            splats: of the floor's map, and of each depth's.
-            vertices: rays along a side of the tile.
-            texels: texels of a map along a side of the tile.
-            slices: maps in depths.
+        splats  of the floor's map, and of each depth's;  slices  maps in depths
+        vertices, texels  rays, and texels of a map, along a side of the tile
         """
         self.renderer, self.world, self.reach = renderer, world, reach_of(world)
         count = checked_whole("slices", slices, 2, 64)
@@ -103,12 +94,8 @@ class SeaPasses:
     def view(self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int) -> Pass:
         """Return the pass of the radiance that a camera sees, after those of `light`: z is up.
 
-        Args:
-            camera: whose picture it is.
-            size: columns and rows.
-            kind: one of `haze.KINDS`.
-            pieces: of a ray through the water.
-            steps: of the search for a hit.
+        size  columns and rows;  kind  one of `haze.KINDS`
+        pieces, steps  of a ray through the water, and of the search for a hit
         """
         self.renderer.declare(VIEW, size)
         world, (right, up, forward) = self.world, axes(camera, size)
@@ -130,24 +117,24 @@ class SeaPasses:
             "crest": max(world.sea.highest, 1e-6),
             "steps": checked_whole("steps", steps, 1, 64),
             "eye": camera.eye,
-            "forward": _rgb(forward),
-            "right": _rgb(right),
-            "up": _rgb(up),
+            "forward": rgb(forward),
+            "right": rgb(right),
+            "up": rgb(up),
             "angle": camera.pixel(size[1]),
             "reach": self.reach,
             "n": world.n,
-            "beam": _rgb(world.beam),
+            "beam": rgb(world.beam),
             "floor_drift": self._floor.drift * world.sea.tile / self._floor.pixels,
             "shaft": min(world.shaft, 1e6),
             "first_depth": self._top,
             "depth_step": self._step,
             "b": world.b,
-            "sunlight": _rgb(light.sun),
-            "skylight": _rgb(light.sky),
+            "sunlight": rgb(light.sun),
+            "skylight": rgb(light.sky),
             "sky": world.sky,
             "reflectance": world.reflectance,
-            "sky_on_floor": _rgb(light.sky_on_floor),
-            "again": _rgb(light.interreflection),
+            "sky_on_floor": rgb(light.sky_on_floor),
+            "again": rgb(light.interreflection),
             "glow_depth": self._deepest,
             "turn": TURN,
             "rate": float(np.min(world.c)),
@@ -266,11 +253,6 @@ def _four(array: NDArray) -> NDArray[np.float32]:
     found = np.zeros((*array.shape[:2], 4), np.float32)
     found[..., : array.shape[2]] = array
     return found
-
-
-def _rgb(values: Floats) -> tuple[float, float, float]:
-    x, y, z = np.asarray(values, float).tolist()
-    return x, y, z
 
 
 def _text(file: str) -> str:

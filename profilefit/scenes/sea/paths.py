@@ -79,14 +79,12 @@ class Sunlight:
 
 
 class Event(NamedTuple):
-    """Event of paths.
+    """Event of n paths.
 
-    Attributes:
-        seen: (n, 3) radiance that comes in at the event.
-        kept: (n or 1, 3 or 1) share of the path's light that goes on [-].
-        turned: (n,) density of the turn that light would take, over the density that the turn was drawn from [-].
-        place: (n, 3) start of the path's next part.
-        way: (n, 3) direction of the path's next part.
+    seen    (n, 3) radiance that comes in at the event
+    kept    (n or 1, 3 or 1) share of the path's light that goes on [-]
+    turned  (n,) density of the turn that light would take, over that which the turn was drawn from [-]
+    place, way  (n, 3) start and direction of the path's next part
     """
 
     seen: Floats
