@@ -160,14 +160,6 @@ TABLES = {
         },
         feet.feet_laws,
     ),
-    "leans": Listed(
-        "Leans that differ, Gaussian: mean shadow over that of upright strands, and what rays see over it",
-        {
-            **{"rms lean": "g", "theta": "g", "factor": ".3f", "rays, z = 0": ".3f", "+- 0": ".3f"},
-            **{"rays, z = 0.5": ".3f", "+- 0.5": ".3f"},
-        },
-        feet.leans,
-    ),
     "lamp": Listed(
         "Light on what an eye sees, over visibility toward the lamp, and over it without the shadows' shared part",
         {
