@@ -182,31 +182,30 @@ def test_srgb():
         to_srgb(0.5, exposure=0)
 
 
+BAD = [
+    (lambda stage, law: stage.scatter("blur", 1.0), r"law must be a profile law.* got 'blur'"),
+    (lambda stage, law: stage.scatter(law, 0), r"mfp must be lengths > 0 \[mm\], got 0"),
+    (lambda stage, law: stage.scatter(law, (1, 2)), r"mfp must be one number or three, got \(1, 2\)"),
+    (lambda stage, law: stage.scatter(law, 1.0, fixed_alpha=1.5), r"fixed_alpha must be albedos in \[0, 1\], got 1.5"),
+    (lambda stage, law: stage.upload(flat((8, 8), 1.0, 0.5)), r"buffers must be \(64, 48\) pixels.* got \(8, 8\)"),
+    (lambda stage, law: stage.time(law, 1.0, passes="all"), "passes must be one of scatter, frame, got 'all'"),
+    (lambda stage, law: stage.time(law, 1.0, passes="frame"), "scatter where no scene was drawn"),
+    (lambda stage, law: Stage(stage.context, (0, 4)), r"width must be a whole number >= 1.* got 0"),
+    (lambda stage, law: Stage(stage.context, SIZE, shadow_side=0), "shadow_side must be a whole number >= 1.* got 0"),
+    (
+        lambda stage, law: Stage(stage.context, SIZE, shadow_side=2.5),
+        "shadow_side must be a whole number >= 1.* got 2.5",
+    ),
+]
+
+
 def test_bad_input_is_named(stage, burley):
     with pytest.raises(InputError, match="draw or upload comes first"):
         stage.scatter(burley, 1.0)
     stage.upload(flat(SIZE, 1.0, 0.5))
-    with pytest.raises(InputError, match=r"law must be a profile law.* got 'blur'"):
-        stage.scatter("blur", 1.0)
-    with pytest.raises(InputError, match=r"mfp must be lengths > 0 \[mm\], got 0"):
-        stage.scatter(burley, 0)
-    with pytest.raises(InputError, match=r"mfp must be one number or three, got \(1, 2\)"):
-        stage.scatter(burley, (1, 2))
-    with pytest.raises(InputError, match=r"fixed_alpha must be albedos in \[0, 1\], got 1.5"):
-        stage.scatter(burley, 1.0, fixed_alpha=1.5)
-    with pytest.raises(InputError, match=r"buffers must be \(64, 48\) pixels.* got \(8, 8\)"):
-        stage.upload(flat((8, 8), 1.0, 0.5))
-    with pytest.raises(InputError, match="passes must be one of scatter, frame, got 'all'"):
-        stage.time(burley, 1.0, passes="all")
-    with pytest.raises(InputError, match="scatter where no scene was drawn"):
-        stage.time(burley, 1.0, passes="frame")
-    with pytest.raises(InputError, match=r"normal must have shape \(48, 64, 3\)"):
-        replace(flat(SIZE, 1.0, 0.5), normal=np.zeros((4, 4, 3), np.float32))
-    with pytest.raises(InputError, match=r"width must be a whole number >= 1.* got 0"):
-        Stage(stage.context, (0, 4))
-    for side in (0, 2.5):
-        with pytest.raises(InputError, match=f"shadow_side must be a whole number >= 1.* got {side}"):
-            Stage(stage.context, SIZE, shadow_side=side)
+    for call, message in BAD:
+        with pytest.raises(InputError, match=message):
+            call(stage, burley)
 
 
 def test_release_frees_the_gpu(context, burley):

@@ -54,7 +54,6 @@ def test_shells_and_slabs_tend_to_the_cones():
     linear, quadratic = ([rms(by_shells(patch, theta, start, n, p), true) for n in (16, 240)] for p in (1.0, 2.0))
     slabs = {n: rms(by_slabs(patch, theta, start, n), true) for n in (8, 16)}
     two = {n: rms(by_slabs(patch, theta, start, n, 2), true) for n in (8, 12)}
-    print(f"shells {linear}, quadratic {quadratic}, slabs {slabs}, of two strands {two}")
     assert linear[0] > 0.2
     assert linear[1] < 0.06
     assert quadratic[1] > 0.15

@@ -206,7 +206,6 @@ def test_where_iterations_fail():
     ways = ["newton_1m", "newton", "shah", 1, 8, 16]
     shares = wrong_shares(ways, [0.66, 2.5, 5.0], rays=1500)
     published, newton, shah, one, eight, sixteen = shares
-    print(shares)
     assert np.all(shares[1:, 0] == 0.0)
     assert published[1] > 0.3 and shah[1] > 0.2 and newton[1] > 0.05  # noqa: PT018
     assert newton[2] > one[2] > 0.05
@@ -223,7 +222,6 @@ def test_newton_is_exact_while_the_ray_hits_once():
         off = [
             np.abs(newton_hit(floor.height, floor.slope, origin, ray, start, count) - true) / DEPTH for count in (3, 4)
         ]
-        print(steep, [(np.median(one), one.max()) for one in off])
         assert np.median(off[0]) < 1e-14
         assert off[0].max() < three
         assert off[1].max() < 1e-9
@@ -282,14 +280,12 @@ def test_single_precision_in_a_vertex_shader(context):
     origin, ray = (one.astype(np.float32).astype(float) for one in (origin, ray))
     true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest)
     off = np.abs(by_vertices(context, floor, origin, ray) - true[:, None]) / DEPTH
-    print("S 0.7: newton and first_hit, worst", off.max(axis=0), "rms", np.sqrt(np.mean(off**2, axis=0)))
     assert np.all(off.max(axis=0) < 1e-6)
     floor, origin, ray = lit_floor(5.0)
     origin, ray = (one.astype(np.float32).astype(float) for one in (origin, ray))
     true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest)
     off = np.abs(by_vertices(context, floor, origin, ray) - true[:, None]) / DEPTH
     wrong = np.mean(off > 0.01, axis=0)
-    print("S 5: shares of newton and first_hit off by more than 1 %", wrong)
     assert wrong[1] < 0.002
     assert wrong[0] > 0.1
 
