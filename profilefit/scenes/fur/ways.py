@@ -82,18 +82,16 @@ class FurTrial:
     def __post_init__(self) -> None:
         object.__setattr__(self, "true", cast(self.patch, self.theta, self.start))
 
-    def heights(self, way: LayerTechnique, layers: int) -> Floats:
-        """Return heights of first hits (n,) by so many layers."""
-        patch = self.patch
-        if way.tested:
-            return by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
-        exponent = way.exponent_of(layers, patch.length / patch.radius)
-        return by_shells(patch, self.theta, self.start, layers, exponent)
-
     @lru_cache  # noqa: B019, a trial lives as long as what it is asked for
     def error(self, way: LayerTechnique, layers: int) -> float:
-        """Return the root mean square of the heights' errors over the length [-]."""
-        return float(np.sqrt(np.mean((self.heights(way, layers) - self.true) ** 2)) / self.patch.length)
+        """Return the root mean square of the errors of first hits' heights over the length, by so many layers [-]."""
+        patch = self.patch
+        if way.tested:
+            heights = by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
+        else:
+            exponent = way.exponent_of(layers, patch.length / patch.radius)
+            heights = by_shells(patch, self.theta, self.start, layers, exponent)
+        return float(np.sqrt(np.mean((heights - self.true) ** 2)) / patch.length)
 
 
 def trial(patch: Patch, theta: float, count: int, seed: int = 0) -> FurTrial:

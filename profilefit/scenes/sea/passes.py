@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,21 +28,6 @@ DARK = 1e-3  # of wide light, from where on nothing is seen
 FARTHEST = 60.0  # by the attenuation, where that is not reached before
 GLOW, DEPTHS = 128, 32  # cosines and depths of the sky's and the floor's light
 CONE = 512  # angles of that light to the vertical
-
-
-class SeaIrradiance(NamedTuple):
-    """Light of red, green and blue (3,).
-
-    sun, sky      that come in, per horizontal area;  sky_on_floor  share of the sky's that comes to the floor [-]
-    interreflection  irradiance of the floor by its own light, which the surface mirrors
-    exitance      mean radiant exitance of the floor
-    """
-
-    sun: Floats
-    sky: Floats
-    sky_on_floor: Floats
-    interreflection: Floats
-    exitance: Floats
 
 
 class SeaPasses:
@@ -100,7 +84,7 @@ class SeaPasses:
         self.renderer.declare(VIEW, size)
         world, (right, up, forward) = self.world, axes(camera, size)
         fade, blur, glowing = self._of_kind(kind)
-        light = self._irradiance(kind)
+        sun, sky, sky_on_floor, interreflection, _ = self._irradiance(kind)
         reads: dict[str, Read] = {
             "sea_waves": world.sea.texels,
             "floor_waves": world.floor.texels,
@@ -129,12 +113,12 @@ class SeaPasses:
             "first_depth": self._top,
             "depth_step": self._step,
             "b": world.b,
-            "sunlight": rgb(light.sun),
-            "skylight": rgb(light.sky),
+            "sunlight": rgb(sun),
+            "skylight": rgb(sky),
             "sky": world.sky,
             "reflectance": world.reflectance,
-            "sky_on_floor": rgb(light.sky_on_floor),
-            "again": rgb(light.interreflection),
+            "sky_on_floor": rgb(sky_on_floor),
+            "again": rgb(interreflection),
             "glow_depth": self._deepest,
             "turn": TURN,
             "rate": float(np.min(world.c)),
@@ -143,7 +127,12 @@ class SeaPasses:
         source = "".join((*map(read_text, ("common", "near_zero")), *map(_text, SOURCES)))
         return Pass("view", reads, VIEW, source, given)
 
-    def _irradiance(self, kind: str) -> SeaIrradiance:
+    def _irradiance(self, kind: str) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Return light of red, green and blue, each (3,).
+
+        Of sun and sky, as they come in per horizontal area; share of the sky's that comes to the floor; irradiance of
+        the floor by its own light, which the surface mirrors; mean radiant exitance of the floor.
+        """
         world = self.world
         entered, sky = np.array(world.sun) * self._floor.entered, np.array(world.sky) * world.diffuse_in
         inside, weight = window(world)
@@ -151,15 +140,15 @@ class SeaPasses:
         from_sun = np.exp(-optical(world, kind, np.array(world.depth * world.slant))[2])
         first, back = entered * from_sun + sky * on_floor, np.array(world.reflectance) * mirrored(world, kind)
         more = first * back / (1.0 - back)
-        return SeaIrradiance(entered, sky, on_floor, more, (first + more) * np.array(world.reflectance))
+        return entered, sky, on_floor, more, (first + more) * np.array(world.reflectance)
 
     def _of_kind(self, kind: str) -> tuple[Singles, Singles, Singles]:
         """Return tables of what the water leaves, of the blur of the floor's light, and of what sky and floor add."""
         if kind not in self._tables:
-            world, light = self.world, self._irradiance(kind)
+            world, (_, sky, _, _, exitance) = self.world, self._irradiance(kind)
             lengths, depths = np.linspace(0.0, self.reach, FADING), np.linspace(0.0, self._deepest, DEPTHS)
             fade = fade_table(world.c, world.omega, world.shaft, world.lobes, kind, lengths)
-            self._tables[kind] = fade, self._blur(kind), glow(world, kind, depths, light.sky, light.exitance)
+            self._tables[kind] = fade, self._blur(kind), glow(world, kind, depths, sky, exitance)
         return self._tables[kind]
 
     def _blur(self, kind: str) -> Singles:

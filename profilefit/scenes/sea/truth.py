@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, SUN, Waves, checked_sun, refracted
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
 Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
@@ -200,8 +201,7 @@ class Rays:
 
 def _finite(name: str, value: ArrayLike) -> Floats:
     array = checked_numbers(name, value, "finite numbers [m]")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be finite numbers [m], got {array[~np.isfinite(array)].flat[0]:g}")
+    require(name, array, np.isfinite(array), "finite numbers [m]")
     return array
 
 

@@ -18,6 +18,7 @@ from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, sho
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.toml_tables import LENGTHS
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
 SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]
@@ -62,8 +63,7 @@ class Waves:
             raise InputError(f"mean must be a level [m], got {shown(self.mean)}")
         for name in ("amplitudes", "vectors", "phases"):
             array = checked_numbers(name, getattr(self, name), "finite numbers")
-            if not np.all(np.isfinite(array)):
-                raise InputError(f"{name} must be finite numbers, got {array[~np.isfinite(array)].flat[0]:g}")
+            require(name, array, np.isfinite(array), "finite numbers")
             object.__setattr__(self, name, array)
         count = self.amplitudes.size
         for name, accepted in (("amplitudes", (count,)), ("vectors", (count, 2)), ("phases", (count,))):
@@ -463,8 +463,7 @@ def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
         array = checked_numbers(name, value, "finite numbers (..., 3)")
         if not array.ndim or array.shape[-1] != 3:
             raise InputError(f"{name} must have shape (..., 3), got {array.shape}")
-        if not np.all(np.isfinite(array)):
-            raise InputError(f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]:g}")
+        require(name, array, np.isfinite(array), "finite")
         found.append(array)
     length = np.linalg.norm(found[1], axis=-1)
     deviation = np.abs(length - 1.0)

@@ -57,16 +57,16 @@ class Buffers:
 
     def _check_inside(self) -> None:
         mask = np.asarray(self.mask)
-        _require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
+        require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
         inside = mask > INSIDE
         for name in VECTORS + NUMBERS:
             array = getattr(self, name)
             if array is not None:
                 value = np.asarray(array)[inside]
-                _require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+                require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
         albedo = np.asarray(self.reflectance)[inside]
         good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
-        _require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
+        require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -96,9 +96,10 @@ class Buffers:
         return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
 
 
-def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], what: str) -> None:
+def require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], accepted: str) -> None:
+    """Raise InputError where values are not good, with the first of those."""
     if not np.all(good):
-        raise InputError(f"{name} must be {what}, got {values[~good][0]:g}")
+        raise InputError(f"{name} must be {accepted}, got {values[~good].flat[0]:g}")
 
 
 def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:

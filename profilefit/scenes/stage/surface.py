@@ -286,7 +286,7 @@ def own_share(curves: Curves, across: Floats, along: Floats) -> Floats:
 
 
 class _Scene(NamedTuple):
-    """Visible pixels (n + 1, ...), and one that has no area, which stands for all that are not."""
+    """Visible pixels (n + 1, ...), by row and column, and one that has no area, which stands for all that are not."""
 
     position: Array
     across: Array
@@ -294,21 +294,21 @@ class _Scene(NamedTuple):
     area: Array
     irradiance: Array
     place: Array
-    """Row and column."""
 
 
 class _Points(NamedTuple):
-    """Some gathering points (m, ...): what one of them needs, by channel where it says so."""
+    """Some gathering points (m, ...).
+
+    around   visible pixels in the window, (2 NEAR + 1)^2;  own  energy within the own pixel (3,)
+    profile  curves (3, intervals, 4)
+    """
 
     position: Array
     place: Array
     around: Array
-    """Visible pixels in the window, (2 NEAR + 1)^2."""
     profile: Array
-    """Curves (3, intervals, 4)."""
     kappa: Array
     own: Array
-    """Energy within the own pixel (3,)."""
     irradiance: Array
 
 

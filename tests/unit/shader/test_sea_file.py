@@ -7,7 +7,7 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.scenes.sea import law
-from profilefit.scenes.sea.source import blur_text, export_blur, export_segment, segment_text
+from profilefit.scenes.sea.source import blur_text, export_blur, segment_text, source
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.context import program
 from profilefit.shader.law_file import LANGUAGES
@@ -92,7 +92,7 @@ def test_hlsl(tmp_path, which):
 
 @pytest.mark.parametrize("lang", LANGUAGES)
 def test_whole_files(lang):
-    segment, blur = export_segment(lang), export_blur(BLURS, C, DEPTH, lang)
+    segment, blur = source("sea-segment", lang), export_blur(BLURS, C, DEPTH, lang)
     if lang == "json":
         assert json.loads(segment)["law"] == "sea-segment"
         green = json.loads(blur)["numbers"]["green"]
@@ -101,7 +101,7 @@ def test_whole_files(lang):
     assert "sea_segment_integral(c, s0, t0, m, t1)" in segment
     assert "after 4 m of water" in blur
     assert "attenuation of red, green, blue 0.5, 0.2, 0.4 [1/m]" in blur
-    assert "sea_" not in export_segment(lang, "fog")
+    assert "sea_" not in source("sea-segment", lang, "fog")
     assert "fog_share(" in export_blur(BLURS, C, DEPTH, lang, "fog")
     if lang == "python":
         assert functions(segment)["sea_segment_integral"](1.0, 0.0, 0.0, -1.0, 2.0) == 2.0
@@ -111,10 +111,10 @@ def test_whole_files(lang):
     ("make", "message"),
     [
         (lambda: segment_text("wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: export_segment("wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: export_segment("json", "fog"), "name must be left out where lang is json"),
+        (lambda: source("sea-segment", "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
+        (lambda: source("sea-segment", "json", "fog"), "name must be left out where lang is json"),
         (lambda: export_blur(BLURS, C, DEPTH, "json", "fog"), "name must be left out where lang is json"),
-        (lambda: export_segment("glsl", "gl_fog"), "name must be letters, digits"),
+        (lambda: source("sea-segment", "glsl", "gl_fog"), "name must be letters, digits"),
         (lambda: blur_text(BLURS[:2], C), "blurs must be three of one number of Gaussians, .*, got 3, 3"),
         (lambda: blur_text([], C), "blurs must be three .*, got none"),
         (
