@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from profilefit.scenes.sea.truth import Rays, Surface
 
 Floats = NDArray[np.float64]
+SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]
 SUNS = 32  # directions within the sun's disc, in the plane of the waves
 # Gauss's points and weights on [0, 1], of the flux between two samples.
 GAUSS = [(0.5 * (1.0 + point), 0.5 * weight) for point, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import STILL, SUN, Waves, checked_sun, refracted
+from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
 from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
@@ -241,32 +241,26 @@ class Photons(NamedTuple):
     flux: Floats
 
 
-def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: float, azimuth: float = 0.0) -> Photons:
+def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: float) -> Photons:
     """Return rays through all pairs of x (columns,) and y (rows,) to the level floor at -depth [m].
 
-    azimuth  turns the sun about the vertical, from +x toward +y [rad]. Waves must not shade one another: InputError.
+    Waves must not shade one another: InputError.
     """
     deep, angle, index = checked_sun(depth, tilt, n)
     if waves.lowest <= -deep:
         raise InputError(f"depth must be below the deepest trough, {-waves.lowest:g} m, got {deep:g}")
     z, zx, zy = waves.lattice(x, y)
-    cosine, sine = np.cos(azimuth), np.sin(azimuth)
-    along, aside, flux = refracted(angle, (cosine * zx + sine * zy, cosine * zy - sine * zx), index)
+    along, aside, flux = refracted(angle, (zx, zy), index)
     if np.any(flux == 0.0):
         raise InputError(f"tilt must be one at which no wave faces away from the sun, got {angle:g} radians")
     down = deep + z
-    return Photons(
-        x + down * (cosine * along - sine * aside), y[:, None] + down * (sine * along + cosine * aside), flux
-    )
+    return Photons(x + down * along, y[:, None] + down * aside, flux)
 
 
-def caustic_photons(
-    waves: Waves, depth: float, tilt: float, n: float, pixels: int, side: int = 2048, suns: int = 1, sun: float = SUN
-) -> Floats:
+def caustic_photons(waves: Waves, depth: float, tilt: float, n: float, pixels: int, side: int = 2048) -> Floats:
     """Return the irradiance of a tile of a level floor, averaged over pixels: (pixels, pixels), row 0 at y = 0 [-].
 
-    side  photons along the tile, a multiple of pixels;  suns  directions of the sun's disc, 1 of a point sun
-    sun   half-width of the disc in air [rad]
+    side  photons along the tile, a multiple of pixels;  of a point sun
 
     Photons stand on a lattice, in the middle of its cells. Each is spread over the box that has the mean and the
     variances of its cell on the floor, so that its light comes to four pixels at most; light that leaves the tile
@@ -274,17 +268,15 @@ def caustic_photons(
     """
     columns = checked_whole("pixels", pixels, 1, 8192)
     fine = checked_whole("side", side, columns, 16384)
-    count = checked_whole("suns", suns, 1, 4096)
     if fine % columns:
         raise InputError(f"side must be a multiple of pixels = {columns}, got {fine}")
     step, rows = waves.tile / fine, max(1, 2**21 // fine)
     found = np.zeros(columns * columns)
     x = np.asarray((np.arange(-1, fine + 1) + 0.5) * step, np.float64)
-    for angle, azimuth in _disc(tilt, count, sun):
-        for first in range(0, fine, rows):
-            sent = photons(waves, x, x[first : min(first + rows, fine) + 2], depth, angle, n, azimuth)
-            found += _spread(sent, columns, columns / waves.tile)
-    return found.reshape(columns, columns) * (columns / fine) ** 2 / count
+    for first in range(0, fine, rows):
+        sent = photons(waves, x, x[first : min(first + rows, fine) + 2], depth, tilt, n)
+        found += _spread(sent, columns, columns / waves.tile)
+    return found.reshape(columns, columns) * (columns / fine) ** 2
 
 
 def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np.int64], Floats]]:
@@ -314,14 +306,3 @@ def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
     for at, share in boxes(sent, pixels, scale):
         found += np.bincount(at, flux * share, pixels * pixels)
     return found
-
-
-def _disc(tilt: float, count: int, half_width: float) -> list[tuple[float, float]]:
-    """Return tilt and azimuth of directions that fill a disc about the sun evenly: Vogel's spiral."""
-    if count == 1:
-        return [(tilt, 0.0)]
-    radius = half_width * np.sqrt((np.arange(count) + 0.5) / count)
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
-    along, across = radius * np.cos(turn), radius * np.sin(turn)
-    x, z = np.sin(tilt) + along * np.cos(tilt), np.cos(tilt) - along * np.sin(tilt)
-    return list(zip(np.arctan2(np.hypot(x, across), z).tolist(), np.arctan2(across, x).tolist(), strict=True))

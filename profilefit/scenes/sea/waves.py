@@ -21,7 +21,6 @@ from profilefit.recipes.toml_tables import LENGTHS
 from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
-SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for

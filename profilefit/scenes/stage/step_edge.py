@@ -175,19 +175,13 @@ def random_points(samples: int, trials: int, seed: int) -> Floats:
     return np.random.default_rng(seed).random((trials, samples, 2))
 
 
-def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | None = None) -> Floats:
-    """Return one set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
+def shifted_points(samples: int, trials: int, seed: int) -> Floats:
+    """Return the stage's lattice with a random shift for each trial (Cranley and Patterson), (trials, samples, 2).
 
-    points  (samples, 2), shifted over the whole torus; by default the stage's lattice, shifted within one of its cells,
-            which gives the same sets. -> (trials, samples, 2)
+    It is shifted within one of its cells, which gives the same sets as over the whole torus.
     """
     shift = np.random.default_rng(seed).random((trials, 1, 2))
-    if points is None:
-        return (pattern.points(samples) + shift @ pattern.best(samples).cell) % 1.0
-    chosen = np.asarray(points, float)
-    if chosen.shape != (samples, 2):
-        raise InputError(f"points must be {samples} pairs (xi, angle / 2 pi), got an array of shape {chosen.shape}")
-    return (chosen + shift) % 1.0
+    return (pattern.points(samples) + shift @ pattern.best(samples).cell) % 1.0
 
 
 def edge_estimate(gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float, setting: Setting) -> EdgeEstimate:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.planes import flat, step_edge
 from mcml_sim import exact
 from profilefit.errors import InputError
 from profilefit.scenes.skin.passes import SeparableFilter
-from profilefit.scenes.stage.buffers import flat, step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import CHANNELS, KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import profilefit
+from benchmarks.planes import step_edge
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.buffers import step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.planes import flat, step_edge
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import flat, step_edge
 
 
 def spoilt(name, value, mask=1.0):

@@ -6,11 +6,12 @@ import moderngl
 import numpy as np
 import pytest
 
+from benchmarks.planes import flat, step_edge
 from profilefit.errors import InputError
 from profilefit.scenes.skin.chart import covered, covering
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage.buffers import SURFACE, flat, step_edge
+from profilefit.scenes.stage.buffers import SURFACE
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 from profilefit.scenes.stage.stage import Stage

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import profilefit
+from benchmarks.planes import flat
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact.single_scattering import reflected
 from profilefit.laws.stack import LayerLaw, StackLaw
@@ -20,7 +21,6 @@ from profilefit.scenes.layers.passes import (
     once,
     once_table,
 )
-from profilefit.scenes.stage.buffers import flat
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.sea_boxes import caustic_boxes
+from benchmarks.sea_boxes import SUN, caustic_boxes
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.scenes.sea.truth import caustic_irradiance
-from profilefit.scenes.sea.waves import SUN, refracted
+from profilefit.scenes.sea.waves import refracted
 
 N, PERIOD = 1.34, 2.0
 EDGES = np.linspace(0.0, PERIOD, 65)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import planes
 from mcml_sim import exact
 from profilefit.errors import InputError
-from profilefit.scenes.stage import buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, exact_table
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, own_share, refined, seen
@@ -67,7 +67,7 @@ def test_coarsened_is_the_mean_of_blocks():
 
 
 def test_seen_is_the_render_in_view_space():
-    surface, view = seen(buffers.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
+    surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
     np.testing.assert_allclose(along[1, 2], surface.position[2, 2] - surface.position[1, 2])
@@ -76,7 +76,7 @@ def test_seen_is_the_render_in_view_space():
 
 
 def test_seen_is_what_the_shaders_take_for_inside():
-    plane = buffers.flat((4, 1), 0.5, 0.5)
+    plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
 
@@ -106,7 +106,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 def flat(h, w, reflectance, irradiance=1.0, pixel=0.5):
-    return seen(buffers.flat((w, h), pixel, reflectance, irradiance))[0]
+    return seen(planes.flat((w, h), pixel, reflectance, irradiance))[0]
 
 
 def hill(h, w, seed=3):
@@ -185,7 +185,7 @@ def test_even_light_on_even_skin_is_conserved(reflectance):
 @pytest.mark.slow
 def test_step_edge_is_the_integral():
     """Of a plane that ends 16 mfp away, with pixels of half a mfp."""
-    surface, view = seen(buffers.step_edge((64, 64), 0.5, [0.1, 0.3, 0.5]))
+    surface, view = seen(planes.step_edge((64, 64), 0.5, [0.1, 0.3, 0.5]))
     pixels = np.stack([np.full(17, 32), np.arange(24, 41)], axis=1)
     x = surface.position[32, 24:41, 0]
     found = gathered(surface, view, np.ones(3), DIFFUSE, pixels)
@@ -231,7 +231,7 @@ def test_own_pixel_holds_its_disc():
 
 @pytest.mark.slow
 def test_refined_says_what_coarse_pixels_cost():
-    fine, view = seen(buffers.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
+    fine, view = seen(planes.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
     pixels = np.array([[12, 11], [12, 12], [12, 15]])
     light, change = refined(fine, view, np.ones(3), DIFFUSE, pixels)
     coarse = gathered(fine.coarsened(2), view.coarsened(2), np.ones(3), DIFFUSE, pixels)
@@ -265,7 +265,7 @@ def test_a_table_of_ones_own_in_a_picture():
 
     mask = np.ones((4, 6), np.float32)
     mask[:, 0] = 0.0
-    picture = replace(buffers.flat((6, 4), 1.0, 0.8), mask=mask)
+    picture = replace(planes.flat((6, 4), 1.0, 0.8), mask=mask)
     light = exitance_of(picture, np.ones(3), Half())
     np.testing.assert_allclose(light[:, 1:], 0.4, rtol=1e-6)  # float32 of 0.8
     np.testing.assert_allclose(light[:, 0], 0.8, rtol=1e-6)
