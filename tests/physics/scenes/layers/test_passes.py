@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import profilefit
+from benchmarks.layers_tables import of_table
 from benchmarks.planes import flat
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact.single_scattering import reflected
@@ -17,7 +18,6 @@ from profilefit.scenes.layers.passes import (
     diffusely_once,
     of_half_space,
     of_stack,
-    of_table,
     once,
     once_table,
 )
