@@ -1,4 +1,4 @@
-"""Techniques for layers to compare with: samples of exact light by tables of each thickness, and of sums of Gaussians."""
+"""Techniques to compare with, for layers: samples of exact light by tables, and of sums of Gaussians."""
 
 from __future__ import annotations
 

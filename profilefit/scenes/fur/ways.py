@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.checks import checked_whole, is_number, shown
+from mcml_sim.media.checks import is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
@@ -41,33 +41,6 @@ class LayerTechnique(NamedTuple):
 LINEAR, QUADRATIC, FITTED = LayerTechnique("linear", 1.0), LayerTechnique("quadratic", 2.0), LayerTechnique("fitted")
 SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two strands", tested=2)
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
-
-
-# Error of swept slabs by the strands that one tests: rms of the heights of hits over L = size y^steep q^thick, q =
-# r0 sqrt(n), y = |L tan(theta) - lean| sqrt(n) / N, how many strands' distances a ray moves aside in a slab. Over 63
-# furs and angles ln rms scatters by .25 and .30 (`python -m benchmarks.fur --only swept` fits them again).
-SWEPT_ERRORS = {1: (0.0316, 1.70, -0.69), 2: (0.0110, 2.36, -0.67)}
-ERRORS, THICK = (0.01, 0.1), (0.2, 0.6)  # rms and r0 sqrt(n) that they are fitted to
-
-
-def swept_layers(goal: float, density: float, radius: float, aside: float, tested: int = 1) -> int:
-    """Return the swept slabs for an error, by `SWEPT_ERRORS`; scatter is a factor of 1.3 in error, 1.2 in layers.
-
-    goal    root mean square error of the heights of hits over the length, 0.01 to 0.1 [-]
-    aside   of a ray from the tips to the skin, |L tan(theta) - lean| > 0;  density [1/length^2], radius [length]
-    tested  strands, 1 or 2
-
-    InputError where r0 sqrt(n) is beyond 0.2 to 0.6. Rays say it of any fur: `trial`, `least_layers`.
-    """
-    size, steep, thick_power = SWEPT_ERRORS[checked_whole("tested", tested, 1, 2)]
-    for name, value in (("goal", goal), ("density", density), ("radius", radius), ("aside", aside)):
-        if not (is_number(value) and 0 < value < np.inf):
-            raise InputError(f"{name} must be a finite number > 0, got {shown(value)}")
-    thick = float(radius * density**0.5)
-    for what, value, (low, high) in (("goal", goal, ERRORS), ("radius sqrt(density)", thick, THICK)):
-        if not low <= value <= high:
-            raise InputError(f"{what} must be in [{low:g}, {high:g}], got {value:g}")
-    return int(np.ceil(aside * density**0.5 / (goal / (size * thick**thick_power)) ** (1.0 / steep)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from benchmarks.fur_patches import spaced_patch, tufted_patch
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import shadow, visibility
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays, struck
-from profilefit.scenes.fur.ways import SWEPT, SWEPT_TWO, error_of, swept_layers, trial
 from tests.fixtures import slow
 
 
@@ -84,33 +83,6 @@ def test_one_strand_head_on_and_aside():
 def test_what_no_patch_has(call, said):
     with pytest.raises(InputError, match=said):
         call()
-
-
-def test_swept_slabs_are_as_wrong_as_their_law_says():
-    """Furs that it was not fitted to: its number of layers is within a goal by three of its scatters; half are not."""
-    for degrees, density, radius in ((45.0, 64.0, 0.05), (60.0, 36.0, 0.05), (40.0, 225.0, 0.03)):
-        theta = np.radians(degrees)
-        looked = [trial(random_patch(density, radius, 1.0, 3.0, seed), theta, 1500, seed) for seed in (11, 12, 13)]
-        for way, scatter in ((SWEPT, 0.25), (SWEPT_TWO, 0.30)):
-            layers = swept_layers(0.03, density, radius, np.tan(theta), way.tested)
-            assert abs(np.log(error_of(looked, way, layers) / 0.03)) < 3.0 * scatter
-            assert np.log(error_of(looked, way, layers // 2) / 0.03) > 3.0 * scatter
-    assert swept_layers(0.02, 64.0, 0.05, 1.0) <= 16
-    assert swept_layers(0.02, 64.0, 0.05, 1.0, 2) <= 12
-
-
-@pytest.mark.parametrize(
-    ("numbers", "said"),
-    [
-        ((0.0, 64.0, 0.05, 1.0), "goal must be a finite number > 0, got 0"),
-        ((0.5, 64.0, 0.05, 1.0), r"goal must be in \[0.01, 0.1\], got 0.5"),
-        ((0.05, 64.0, 0.5, 1.0), r"radius sqrt\(density\) must be in \[0.2, 0.6\], got 4"),
-        ((0.05, 64.0, 0.05, 1.0, 3), "tested must be a whole number >= 1 and <= 2, got 3"),
-    ],
-)
-def test_what_the_law_of_swept_slabs_is_not_of(numbers, said):
-    with pytest.raises(InputError, match=said):
-        swept_layers(*numbers)
 
 
 def nearest(patch):
