@@ -47,7 +47,7 @@ class StackTable:
     def curves(self, values: ArrayLike, /) -> Curves:
         """Return the curves, as `CurveTable.curves`."""
         given, y = np.asarray(values, float), knots()
-        u = self._place(given)
+        u = np.log(np.maximum(self.least + (self.most - self.least) * given, np.exp(self.u[0])))
         size = (given.size, y.size - 1, 4)
         reflectance, kappa = np.empty(given.size), np.empty(given.size)
         profile, cdf = np.empty(size), np.empty(size)
@@ -58,10 +58,6 @@ class StackTable:
             profile[own] = hermite(self.profile[channel], u[own], y)
             cdf[own] = hermite(self.cdf[channel], u[own], y)
         return Curves(np.zeros(given.size), reflectance, kappa, profile, cdf)
-
-    def _place(self, values: Floats) -> Floats:
-        thickness = self.least + (self.most - self.least) * values
-        return np.log(np.maximum(thickness, np.exp(self.u[0])))
 
 
 def stack_table(

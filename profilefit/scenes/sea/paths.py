@@ -168,20 +168,15 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
 
 def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
     """Return what is scattered in the water: sunlight that turns into the path, and where it goes on backward."""
-    seen, sunward = _sunlit(world, light, place, way)
+    flux, beam = light.at(*place.T)
+    turned, sunward = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0), -beam
+    seen = (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam)
     new = _turned(world.phase, way, rng)
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
     new[sunny] = _turned(light.around, sunward[sunny], rng)
     straight, aside = _density(world.phase, way, new), _density(light.around, sunward, new)
     factor = straight / ((1.0 - SUNWARD) * straight + SUNWARD * aside)
     return Event(seen, np.ones((1, 3)), factor, place, new)
-
-
-def _sunlit(world: World, light: Sunlight, place: Floats, way: Floats) -> tuple[Floats, Floats]:
-    """Return sunlight (n, 3) that is scattered into a ray, which `way` follows backward; and the way to the sun."""
-    flux, beam = light.at(*place.T)
-    turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
-    return (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam), -beam
 
 
 def _come(world: World, place: Floats, beam: Floats) -> Floats:

@@ -52,8 +52,9 @@ def caustic_irradiance(
     The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
     Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
     """
-    rays = Rays(surface, _finite("x", x), depth, tilt, n, slope, curvature, spacing)
-    where = np.asarray(x, float)
+    where = checked_numbers("x", x, "finite numbers [m]")
+    require("x", where, np.isfinite(where), "finite numbers [m]")
+    rays = Rays(surface, where, depth, tilt, n, slope, curvature, spacing)
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -197,12 +198,6 @@ class Rays:
             zx = zx if self._slope else sum(w * one for w, one in zip(FIRST, around, strict=True)) / step
             zxx = zxx if self._curvature else sum(w * one for w, one in zip(SECOND, around, strict=True)) / step**2
         return z, zx, zxx
-
-
-def _finite(name: str, value: ArrayLike) -> Floats:
-    array = checked_numbers(name, value, "finite numbers [m]")
-    require(name, array, np.isfinite(array), "finite numbers [m]")
-    return array
 
 
 class MapError(NamedTuple):
