@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -128,12 +127,12 @@ def sheets() -> list[tuple[str, ...]]:
 def request(size: tuple[int, int] = (160, 120)) -> scene.HeartRequest:
     """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
-    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+    return scene.read(str(path), read_toml(Path(path))).changed(camera_table={"resolution": size})
 
 
 def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tuple[str, ...]], str]:
     """Return error and cost of each way at each size; rows of them and of frames; the device."""
-    light, found, told = scene.light_of(request().stack, COUNT), {}, []
+    light, found, told = scene.light_of(request(), COUNT), {}, []
     with opened() as context:
         for size in SIZES:
             with scene.reference_render(context, request(size), light, JUDGED) as own:
@@ -152,7 +151,7 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
 def finer() -> list[tuple[str, ...]]:
     """Return errors as the atlas is refined."""
     found = []
-    light = scene.light_of(request().stack, COUNT)
+    light = scene.light_of(request(), COUNT)
     with opened() as context, scene.reference_render(context, request(), light, JUDGED) as own:
         for texel in FINER:
             with own.with_texels(texel) as of:
@@ -166,7 +165,7 @@ def edges() -> list[tuple[str, ...]]:
 
     Jitter is the mean over many frames of a pixel's place moved by a Gaussian: a blur, by its variance.
     """
-    light, columns, rows = scene.light_of(request().stack, COUNT), *request().size
+    light, columns, rows = scene.light_of(request(), COUNT), *request().size
     size = (SUPER * columns, SUPER * rows)
     with opened() as context, scene.reference_render(context, request(size), light, 1) as own:
         stage, mfp = own.stage, own.light.mfp
@@ -199,7 +198,7 @@ def over_texel_and_view(
 ) -> dict[str, np.ndarray]:
     """Return errors (texels, views) of texture, screen and their split, by mean sides [mm] and turns of the view."""
     errors = {kind: np.empty((len(texels), len(degrees))) for kind in MAPPED}
-    light = scene.light_of(request.stack, COUNT)
+    light = scene.light_of(request, COUNT)
     for column, one in enumerate(degrees):
         with scene.reference_render(context, turned(request, one), light, JUDGED) as seen:
             for row, texel in enumerate(texels):
@@ -211,10 +210,8 @@ def over_texel_and_view(
 
 def turned(request: scene.HeartRequest, degrees: float) -> scene.HeartRequest:
     """Return the request seen from the front, turned by an angle about the upright."""
-    angle, camera = np.radians(degrees), request.camera
-    away = camera.distance * unit((np.sin(angle), 0.0, np.cos(angle)))
-    x, y, z = (np.array(camera.target) + away).tolist()
-    return replace(request, camera=replace(camera, eye=(x, y, z)))
+    angle, distance = np.radians(degrees), request.camera.distance
+    return request.changed(camera_table={"direction": (np.sin(angle), 0.0, np.cos(angle)), "distance": distance})
 
 
 def mapped() -> dict[str, np.ndarray]:

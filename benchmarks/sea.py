@@ -11,7 +11,6 @@ OpenGL, of three turns and more the least or the 16th percentile.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -177,16 +176,16 @@ def splats() -> Rows:
 
 def over_maps(drawn: SeaRender) -> Rows:
     """Return errors of the request's picture by each splat and by numbers of maps in depths, and milliseconds."""
-    of, splats = drawn.request, (Splat.POINTS, Splat.FACES, Splat.CELLS)
-    cases = [(f"{one.value}, {of.slices} slices", (one, one), of.slices) for one in splats]
+    of, named, splats = drawn.request, drawn.request.technique, (Splat.POINTS, Splat.FACES, Splat.CELLS)
+    cases = [(f"{one.value}, {named.slices} slices", (one, one), named.slices) for one in splats]
     cases += [(f"{of.splats[1].value}, {one} slices", of.splats, one) for one in SLICES]
     rows: Rows = []
     for name, by, count in cases:
         with Renderer(drawn.passes.renderer.context, of.size) as maps:
-            own = drawn._replace(passes=SeaPasses(maps, of.world, by, of.vertices, of.texels, count))
+            own = drawn._replace(passes=SeaPasses(maps, of.world, by, named.vertices, named.texels, count))
             own.light()  # compiled
             least = min(sum(own.light().values()) for _ in range(TURNS))
-            rows.append((name, "", own.judge.rmse(own.picture(of.kind, of.sampling.samples)), least))
+            rows.append((name, "", own.judge.rmse(own.picture(named.kind, of.sampling.samples)), least))
     return rows
 
 
@@ -194,8 +193,8 @@ def over_pixels(drawn: SeaRender) -> Rows:
     """Return errors of the request's kind by views of a pixel along a side, and milliseconds of the view."""
     rows: Rows = []
     for fine in FINER:
-        own = drawn._replace(request=replace(drawn.request, supersampling=fine))
-        (one,) = own.points(own.request.kind, [own.request.sampling.samples], TURNS)
+        own = drawn._replace(request=drawn.request.changed(technique={"supersampling": fine}))
+        (one,) = own.points(own.request.technique.kind, [own.request.sampling.samples], TURNS)
         rows.append((f"{fine} x {fine} views of a pixel", "", one.rmse, min(one.milliseconds)))
     return rows
 
@@ -213,8 +212,8 @@ def waters() -> Rows:
     of, rows = tradeoff.request(), []
     with opened() as context:
         for factor in FACTORS:
-            red, green, blue = (factor * one for one in of.b)
-            with reference_render(context, replace(of, b=(red, green, blue)), OF_WATER) as drawn:
+            red, green, blue = (factor * one for one in of.water.b)
+            with reference_render(context, of.changed(water={"b": (red, green, blue)}), OF_WATER) as drawn:
                 errors = (drawn.judge.rmse(drawn.picture(kind, of.sampling.samples)) for kind in KINDS)
                 rows.append((factor, float(max(drawn.request.world.omega)), *errors))
     return rows

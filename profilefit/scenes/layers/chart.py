@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +57,6 @@ def ways(
     table    exact light of the scene's stack
     samples  of the kinds of a file, and of `others` by their names
     """
-    judge, laws = reference(stage, request, table), laws_of(request.stack)
-    pairs = {kind: others.get(kind) or technique(replace(request, kind=kind), laws) for kind in samples}
+    judge, laws = reference(stage, request, table), laws_of(request)
+    pairs = {kind: others.get(kind) or technique(request.changed(technique={"kind": kind}), laws) for kind in samples}
     return {kind: points(stage, judge, pairs[kind], request.sampling, samples[kind], turns) for kind in samples}

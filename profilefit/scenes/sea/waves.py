@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
-from profilefit.recipes.toml_tables import LENGTHS
+from profilefit.recipes.declared import LENGTHS
 from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]

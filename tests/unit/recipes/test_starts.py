@@ -114,7 +114,7 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
 
 def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
-    chosen = replace(recipe.find("burley-whole", FITS), setting=Setting("diffuse", n=1.4))
+    chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
     law = starts.starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
@@ -136,13 +136,13 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
 )
 def test_what_a_recipe_must_name(change, words):
     with pytest.raises(RecipeError, match=words):
-        starts.require_known(replace(recipe.find("burley-whole", FITS), **change))
+        starts.require_known(recipe.find("burley-whole", FITS).changed(**change))
 
 
 @pytest.mark.slow
 def test_random_starts_beat_the_printed_start_of_the_papers_inverse():
     """A known case: from (20) as printed, the search ends in the second-best optimum."""
-    from_exact = replace(recipe.find("liang-inverse-whole", FITS), truth="exact")
+    from_exact = recipe.find("liang-inverse-whole", FITS).changed(truth="exact")
     profiles = truth_of(from_exact, None)
     start = starts.starting_law(from_exact, FITS)
     xi = tuple((np.arange(64) + 0.5) / 64 * 0.99)

@@ -1,7 +1,5 @@
 """From a recipe to its truth: where albedos and rings stand, and which photons they get."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -23,7 +21,7 @@ FITS = catalogue.fits_folder()
     ],
 )
 def test_albedos_are_even_in_their_spacing(spacing, even):
-    alpha = albedo_values(Albedos(0.1, 0.99, 12, spacing))
+    alpha = albedo_values(Albedos(low=0.1, high=0.99, count=12, spacing=spacing))
     assert alpha[[0, -1]] == pytest.approx([0.1, 0.99], abs=1e-6)
     steps = np.diff(even(alpha))
     # The table behind the spacing in A is linear between 4001 nodes: its steps are even to 1e-4.
@@ -49,7 +47,7 @@ def test_rings_that_the_run_cannot_make_are_refused(rings):
 def test_photons_and_exact_truth_agree_on_a_recipes_rings():
     chosen = recipe.find("liang-whole", FITS)
     light = simulate_orders(Grid.from_edges(r=RUN_EDGES), 2**19, seed=11)
-    photons, exactly = truth_of(chosen, light), truth_of(replace(chosen, truth="exact"), None)
+    photons, exactly = truth_of(chosen, light), truth_of(chosen.changed(truth="exact"), None)
     assert photons.source == "orders"
     assert exactly.source == "exact"
     # Where fewer photons arrive, the heavy ones may be missing, and the standard error with them: z is far from normal.
