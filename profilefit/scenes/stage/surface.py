@@ -19,7 +19,7 @@ divided by Gauss points, all others taken at their middle. All pairs count, near
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -37,6 +37,7 @@ from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.world import Camera
 
 Floats = NDArray[np.float64]
+FORWARD = np.array([0.0, 0.0, -1.0])
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
 LEAST_COSINE = 0.05
 # A point may lie so many pixels off the one that shows it, over the cosine of normal and ray, that at least.
@@ -52,54 +53,37 @@ AT_ONCE = 32  # gathering points; a few arrays of so many times the number of vi
 CHECKED = 60  # pixels at which the reference is compared with one of half the pixel
 
 
-@dataclass(frozen=True)
-class View:
-    """A camera: which way it looks, and what a pixel covers.
+class View(NamedTuple):
+    """Camera in view space: x right, y up, z < 0 before it.
 
-    right, up, forward  orthonormal axes (3,): along a row, across rows, into the scene
-    pixel               side of a pixel [length], or with an eye that at unit depth [-]: 2 tan(fov / 2) / pixels
-    eye                 (3,) [length] of a perspective view; None of an orthographic one
+    pixel  side of a pixel [length], or in perspective that at unit depth [-]: 2 tan(fov / 2) / pixels
     """
 
-    right: Floats
-    up: Floats
-    forward: Floats
     pixel: float
-    eye: Floats | None = None
-
-    def __post_init__(self) -> None:
-        axes = np.stack([np.asarray(axis, float) for axis in (self.right, self.up, self.forward)])
-        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-6):
-            raise InputError(f"right, up, forward must be three orthonormal axes, got {axes.tolist()}")
-        if not (np.isfinite(self.pixel) and self.pixel > 0):
-            raise InputError(f"pixel must be a length > 0, got {self.pixel!r}")
+    is_perspective: bool = False
 
     def footprint(self, position: Floats, normal: Floats) -> tuple[Floats, Floats]:
         """Return sides of the parallelogram of the tangent plane that a pixel shows, along and across rows (..., 3)."""
-        forward = np.asarray(self.forward, float)
-        ray, scale = np.broadcast_to(forward, position.shape), np.full(position.shape[:-1], float(self.pixel))
-        if self.eye is not None:
-            depth = (position - self.eye) @ forward
+        ray, scale = np.broadcast_to(FORWARD, position.shape), np.full(position.shape[:-1], float(self.pixel))
+        if self.is_perspective:
+            depth = -position[..., 2]
             scale = self.pixel * depth
             # The background's positions are the eye's own: any ray will do there, for its footprint is 0.
-            ray = np.where(depth[..., None] > 0, position - self.eye, forward)
-            ray = ray / np.where(depth > 0, depth, 1.0)[..., None]
-        facing = -np.sum(normal * ray, axis=-1)
-        facing = np.maximum(facing, LEAST_COSINE * np.linalg.norm(ray, axis=-1))
+            ray = np.where(depth[..., None] > 0, position, FORWARD) / np.where(depth > 0, depth, 1.0)[..., None]
+        facing = np.maximum(-np.sum(normal * ray, axis=-1), LEAST_COSINE * np.linalg.norm(ray, axis=-1))
         across, along = (
-            scale[..., None] * (axis + ((normal @ axis) / facing)[..., None] * ray)
-            for axis in (np.asarray(self.right, float), np.asarray(self.up, float))
+            scale[..., None] * (axis + (part / facing)[..., None] * ray)
+            for axis, part in zip(np.eye(3), (normal[..., 0], normal[..., 1]), strict=False)
         )
         return across, along
 
     def coarsened(self, factor: int) -> View:
         """Return the view with pixels that many times as large."""
-        return replace(self, pixel=self.pixel * factor)
+        return self._replace(pixel=self.pixel * factor)
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A G-buffer (h, w, ...); what the mask leaves out is not read.
+class Surface(NamedTuple):
+    """A G-buffer (h, w, ...) in view space; what the mask leaves out is not read.
 
     position [length], normal (unit, towards the eye), irradiance E [any unit], reflectance A [-], each (h, w, 3), the
     last two by channel;  mask (h, w), True where the surface is seen
@@ -111,27 +95,6 @@ class Surface:
     irradiance: Floats
     reflectance: Floats
     mask: NDArray[np.bool_]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mask", np.asarray(self.mask, bool))
-        if self.mask.ndim != 2 or not self.mask.any():
-            raise InputError(f"mask must be (h, w) with a visible pixel, got shape {self.mask.shape}")
-        for field in fields(self)[:-1]:
-            object.__setattr__(self, field.name, self._checked(field.name))
-        seen = self.reflectance[self.mask]
-        if not np.all((seen >= 0) & (seen <= 1)):
-            raise InputError(f"reflectance must be in [0, 1], got {seen[~((seen >= 0) & (seen <= 1))][0]:g}")
-        lengths = np.linalg.norm(self.normal[self.mask], axis=-1)
-        if not np.allclose(lengths, 1.0, atol=1e-3):
-            raise InputError(f"normal must have length 1, got one of {lengths[np.argmax(np.abs(lengths - 1))]:g}")
-
-    def _checked(self, name: str) -> Floats:
-        value = np.asarray(getattr(self, name), float)
-        if value.shape != (*self.mask.shape, 3):
-            raise InputError(f"{name} must be {(*self.mask.shape, 3)} as the mask, got {value.shape}")
-        if not np.all(np.isfinite(value[self.mask])):
-            raise InputError(f"{name} must be finite where the mask is True, got {value[self.mask].ravel()[0]}...")
-        return np.where(self.mask[..., None], value, 0.0)
 
     def coarsened(self, factor: int) -> Surface:
         """Return means over blocks of factor x factor pixels, seen where all are; InputError if blocks do not fit."""
@@ -152,12 +115,12 @@ class Surface:
 def seen(buffers: Buffers) -> tuple[Surface, View]:
     """Return the scattering part of a render's G-buffer, in view space, and the camera that it was seen by."""
     reflectance = np.clip(np.asarray(buffers.reflectance, float), 0.0, 1.0)  # a float32 may end beyond
-    position, normal, irradiance = (
-        np.asarray(value, float) for value in (buffers.position, buffers.normal, buffers.irradiance)
+    mask = buffers.mask > INSIDE
+    position, normal, irradiance, reflectance = (
+        np.where(mask[..., None], np.asarray(value, float), 0.0)
+        for value in (buffers.position, buffers.normal, buffers.irradiance, reflectance)
     )
-    right, up, forward = np.diag([1.0, 1.0, -1.0])
-    view = View(right, up, forward, buffers.pixel, np.zeros(3) if buffers.is_perspective else None)
-    return Surface(position, normal, irradiance, reflectance, buffers.mask > INSIDE), view
+    return Surface(position, normal, irradiance, reflectance, mask), View(buffers.pixel, buffers.is_perspective)
 
 
 def world(buffers: Buffers, camera: Camera) -> Floats:
