@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted
+from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
@@ -112,10 +112,7 @@ class Caustics:
         self.vertices = checked_whole("vertices", vertices, 2, MOST_VERTICES)
         self.pixels = checked_whole("pixels", pixels, 1, MOST_PIXELS)
         bed = floor or Waves(waves.tile, mean=-deep)
-        if bed.tile != waves.tile:
-            raise InputError(f"floor must have the sea's tile of {waves.tile:g} m, got {bed.tile:g}")
-        if bed.highest >= waves.lowest:
-            raise InputError(f"floor must be below the sea's lowest trough, {waves.lowest:g} m, got {bed.highest:g}")
+        require_below(waves, bed)
         self._pixel = waves.tile / self.pixels
         # Light is drawn as many whole pixels aside as a calm sea bends it: margins need hold the waves' share alone.
         drift = (deep * float(refracted(angle, (np.zeros(1), np.zeros(1)), index)[0][0])) / self._pixel

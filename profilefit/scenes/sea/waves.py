@@ -222,6 +222,14 @@ def checked_sun(depth: object, tilt: object, n: object) -> tuple[float, float, f
     return float(depth), float(tilt), float(n)
 
 
+def require_below(sea: Waves, floor: Waves) -> None:
+    """Raise InputError where a floor has not the sea's tile, or is not below its lowest trough."""
+    if floor.tile != sea.tile:
+        raise InputError(f"floor must have the sea's tile of {sea.tile:g} m, got {floor.tile:g}")
+    if floor.highest >= sea.lowest:
+        raise InputError(f"floor must be below the sea's lowest trough, {sea.lowest:g} m, got {floor.highest:g}")
+
+
 def _lattice(tile: float, harmonics: int) -> Floats:
     """Return the wave vectors of up to so many waves a tile, one of each pair of opposite ones (n, 2) [1/m]."""
     whole = np.arange(-harmonics, harmonics + 1)
