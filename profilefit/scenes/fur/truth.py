@@ -33,14 +33,6 @@ class Patch:
     length: float
     lean: tuple[float, float] = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        for name in ("side", "radius", "length"):
-            value = getattr(self, name)
-            if not (is_number(value) and 0 < value < np.inf):
-                raise InputError(f"{name} must be a finite length > 0, got {shown(value)}")
-        if self.feet.ndim != 2 or self.feet.shape[1] != 2 or not 1 <= len(self.feet) <= MOST_STRANDS:
-            raise InputError(f"feet must be 1 to {MOST_STRANDS} strands (k, 2), got shape {self.feet.shape}")
-
     @property
     def density(self) -> float:
         """Number of strands per unit of area."""
