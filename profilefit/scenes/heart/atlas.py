@@ -20,6 +20,7 @@ from typing import Self
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_cdt, label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -34,6 +35,7 @@ from profilefit.scenes.stage.world import Mesh, Part
 from profilefit.shader.emit import text_beside
 
 Floats = NDArray[np.float64]
+EIGHT = np.ones((3, 3))  # a texel and its neighbours
 LEAST = 2  # texels of a margin: linear reads next to an edge
 REACH = 3.3  # of a blur's taps, in its sigma
 SHORTEST = 0.2  # of texels are shorter than those whose margins blurs are made for
@@ -72,10 +74,13 @@ class Atlas:
 
     def draw(self, stage: Unwraps, part: Part) -> None:
         """Draw irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
+        if self._links is None:
+            _require_charts(part.mesh)
         self.renderer.run(stage.unwrapping(part, self.inset))
         if self._links is None:
             place = self.read("position_map")
             inside = place[..., 3] > INSIDE
+            self._require_apart(part.mesh, inside)
             self._links = links(place[..., :3].astype(float), inside, self.margin)
         self.renderer.run(self._filled("position_map"), self._pass("stretch", STRETCH, "position_map", FILLED))
         if not self.texel:
@@ -117,6 +122,29 @@ class Atlas:
     def __exit__(self, *error: object) -> None:
         self.release()
 
+    def _require_apart(self, mesh: Mesh, inside: NDArray[np.bool_]) -> None:
+        """Raise InputError where two triangles lie on one texel, or two charts nearer than their margins are wide."""
+        covered = 0.5 * np.abs(_areas(mesh)).sum() * np.prod(np.multiply(self.inset, self.size))
+        texels = np.count_nonzero(inside)
+        edge = np.count_nonzero(inside & ~binary_erosion(inside, EIGHT))
+        if not texels:
+            raise InputError(f"mesh must cover texels of the atlas, got none of {self.size[0]} x {self.size[1]}")
+        if covered > texels + edge:
+            raise InputError(
+                f"charts must not overlap, nor triangles turn over: they cover {covered:.0f} texels, of which "
+                f"{texels} are one or another's"
+            )
+        charts, count = label(inside, EIGHT)
+        away, nearest = distance_transform_cdt(charts == 0, "chessboard", return_indices=True)
+        owner = charts[tuple(nearest)]
+        for axis in (0, 1):
+            (one, other), (there, here) = ((np.delete(of, -1, axis), np.delete(of, 0, axis)) for of in (owner, away))
+            if np.any((one != other) & (there + here <= 2 * self.margin)):
+                raise InputError(
+                    f"charts must lie {2 * self.margin + 1} texels apart, twice the margin of this atlas and one, got "
+                    f"some of {count} that are nearer"
+                )
+
     def _gaussian(self, done: float, variance: float) -> Iterator[Pass]:
         """Yield passes from one variance to another [mm^2], in so many parts that each stays within the margin."""
         widest, sigma = self.margin / REACH, np.sqrt(variance - done)
@@ -145,7 +173,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     """
     a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
     p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
-    flat = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
+    flat = _areas(mesh)
     good = np.abs(flat) > 0
     by_u = ((b - a) * (r - p)[:, 1:] - (c - a) * (q - p)[:, 1:])[good] / flat[good, None]
     by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
@@ -157,6 +185,25 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     margin = int(np.clip(min(inner.min() // 12, (_apart(mesh, inner) - 1) // 2), LEAST, 24))
     columns, rows = (inner + 2 * margin).tolist()
     return (columns, rows), margin
+
+
+def _require_charts(mesh: Mesh) -> None:
+    """Raise InputError on a mesh that cannot be laid out."""
+    count = len(mesh.position)
+    if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):
+        raise InputError(f"mesh must have a finite uv at each of {count} vertices, got an array of {mesh.uv.shape}")
+    if not np.all((mesh.uv >= 0) & (mesh.uv <= 1)):
+        raise InputError(f"uv must be in [0, 1], got {mesh.uv[~((mesh.uv >= 0) & (mesh.uv <= 1))][0]:g}")
+    flat = _areas(mesh)
+    if not np.all(np.abs(flat) > 0):
+        at = int(np.argmin(np.abs(flat)))
+        raise InputError(f"triangles must have an area in the atlas, got 0 of triangle {at} of {len(flat)}")
+
+
+def _areas(mesh: Mesh) -> Floats:
+    """Return twice the areas of triangles in the atlas, below 0 of those that turn over (n,)."""
+    p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
+    return (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
 
 
 def _apart(mesh: Mesh, inner: Floats) -> float:

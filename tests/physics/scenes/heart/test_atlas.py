@@ -1,5 +1,7 @@
 """Light in texture space against the oracle of a sphere, and where an atlas fails if it is made carelessly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
@@ -169,13 +171,17 @@ def test_elements_are_the_surface(stage):
 @pytest.mark.slow
 @pytest.mark.parametrize("apart", [4, 1])
 def test_a_heart_is_blurred_as_its_sum(stage, apart):
-    """All of it, and next to the seams of six charts."""
+    """All of it, and next to the seams of six charts; where they lie nearer than margins are wide, that is refused."""
     part = Part(heart(2.0 * RADIUS), WHITE)
     stage.draw(Scene((part,)))
     size, margin = atlas_size(part.mesh, 0.25, 400)
     finest, least = atlas_size(part.mesh, 0.0, 12 * CHARTS_END, CHARTS_END)
     kernel = Kernel(np.array([0.1, 0.4]), np.array([0.6, 0.4]))
-    with Atlas(stage.context, size, margin) as atlas, Atlas(stage.context, finest, least) as fine:
+    with (
+        Atlas(stage.context, size, margin) as atlas,
+        Atlas(stage.context, finest, least) as fine,
+        Atlas(stage.context, size, 3 * margin) as wide,
+    ):
         for one in (atlas, fine):
             one.draw(stage, part)
             lit(one, 1.0 + cosine(one))
@@ -191,3 +197,31 @@ def test_a_heart_is_blurred_as_its_sum(stage, apart):
             expected = summed(fine.elements(), kernel.variances, kernel.weights, own.points[chosen], light)[:, 0]
             assert rms(found[chosen] - expected, own.areas[chosen]) < bound
             assert rms(light[:, 0] - expected, own.areas[chosen]) > 1.5 * bound
+        with pytest.raises(InputError, match=f"charts must lie {6 * margin + 1} texels apart, .* some of 6 that"):
+            wide.draw(stage, part)
+
+
+def flawed(**changes) -> Part:
+    return Part(replace(bumps(10.0, 0.0, 20.0, 8), **changes), WHITE)
+
+
+SHEET = bumps(10.0, 0.0, 20.0, 8)
+COLLAPSED = np.where(SHEET.uv == SHEET.uv.max(), SHEET.uv[-2, 0], SHEET.uv)
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        (flawed(uv=np.zeros((81, 0))), r"mesh must have a finite uv at each of 81 vertices, got an array of \(81, 0\)"),
+        (flawed(uv=SHEET.uv * np.nan), "mesh must have a finite uv at each of 81 vertices"),
+        (flawed(uv=2.0 * SHEET.uv), r"uv must be in \[0, 1\], got "),
+        (flawed(uv=0.0 * SHEET.uv), "triangles must have an area in the atlas, got 0 of triangle 0 of 128"),
+        (flawed(uv=COLLAPSED), "triangles must have an area in the atlas, got 0 of triangle 7 of 128"),
+        (flawed(uv=np.abs(SHEET.uv - 0.5)), "charts must not overlap, nor triangles turn over: they cover 6400 texels"),
+    ],
+)
+def test_a_mesh_that_cannot_be_laid_out(stage, part, message):
+    """Refused in one line, before links are made."""
+    stage.draw(Scene((part,)))
+    with Atlas(stage.context, (100, 100), 10) as atlas, pytest.raises(InputError, match=message):
+        atlas.draw(stage, part)
