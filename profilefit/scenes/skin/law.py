@@ -49,11 +49,6 @@ class SkinGaussians:
         gaussians = np.exp(-(scaled[..., None, :] ** 2) / (2.0 * variance)) / (2.0 * np.pi * variance)
         return np.sum(np.array(self.weights) * gaussians, axis=-2)
 
-    @property
-    def energy(self) -> Floats:
-        """Integral of 2 pi r R over all r, of red, green, blue [-]."""
-        return np.sum(self.weights, axis=0) * np.square(self.stretches)
-
 
 # White light in, white light out: each channel's weights sum to one, and an albedo texture multiplies.
 D_EON = SkinGaussians(
