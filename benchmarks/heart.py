@@ -13,9 +13,11 @@ heart are over the mean light, against exact light; times are of this machine's 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from moderngl import Context
 from scipy.ndimage import gaussian_filter
 
 import profilefit
@@ -44,6 +46,7 @@ SIZES = ((512, 512), (768, 768), (1024, 1024), (1280, 1280))
 WAYS = {"split": (4, 16, 64), "texture": (1,), "screen": (4, 16, 64), "none": (1,)}
 JUDGED, TURNS = 2000, 3  # pixels; of times
 TEXELS, VIEWS = (0.1, 0.2, 0.4, 0.7), (0.0, 60.0, 120.0)  # [mm], degrees from the front
+MAPPED = (scene.SPLIT, scene.TEXTURE, scene.SCREEN)
 SUPER, JITTERS = 8, (0.3, 0.5, 1.0)  # samples of a side; sigma [pixels]
 FINER = (0.7, 0.4, 0.2, 0.1)
 # A sheet that hides light: period 10, amplitude 2, eye at 50 degrees, lamp at 40, in mean free paths of alpha = 0.9.
@@ -190,10 +193,31 @@ def edges() -> list[tuple[str, ...]]:
     return found
 
 
+def over_texel_and_view(
+    context: Context, request: scene.HeartRequest, texels: Sequence[float], degrees: Sequence[float]
+) -> dict[str, np.ndarray]:
+    """Return errors (texels, views) of texture, screen and their split, by mean sides [mm] and turns of the view."""
+    errors = {kind: np.empty((len(texels), len(degrees))) for kind in MAPPED}
+    light = scene.light_of(request, COUNT)
+    for column, one in enumerate(degrees):
+        with scene.reference_render(context, turned(request, one), light, JUDGED) as seen:
+            for row, texel in enumerate(texels):
+                with seen.with_texels(texel) as own:
+                    for kind in MAPPED:
+                        errors[kind][row, column] = chart.error(own, kind)
+    return errors
+
+
+def turned(request: scene.HeartRequest, degrees: float) -> scene.HeartRequest:
+    """Return the request seen from the front, turned by an angle about the upright."""
+    angle, distance = np.radians(degrees), request.camera.distance
+    return request.changed(camera_table={"direction": (np.sin(angle), 0.0, np.cos(angle)), "distance": distance})
+
+
 def mapped() -> dict[str, np.ndarray]:
     """Return errors by texel and view."""
     with opened() as context:
-        return chart.over_texel_and_view(context, request(), scene.light_of(request(), COUNT), TEXELS, VIEWS)
+        return over_texel_and_view(context, request(), TEXELS, VIEWS)
 
 
 def main(arguments: list[str] | None = None) -> None:

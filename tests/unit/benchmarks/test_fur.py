@@ -7,17 +7,8 @@ import pytest
 
 from benchmarks import fur, fur_choose
 from benchmarks.fur_choose import COVER, DEGREES, SLENDER, TOLERANCES, Fur, Judged, furs, summary
-from benchmarks.fur_feet import mean_shadow
 from benchmarks.fur_layers import LINEAR, layers_for
-from profilefit.scenes.fur.law import shadow
 from profilefit.studies.choose import scenes as study
-
-
-def test_a_mean_shadow_is_that_of_leans_drawn():
-    for degrees in (0.0, 50.0):
-        theta, drawn = np.radians(degrees), np.random.default_rng(2).normal(0.0, 0.3 / 2.0**0.5, (200_000, 2))
-        aside = np.hypot(np.tan(theta) - drawn[:, 0], drawn[:, 1])
-        assert mean_shadow(theta, 0.3) == pytest.approx(np.mean(shadow(0.05, 1.0, np.arctan(aside))), rel=0.005)
 
 
 def test_layers_of_an_error():

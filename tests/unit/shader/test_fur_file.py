@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.fur_feet import shared_shadow
 from profilefit.scenes.fur import law, truth
-from profilefit.scenes.fur.source import source, strand_text
+from profilefit.scenes.fur.law import source, strand_text
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.cells import RoundedText
@@ -153,7 +154,7 @@ def test_what_an_eye_and_a_lamp_share(context):
     exact = DOUBLE.call("shared", *given)
     some = slice(0, None, 40)
     angles = (np.arctan(one[some] / radius[some]) for one in (first, second))
-    library = [law.shared_shadow(1.0, 1.0, *each) for each in zip(*angles, turn[some], strict=True)]
+    library = [shared_shadow(1.0, 1.0, *each) for each in zip(*angles, turn[some], strict=True)]
     np.testing.assert_allclose(exact[some] / radius[some] ** 2, library, rtol=1e-7)
     for one in (first, second):
         assert np.all(exact <= DOUBLE.call("shadow", radius, one) * (1.0 + 1e-9))

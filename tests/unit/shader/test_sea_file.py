@@ -7,7 +7,7 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.scenes.sea import law
-from profilefit.scenes.sea.source import blur_text, export_blur, export_segment, segment_text
+from profilefit.scenes.sea.source import blur_text, export_blur, segment_text, source
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
 from tests.unit.shader.test_phase_text import functions
@@ -60,7 +60,7 @@ def test_in_float32_on_opengl(context):
 
 @pytest.mark.parametrize("lang", LANGUAGES)
 def test_whole_files(lang):
-    segment, blur = export_segment(lang), export_blur(BLURS, C, DEPTH, lang)
+    segment, blur = source("sea-segment", lang), export_blur(BLURS, C, DEPTH, lang)
     if lang == "json":
         assert json.loads(segment)["law"] == "sea-segment"
         green = json.loads(blur)["numbers"]["green"]
@@ -69,7 +69,7 @@ def test_whole_files(lang):
     assert "sea_segment_integral(c, s0, t0, m, t1)" in segment
     assert "after 4 m of water" in blur
     assert "attenuation of red, green, blue 0.5, 0.2, 0.4 [1/m]" in blur
-    assert "sea_" not in export_segment(lang, "fog")
+    assert "sea_" not in source("sea-segment", lang, "fog")
     assert "fog_share(" in export_blur(BLURS, C, DEPTH, lang, "fog")
     if lang == "python":
         assert functions(segment)["sea_segment_integral"](1.0, 0.0, 0.0, -1.0, 2.0) == 2.0

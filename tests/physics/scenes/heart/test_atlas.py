@@ -8,9 +8,8 @@ from scipy.ndimage import binary_erosion
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.atlas import BLURRED, Atlas, atlas_size
+from profilefit.scenes.heart.atlas import BLURRED, Atlas, atlas_size, links
 from profilefit.scenes.heart.law import Kernel
-from profilefit.scenes.heart.links import links
 from profilefit.scenes.heart.meshes import CHARTS_END, ball, bumps, heart
 from profilefit.scenes.heart.truth import sphere_blur, summed
 from profilefit.scenes.stage.stage import Stage
