@@ -14,8 +14,7 @@ from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, LayerTechnique, least_layers, trial
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
-from profilefit.scenes.heart.chart import SURE
-from profilefit.scenes.heart.law import occlusion_error
+from profilefit.scenes.heart.chart import SURE, occlusion_error
 from profilefit.scenes.heart.meshes import CHARTS_END, off_edges
 from profilefit.scenes.heart.passes import ATLAS, Balanced
 from profilefit.scenes.heart.scene import HeartRequest, light_of, staged

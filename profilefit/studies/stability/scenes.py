@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from profilefit.scenes.fur.law import shadow, shell_shadow
-from profilefit.scenes.fur.source import strand_text
+from profilefit.scenes.fur.law import shadow, shell_shadow, strand_text
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, LayerTechnique, trial
 from profilefit.scenes.heart.atlas import BLURRED, Atlas
@@ -24,11 +23,10 @@ from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.meshes import ball, bumps
 from profilefit.scenes.heart.passes import gather_of
 from profilefit.scenes.heart.truth import sphere_blur
-from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
 from profilefit.scenes.sea.scene import PHASE, lobes_of
 from profilefit.scenes.sea.source import segment_text
-from profilefit.scenes.sea.waves import Waves, random_floor
+from profilefit.scenes.sea.waves import Waves, first_hit, random_floor, wrong_shares
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Mesh, Part, Scene, unit
@@ -51,7 +49,7 @@ Floats = NDArray[np.float64]
 DIGITS = 1e-6  # relative: a few roundings in float32
 
 HITS, BEAM, SEGMENT = "rays with a wrong hit", "beam, cw 0.1", "segment"  # quantities
-# Searches of a hit, as `hits.wrong_shares` calls them, 3 iterations each, with the S below which each is promised to be
+# Searches of a hit, as `waves.wrong_shares` calls them, 3 iterations each, with the S below which each is promised to be
 # right: beyond, iterations alone find another crossing, or none. The first three are ours. From S = 1 on a ray may
 # cross the floor more than once.
 SEVERAL = 1.0

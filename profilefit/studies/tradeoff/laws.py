@@ -43,7 +43,7 @@ from profilefit.laws.quantile import Quantile, radius
 from profilefit.laws.rational import Normalisation
 from profilefit.laws.two_parts import TwoPartHazard
 from profilefit.recipes import catalogue
-from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
+from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, STEP, Curves, exact_table
 from profilefit.studies.tradeoff import stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track

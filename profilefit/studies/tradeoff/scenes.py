@@ -22,9 +22,9 @@ from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.sea import scene as sea_scene
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
+from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.scene import SeaRender, SeaRequest
-from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
 from profilefit.scenes.sea.truth import caustic_photons, misfit
 from profilefit.scenes.sea.waves import Waves, random_sea
 from profilefit.scenes.stage.picture import ChartPoint
@@ -151,7 +151,7 @@ def shafts(sizes: SeaSizes = SEA) -> Panel:
         for z, up, length in ((1.0, 0.35, 2.0), (2.0, -0.35, 3.0), (0.5, 0.79, 2.0), (2.5, -1.05, 2.5), (1.5, 0.0, 3.0))
         for side in (0.0, 0.7)
     ]
-    true = np.array([by_quadrature(bundle, at, one) for at in views])
+    true = np.array([by_prisms(bundle, at, one, FINE) for at in views])
     points = []
     for name, way in SHAFTS.items():
         for count in sizes.of_shafts:

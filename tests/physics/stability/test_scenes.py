@@ -7,7 +7,7 @@ from profilefit.errors import ShaderError
 from profilefit.scenes.fur.law import shell_shadow
 from profilefit.scenes.fur.ways import FITTED, LINEAR
 from profilefit.scenes.heart.atlas import Atlas
-from profilefit.scenes.sea.hits import first_hit
+from profilefit.scenes.sea.waves import first_hit
 from profilefit.studies.stability import scenes
 from profilefit.studies.stability.cells import Verdict, regions_of
 from profilefit.studies.stability.scenes import FILLED, FULL, SLENDER, filled

@@ -10,7 +10,7 @@ from profilefit.errors import InputError, ShaderError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.diffusion import BeamDiffusion
 from profilefit.recipes import catalogue
-from profilefit.scenes.fur.source import strand_text
+from profilefit.scenes.fur.law import strand_text
 from profilefit.scenes.sea.source import blur_text, segment_text
 from profilefit.shader import emit
 from profilefit.shader.context import program

@@ -16,8 +16,9 @@ import pytest
 from profilefit.errors import InputError, ShippedMap
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import find
-from profilefit.scenes.fur.source import source as fur_source
-from profilefit.scenes.sea.source import export_blur, export_segment
+from profilefit.scenes.fur.law import source as fur_source
+from profilefit.scenes.sea.source import export_blur
+from profilefit.scenes.sea.source import source as sea_source
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.law_file import LANGUAGES, TARGETS, commented, export
@@ -234,7 +235,7 @@ def test_the_clamps_are_those_that_it_states(name):
 EXPORTERS = {
     "law": partial(export, find("hazard", FITS), FITS),
     "phase": partial(export_phase, RECORD),
-    "segment": export_segment,
+    "segment": partial(sea_source, "sea-segment"),
     "blur": partial(export_blur, BLURS, C, DEPTH),
     "fur": partial(fur_source, "fur"),
 }
