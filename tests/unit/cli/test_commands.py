@@ -193,10 +193,7 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
         ("count = 9|count = 1", "albedos.count must be between 3 and 1000, got 1"),
         ("count = 9|cuont = 9", "unknown key 'cuont'"),
         ("[weighting]|[weighting", "is not TOML"),
-        (
-            'objective = "albedo"|objective = "energy"',
-            "must be one of albedo, reflectance, relative_reflectance, got",
-        ),
+        ('objective = "albedo"|objective = "energy"', "must be one of albedo, reflectance, relative_reflectance, got"),
         (
             'truth = "orders"|truth = "orders"\nmfp = [0.0]',
             "mfp must be a list of lengths from 0.001 to 1000, got [0.0]",

@@ -248,10 +248,7 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
         (("none.jpg", "--scale", f"1,1:{'9' * 5000},1=10mm"), "scale must have two points that are apart, on a photo"),
         (("SPOT", *SCALE, "--beam", "0.5mm"), "--beam must be a value with its error"),
         (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
-        (
-            ("SPOT", *SCALE, "--glare", "2+-2"),
-            "--glare must be a value between 0 and 1 with an error",
-        ),
+        (("SPOT", *SCALE, "--glare", "2+-2"), "--glare must be a value between 0 and 1 with an error"),
         (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
         (("SPOT", *SCALE, "--grey", "SPOT", "--reflectance", "97.1"), "got '97.1' (a share: 0.971 for 97.1 %)"),
         (
@@ -262,10 +259,7 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
         (("SPOT", *SCALE, "--n", "3"), "n = 3"),
         (("SPOT", *SCALE, "--n", "1.7", "--g", "0", "--out", "out"), "without --out the medium alone is measured"),
         (("--simulate", "SETUP.toml"), "--out must be a folder"),
-        (
-            ("--simulate", "SETUP.toml", *SCALE, "--out", "out"),
-            "--scale must be left out where photographs",
-        ),
+        (("--simulate", "SETUP.toml", *SCALE, "--out", "out"), "--scale must be left out where photographs"),
         (("SPOT", "--simulate", "SETUP.toml", "--out", "out"), "SHOT must be left out"),
     ],
     ids=str,

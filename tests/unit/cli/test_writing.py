@@ -106,10 +106,7 @@ for words in {EXPORT[:-1]!r}, {(*EXPORT, f"{name}/law.glsl")!r}:
     os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})  # now that all is imported, from wherever it is
 """
         child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-        assert (child.returncode, child.stderr) == (
-            2,
-            f"profilefit: cannot write {name}/law.glsl: Permission denied\n",
-        )
+        assert (child.returncode, child.stderr) == (2, f"profilefit: cannot write {name}/law.glsl: Permission denied\n")
         assert not os.listdir(name)
 
 

@@ -501,22 +501,14 @@ def lines_of(run: str) -> str:
         ),
         (None, ("walk", "two.mci"), "No such command 'walk'. .*"),
         (None, ("run", "two.mci", "--out", "two.mci"), "cannot write into two.mci: .*"),
-        (
-            None,
-            ("run", "two.mci", "--out", "a/folder"),
-            "cannot write a/folder/first.mco: it is a folder",
-        ),
+        (None, ("run", "two.mci", "--out", "a/folder"), "cannot write a/folder/first.mco: it is a folder"),
         (lines_of("x.mco A\nten\n"), ("run", "two.mci"), "two.mci:4: expected the number of photons, .*, got 'ten'"),
         (
             runs(("two.mci", 9, 1)),
             ("run", "two.mci"),
             "cannot write two.mci for two.mci: it belongs to the input file .*",
         ),
-        (
-            runs(("x.mco", 9, 1), ("x", 9, 1)),
-            ("run", "two.mci"),
-            "cannot write x.npz for x: it belongs to x.mco",
-        ),
+        (runs(("x.mco", 9, 1), ("x", 9, 1)), ("run", "two.mci"), "cannot write x.npz for x: it belongs to x.mco"),
         *(
             (
                 runs(("x.mco", 9, 1), (name, 9, 1)),

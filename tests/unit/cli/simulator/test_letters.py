@@ -12,11 +12,7 @@ LINE = "α 0.12 ± 0.03 → ▁▅█ √(1 − α) 漢"
 
 @pytest.mark.parametrize(
     ("encoding", "printed"),
-    [
-        ("utf-8", LINE),
-        ("latin-1", "a 0.12 ± 0.03 > _~# V(1 - a) ?"),
-        ("ascii", "a 0.12 + 0.03 > _~# V(1 - a) ?"),
-    ],
+    [("utf-8", LINE), ("latin-1", "a 0.12 ± 0.03 > _~# V(1 - a) ?"), ("ascii", "a 0.12 + 0.03 > _~# V(1 - a) ?")],
 )
 def test_one_letter_for_one(monkeypatch, encoding, printed):
     paper = io.BytesIO()
