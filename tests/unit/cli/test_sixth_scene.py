@@ -39,6 +39,4 @@ def test_it_is_drawn_by_the_command(command, opengl, toy):
 
 def test_its_mistakes_are_one_line(command, toy):
     Path(toy).write_text(FILE.replace("[technique]", "k = -1\n[technique]"), encoding="utf-8")
-    status, out, err = command("scene", toy, "--out", "drawn")
-    assert (status, out) == (2, "")
-    assert err == f"profilefit: {toy}: k must be a number > 0, got -1\n"
+    assert command("scene", toy, "--out", "drawn") == (2, "", f"profilefit: {toy}: k must be a number > 0, got -1\n")

@@ -12,8 +12,11 @@ from profilefit.studies.tradeoff.parts import is_comparable, keep, read
 
 def test_an_unknown_part_is_one_line(command, tmp_path):
     status, out, err = command("tradeoff", "laws", "light")
-    assert (status, out) == (2, "")
-    assert err == "profilefit: PART must be one of truth, laws, samplers, fits, sea, fur, got 'light'\n"
+    assert (status, out, err) == (
+        2,
+        "",
+        "profilefit: PART must be one of truth, laws, samplers, fits, sea, fur, got 'light'\n",
+    )
     assert list(tmp_path.iterdir()) == []
 
 

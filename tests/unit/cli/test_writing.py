@@ -114,8 +114,11 @@ def test_what_is_filled_in_place_must_be_a_file(command, tmp_path):
     """To read a pipe would wait for ever."""
     os.mkfifo(tmp_path / "pipe")
     status, out, err = command("report", "burley-whole", "--markdown", "pipe")
-    assert (status, out) == (2, "")
-    assert err == "profilefit: --markdown must be a file whose tables are filled in, got pipe, which is none\n"
+    assert (status, out, err) == (
+        2,
+        "",
+        "profilefit: --markdown must be a file whose tables are filled in, got pipe, which is none\n",
+    )
 
 
 def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from mcml_sim.cli.terminal import STOPPING, mend_streams, two_interrupts, without_logs
+from mcml_sim.cli.program import ENCODED, STANDS_FOR, STOPPING, mend_streams, two_interrupts, without_logs
 from mcml_sim.results.tally_file import read_results
 
 MCI = "1.0\n1\nfirst.mco A\n2000\n0.01 0.02\n4 5 3\n1\n1.0\n1.4 10 90 0.5 0.05\n1.0\n"
 STOPPED = "mcml-sim: stopped; the finished batches are kept, the same command resumes\n"
+LINE = "α 0.12 ± 0.03 → ▁▅█ √(1 − α) 漢"
 
 
 @pytest.fixture
@@ -81,14 +82,30 @@ def test_closed_streams_do_no_harm(mci, tmp_path):
     assert read_results(tmp_path / "first.npz").photons == 2000
 
 
-def test_letters_that_the_terminal_lacks_are_replaced(monkeypatch):
-    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    monkeypatch.setattr(sys, "stdout", screen)
-    with pytest.raises(UnicodeEncodeError):
-        print("0.5 ± 0.1")
+@pytest.mark.parametrize(
+    ("encoding", "printed"),
+    [("utf-8", LINE), ("latin-1", "a 0.12 ± 0.03 > _~# V(1 - a) ?"), ("ascii", "a 0.12 + 0.03 > _~# V(1 - a) ?")],
+)
+def test_a_poor_encoding_prints_another_letter_for_each(monkeypatch, encoding, printed):
+    """So that columns stay in place."""
+    paper = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(paper, encoding=encoding))
+    if encoding != "utf-8":
+        with pytest.raises(UnicodeEncodeError):
+            print(LINE)
     mend_streams()
-    print("0.5 ± 0.1 \N{SNOWMAN}", flush=True)
-    assert screen.buffer.getvalue() == b"0.5 + 0.1 ?\n"
+    print(LINE, flush=True)
+    assert paper.getvalue().decode(encoding) == printed + "\n"
+    assert len(printed) == len(LINE)
+
+
+def test_every_letter_has_one_in_ascii():
+    assert all(len(text) == 1 and text.isascii() for text in STANDS_FOR.values())
+
+
+def test_what_cannot_be_read_is_not_spelled():
+    with pytest.raises(UnicodeDecodeError, match="can't decode byte"):
+        b"\xff".decode("utf-8", ENCODED)
 
 
 @pytest.mark.usefixtures("python_handles_sigint")
