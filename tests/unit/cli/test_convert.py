@@ -128,13 +128,6 @@ def test_every_length_is_an_option(table, name):
         assert table("--alpha", "0.5,0.9", "--falloff", "0.3um") == found
 
 
-def test_there_and_back_through_an_engine(table):
-    first = table("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
-    again = table("--alpha", repr(first["alpha"][0]), "--unreal-mfp", f"{first['unreal_mfp'][0]!r}mm")
-    for name in {*BY_NAME, "alpha", "mu_a", "mu_s"}:
-        assert again[name] == pytest.approx(first[name], rel=1e-12)
-
-
 def test_coefficients_are_a_colour_and_a_length(table):
     found = table("--mu-a", "0.032,0.17,0.48/mm", "--mu-s", "0.74/mm,0.88/mm,1.01/mm")
     np.testing.assert_allclose(found["mu_s"], [0.74, 0.88, 1.01], rtol=1e-14)
