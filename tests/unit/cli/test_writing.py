@@ -1,4 +1,4 @@
-"""What a command writes goes through the writer of whole files, whose refusals are one line; records come in pairs."""
+"""What a command writes goes through the writer of whole files, whose refusals are one line; pairs, and examples."""
 
 import os
 from pathlib import Path
@@ -9,6 +9,7 @@ from profilefit.errors import OutputError
 from profilefit.recipes import record
 from profilefit.recipes.catalogue import fits_folder
 from profilefit.report.figures.canvas import canvas, save
+from tests.fixtures import EXAMPLES
 
 
 @pytest.mark.parametrize(
@@ -42,3 +43,26 @@ def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):
     with pytest.raises(OutputError, match=r"cannot write .*two\.json: it is a folder"):
         record.write(tmp_path, "two", record.read(path), record.read_arrays(path))
     assert {one.name for one in tmp_path.iterdir()} == {"one.svg", "two.json"}
+
+
+def test_every_example_is_copied_and_named(command):
+    status, out, err = command("examples")
+    assert (status, err) == (0, "")
+    assert out.splitlines() == [f"examples/{name}" for name in EXAMPLES]
+    assert all(Path("examples", name).read_bytes() == Path(path).read_bytes() for name, path in EXAMPLES.items())
+
+
+@pytest.mark.parametrize("there", ["file", "link"])
+def test_what_is_there_is_never_replaced_and_nothing_is_half_copied(refused, there):
+    Path("trial").mkdir()
+    taken = Path("trial/skin.toml")
+    taken.write_text("mine") if there == "file" else taken.symlink_to("nowhere")
+    said = "cannot write into trial: skin.toml would be replaced; use --out with another folder"
+    assert refused("examples --out trial", said) == f"profilefit: {said}\n"
+    assert [path.name for path in Path("trial").iterdir()] == ["skin.toml"]
+    assert taken.is_symlink() or taken.read_text() == "mine"
+
+
+def test_where_nothing_can_be_written_is_one_line(refused):
+    Path("file").write_text("")
+    refused("examples --out file/inside", "profilefit: cannot write")

@@ -269,8 +269,7 @@ def export_faults(name: str, folder: Path, faults: list[str], told: str) -> None
     for lang in LANGUAGES if named else ():
         with bounded(faults, f"{told}, {lang}"):
             text = export(named, folder, lang)
-            if CONTROL.search(text):
-                faults.append(f"{told}, {lang}: control characters {CONTROL.findall(text)[:5]}")
+            faults += [f"{told}, {lang}: control character {one!r}" for one in CONTROL.findall(text)[:1]]
             if skeleton(text, lang) != known.get(code_of(named, lang)):
                 faults.append(f"{told}, {lang}: other code than of the record unchanged")
 
@@ -280,23 +279,19 @@ MARKS = ("short", "quality", "constants", "hazard", "readings", "inversion", "ma
 
 def table_faults(name: str, folder: Path, faults: list[str], told: str) -> None:
     """Print a record's tables, and fill those of a page in Markdown."""
-    options: dict[str, Any] = {
-        **{"quality": False, "figures_to": None, "markdown": None, "html": None, "evidence": None, "fits": folder},
-        **{"as_json": False, "quiet": True},
-    }
+    options: dict[str, Any] = dict.fromkeys(("figures_to", "markdown", "html", "evidence"))
+    options |= {"quality": False, "claims": False, "fits": folder, "as_json": False, "quiet": True}
     for names in ([name], None):
         with bounded(faults, f"{told}, tables"), contextlib.redirect_stdout(io.StringIO()) as printed:
             report(names, **options)
-            if CONTROL.search(printed.getvalue()):
-                faults.append(f"{told}, tables: control characters {CONTROL.findall(printed.getvalue())[:5]}")
+            faults += [f"{told}, tables: control character {one!r}" for one in CONTROL.findall(printed.getvalue())[:1]]
     page = folder / "page.md"
     empty = "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in MARKS)
     page.write_text(empty)
     with bounded(faults, f"{told}, markdown"):
         report([name], **options | {"markdown": page})
         text = page.read_text(encoding="utf-8")
-        if CONTROL.search(text):
-            faults.append(f"{told}, markdown: control characters {CONTROL.findall(text)[:5]}")
+        faults += [f"{told}, markdown: control character {one!r}" for one in CONTROL.findall(text)[:1]]
         if found := set(re.findall(r"(?<!\\)<[A-Za-z!/][^>]*", text)) - set(re.findall("<[^>]*", empty)):
             faults.append(f"{told}, markdown: markup {found}")
         if any(len({row.count("|") for row in rows}) > 1 for rows in _markdown_tables(text)):
@@ -375,21 +370,18 @@ def page_faults(name: str, folder: Path, faults: list[str], told: str) -> bool:
         faults.append(f"{told}: {type(error).__name__}: {str(error)[:200]} at {_place(error)}")
         return False
     found = Elements(text)
-    if new := set(found.counts) - set(known.counts):
-        faults.append(f"{told}: elements {new}")
-    if more := found.active - known.active:  # fewer, where a fit that failed has no figures
-        faults.append(f"{told}: more scripts or controls {more}")
-    if found.misnested or found.open:
-        faults.append(f"{told}: elements that do not close {found.misnested} {found.open}")
-    if strange := {one for one in found.addresses - known.addresses if not one.startswith("#")}:
-        faults.append(f"{told}: addresses {strange}")
     data = [one for one in found.scripts if one.lstrip().startswith("{")]
     for one in data:
         json.loads(one, parse_constant=pytest.fail)
-    if len(data) != 1 or "<" in data[0]:
-        faults.append(f"{told}: the explorer's data must be one piece of JSON without <")
-    if CONTROL.search(text):
-        faults.append(f"{told}: control characters {CONTROL.findall(text)[:5]}")
+    wrong: dict[str, object] = {
+        "elements": set(found.counts) - set(known.counts),
+        "more scripts or controls": found.active - known.active,  # fewer, where a fit that failed has no figures
+        "elements that do not close": found.misnested + found.open,
+        "addresses": {one for one in found.addresses - known.addresses if not one.startswith("#")},
+        "the explorer's data must be one piece of JSON without <": len(data) != 1 or "<" in data[0],
+        "control characters": CONTROL.findall(text)[:5],
+    }
+    faults += [f"{told}: {what} {seen}" for what, seen in wrong.items() if seen]
     return True
 
 
