@@ -44,6 +44,18 @@ def command(program):
 
 
 @pytest.fixture
+def done(command):
+    """Run WORDS, which must end with status 0 and nothing on stderr; what is printed."""
+
+    def run(*words: object) -> str:
+        status, out, err = command(*words)
+        assert (status, err) == (0, "")
+        return out
+
+    return run
+
+
+@pytest.fixture
 def refused(command):
     """Run WORDS, between spaces; they must be refused in one line that has `said` in it, which is returned.
 

@@ -59,9 +59,8 @@ def test_a_full_disk_is_met_before_the_work(refused, monkeypatch, tmp_path, word
 
 
 @pytest.mark.slow
-def test_regenerate_writes_a_record_that_loads(command, recipe):
-    status, out, err = command(*small(recipe, "out", "--json", "--quiet"))
-    assert (status, err) == (0, "")
+def test_regenerate_writes_a_record_that_loads(done, recipe):
+    out = done(*small(recipe, "out", "--json", "--quiet"))
     content = json.loads(Path("out/small.json").read_text())
     assert content["truth"]["photons"] == 20000
     assert content["fit"]["result"] == "converged"
@@ -227,9 +226,8 @@ def test_a_damaged_record_is_one_line(refused):
 
 
 @pytest.mark.slow
-def test_report_shows_shipped_records_and_draws_figures(command):
-    status, out, err = command("report", "albedo-liang", "--figures", "figures", "--quiet")
-    assert (status, err) == (0, "")
+def test_report_shows_shipped_records_and_draws_figures(done):
+    out = done("report", "albedo-liang", "--figures", "figures", "--quiet")
     assert "(8)" in out
     assert list(Path("figures").glob("*.png"))
 

@@ -26,10 +26,9 @@ def table(command):
     return run
 
 
-def test_tables_of_the_medium_and_of_what_to_type(command):
+def test_tables_of_the_medium_and_of_what_to_type(done):
     words = ("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
-    status, out, err = command(*words)
-    assert (status, err) == (0, "")
+    out = done(*words)
     lines = out.splitlines()
     assert max(map(len, lines)) <= 120
     assert "…" not in out

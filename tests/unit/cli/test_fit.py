@@ -45,9 +45,8 @@ def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_law_in_place_of_exact_light_brings_its_own_error(command):
-    status, out, err = command("fit", PHANTOM, "--law", "hazard")
-    assert (status, err) == (0, "")
+def test_a_law_in_place_of_exact_light_brings_its_own_error(command, done):
+    out = done("fit", PHANTOM, "--law", "hazard")
     assert out.startswith("phantom.csv: 20 points, law hazard, searchlight")
     found = json.loads(command("fit", PHANTOM, "--law", "hazard", "--json")[1])
     assert found["law"]["record"] == "hazard.json"
@@ -63,7 +62,7 @@ def half(ends):
 
 
 @pytest.mark.slow
-def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path):
+def test_errors_from_three_replicates_are_said_to_be_estimates(command, done, tmp_path):
     """Table, JSON and chain have one and the same width: Student's of the trend's freedom, and Meier's factor."""
     rows = [line.split(",") for line in Path(PHANTOM).read_text().splitlines()[2:]]
     text = "r [mm],value1,value2,value3\n"
@@ -72,8 +71,7 @@ def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path
             f"{r}," + ",".join(f"{float(value) * (1 + 0.03 * math.sin(7 * at + 2 * k)):.6g}" for k in range(3)) + "\n"
         )
     (tmp_path / "three.csv").write_text(text)
-    status, out, err = command("fit", str(tmp_path / "three.csv"))
-    assert (status, err) == (0, "")
+    out = done("fit", str(tmp_path / "three.csv"))
     found = json.loads(command("fit", str(tmp_path / "three.csv"), "--json")[1])
     assert found["data"]["pooled_freedom"] == pytest.approx(0.61 * 2 * 18, rel=0.01)
     assert max(found["data"]["freedom"]) <= found["data"]["pooled_freedom"] + 2
@@ -85,9 +83,8 @@ def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path
 
 
 @pytest.mark.slow
-def test_what_is_not_identifiable_is_reported_with_a_remedy(command):
-    status, out, err = command("fit", PHANTOM, "--scale", "free", "--r-max", "0.5mm")
-    assert (status, err) == (0, "")
+def test_what_is_not_identifiable_is_reported_with_a_remedy(done):
+    out = done("fit", PHANTOM, "--scale", "free", "--r-max", "0.5mm")
     assert "ARE NOT SEPARATELY IDENTIFIABLE" in out
     assert "alpha: anything fits as well" in out
     assert "is beyond the data's reach" in out
@@ -137,10 +134,9 @@ def test_three_rows_have_limits_where_alpha_may_be_one(command, tmp_path):
     assert length["statistical_error"] is None, "derivatives at the edge are no errors"
 
 
-def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
+def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
     """Five times as much as is there."""
-    status, out, err = command("fit", PHANTOM, "--scale", "0.2")
-    assert (status, err) == (0, "")
+    out = done("fit", PHANTOM, "--scale", "0.2")
     assert "AT AN EDGE: alpha runs to 1" in out
     assert "MISFIT (p-value below 1e-16)" in out
 

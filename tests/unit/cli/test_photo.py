@@ -133,22 +133,21 @@ def linear(folder, name):
 
 
 @pytest.mark.slow
-def test_floats_clip_where_they_have_a_plateau_only(command, folder, tmp_path):
+def test_floats_clip_where_they_have_a_plateau_only(done, folder, tmp_path):
     shares = linear(folder, "spot")
     for at, one in enumerate(shares):
         with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": one}) as file:
             file.write(str(tmp_path / f"spot-{at}.exr"))
     tifffile.imwrite(tmp_path / "one.tif", shares[0])
     for files in ([f"spot-{at}.exr" for at in range(len(shares))], ["one.tif"]):
-        status, out, err = command("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
-        assert (status, err) == (0, "")
+        out = done("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
         one = json.loads(out)["colours"]["grey"]
         for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
             assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
 
 
 @pytest.mark.slow
-def test_a_colour_of_noise_alone_changes_no_time(command, folder, tmp_path):
+def test_a_colour_of_noise_alone_changes_no_time(done, folder, tmp_path):
     """Floats, red on a pedestal of noise or of one value, the longest exposure first."""
     noise = np.random.default_rng(2).normal(0.002, 0.0005, linear(folder, "spot").shape).astype(np.float32)
     answers = []
@@ -157,8 +156,7 @@ def test_a_colour_of_noise_alone_changes_no_time(command, folder, tmp_path):
         for at, one in list(enumerate(linear(folder, "spot")[:3]))[::-1]:
             files.append(f"spot-{at}.tif")
             tifffile.imwrite(tmp_path / files[-1], np.stack([pedestal[at], one, one], axis=-1), photometric="rgb")
-        status, out, err = command("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
-        assert (status, err) == (0, "")
+        out = done("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
         answers.append(json.loads(out))
         assert list(answers[-1]["colours"]) == ["green", "blue"]
         np.testing.assert_allclose(answers[-1]["times"], [1.0, 0.25, 0.0625], rtol=0.06)
@@ -176,7 +174,7 @@ def test_white_of_sixteen_bits_is_where_pixels_pile_up(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(command, refused, folder, tmp_path):
+def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(done, refused, folder, tmp_path):
     """RGB of sixteen bits, blue dark; red and green of the same light on levels of their own."""
     levels = np.array([300, 600, 900], np.float32)
     for at, one in enumerate(linear(folder, "spot")[:2]):
@@ -184,9 +182,7 @@ def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(command
         tifffile.imwrite(tmp_path / f"spot-{at}.tif", (picture + levels).astype(np.uint16))
     tifffile.imwrite(tmp_path / "dark.tif", np.broadcast_to(levels, picture.shape).astype(np.uint16))
     words = (*SCALE, "--beam", "0.5mm+-0.05mm", "--dark", "dark.tif", "--json")
-    status, out, err = command("photo", "spot-0.tif", "spot-1.tif", *words)
-    assert (status, err) == (0, "")
-    found = json.loads(out)
+    found = json.loads(done("photo", "spot-0.tif", "spot-1.tif", *words))
     assert list(found["colours"]) == ["red", "green"]
     assert found["notes"] == ["blue: no spot is seen, so it is left out"]
     red, green = (found["colours"][one]["values"] for one in found["colours"])
@@ -316,15 +312,14 @@ def test_files_after_an_equals_sign_are_the_options_too():
 
 
 @pytest.mark.slow
-def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
+def test_a_jpeg_is_read_with_a_warning(done, folder, tmp_path):
     """Of a spot that eight bits hold; the answer says that it is no measurement."""
     for name in ("spot", "grey"):
         with rawpy.imread(several(folder, name)[0]) as raw:
             linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
         coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         cv2.imwrite(str(tmp_path / f"{name}.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
-    status, out, err = command("photo", "spot.jpg", "--grey", "grey.jpg", *SCALE)
-    assert (status, err) == (0, "")
+    out = done("photo", "spot.jpg", "--grey", "grey.jpg", *SCALE)
     assert "no exposure time is stated" in " ".join(out.split())
     assert "one exposure does not tell gain" in " ".join(out.split())
     assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())

@@ -52,9 +52,8 @@ def small(tmp_path):
 
 
 @pytest.mark.parametrize("name", [*slow("heart"), *(one for one in SCENES if one != "heart")])
-def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
-    status, out, err = command("scene", name, "--example")
-    assert (status, err) == (0, "")
+def test_the_example_says_what_is_taken_without_it(done, tmp_path, name):
+    out = done("scene", name, "--example")
     assert out == Path(EXAMPLES[SCENES[name][1]]).read_text(encoding="utf-8")
     home = import_module(SCENES[name][0])
     path = tmp_path / "printed.toml"
@@ -87,11 +86,9 @@ def test_the_truth_is_of_the_index_that_the_law_is_of(opengl, n):
 
 
 @pytest.mark.slow
-def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
+def test_a_scene_is_drawn_beside_its_truth(done, small, opengl):
     """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
-    status, out, err = command("scene", str(small), "--out", "drawn", "--json", "--quiet")
-    assert (status, err) == (0, "")
-    told = json.loads(out)
+    told = json.loads(done("scene", str(small), "--out", "drawn", "--json", "--quiet"))
     assert json.loads(Path("drawn/small.json").read_text(encoding="utf-8")) == told
     ends = ("-chart.png", "-error.png", "-truth.png", ".json", ".png")
     assert sorted(path.name for path in Path("drawn").iterdir()) == [f"small{end}" for end in ends]

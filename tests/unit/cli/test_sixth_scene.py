@@ -20,10 +20,8 @@ def toy(monkeypatch, tmp_path):
     return str(path)
 
 
-def test_it_is_drawn_by_the_command(command, opengl, toy):
-    status, out, err = command("scene", toy, "--out", "drawn", "--json", "--quiet")
-    assert (status, err) == (0, "")
-    told = json.loads(out)
+def test_it_is_drawn_by_the_command(done, opengl, toy):
+    told = json.loads(done("scene", toy, "--out", "drawn", "--json", "--quiet"))
     assert sorted(path.name for path in Path("drawn").iterdir()) == [
         *(f"toy{end}" for end in ("-chart.png", "-error.png", "-truth.png", ".json", ".png"))
     ]

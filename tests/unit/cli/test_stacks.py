@@ -56,10 +56,8 @@ def twin(text):
     return names
 
 
-def test_a_stack_becomes_a_record_and_that_a_text(command, heart):
-    status, out, err = command("regenerate", heart, "--out", "mine", "--json", "--quiet")
-    assert (status, err) == (0, "")
-    told = json.loads(out)
+def test_a_stack_becomes_a_record_and_that_a_text(command, done, heart):
+    told = json.loads(done("regenerate", heart, "--out", "mine", "--json", "--quiet"))
     assert list(told) == ["stacks/heart", "gaussians/heart"]
     assert told["gaussians/heart"]["constants"]["diffuse.6.red.w1"]["jackknife_error"] == 1e-3
     law = stacks.load(Path("mine/stacks/heart.json")).laws[1]
@@ -73,10 +71,9 @@ def test_a_stack_becomes_a_record_and_that_a_text(command, heart):
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)
-def test_every_language_says_what_it_is(command, mine, lang):
+def test_every_language_says_what_it_is(done, mine, lang):
     path = Path("mine/stacks/heart.json")
-    status, text, err = command("export", str(path), "--lang", lang)
-    assert (status, err) == (0, "")
+    text = done("export", str(path), "--lang", lang)
     for said in ("epicardium", stacks.load(path).digest, "no error of photons", "mm", "jackknife"):
         assert said.lower() in text.lower(), said
     assert text.isascii()
@@ -147,10 +144,9 @@ def test_two_files_of_one_name(refused, heart):
     )
 
 
-def test_a_stack_is_reported_by_its_name(command, mine):
+def test_a_stack_is_reported_by_its_name(command, done, mine):
     content = record.read(Path("mine/stacks/heart.json"))
-    status, out, err = command("report", "heart", "--fits", "mine", "--quiet")
-    assert (status, err) == (0, "")
+    out = done("report", "heart", "--fits", "mine", "--quiet")
     assert out.startswith("heart  Muscle under its skin")
     rows = [line.split() for line in out.splitlines()]
     for name in content["constants"]:
@@ -187,13 +183,13 @@ def test_tables_of_stacks_in_markdown(command, mine):
     assert Path("page.md").read_text(encoding="utf-8").count("old") == 3
 
 
-def test_a_stack_beside_other_records(command, heart):
+def test_a_stack_beside_other_records(command, done, heart):
     """In ./fits, and shipped: where it is from is said if that is not where the records are from."""
     command("regenerate", heart, "--quiet")
     status, out, err = command("report", "heart", "hazard")
     assert (status, err) == (0, "profilefit: stack 'heart' is of 'fits'\n")
     assert "Muscle under its skin" in out
-    assert command("report", "skin")[::2] == (0, "")
+    done("report", "skin")
     Path("fits/hazard.json").write_bytes((fits_folder() / "hazard.json").read_bytes())
     other = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
     assert command("report", "heart")[::2] == (0, other)
@@ -235,7 +231,7 @@ def test_damaged_sums_are_no_report(refused, mine):
 
 
 @pytest.mark.slow
-def test_a_grey_stack_is_fitted(command):
+def test_a_grey_stack_is_fitted(command, done):
     """Truly: a minute or two."""
     Path("veil.toml").write_text(GREY, encoding="utf-8")
     status, out, err = command("regenerate", "veil.toml", "--out", "mine", "--quiet")
@@ -255,8 +251,7 @@ def test_a_grey_stack_is_fitted(command):
     # Between the thicknesses that were fitted the law is not the light itself, nor are all constants known exactly.
     assert max(worst["rel"]) > 1e-4
     for lang in ("glsl", "hlsl", "python", "json"):
-        status, text, err = command("export", str(path), "--lang", lang)
-        assert (status, err) == (0, "")
+        text = done("export", str(path), "--lang", lang)
         assert "veil" in text
     sums = gaussians.load(Path("mine/gaussians/veil.json"))
     assert sums.content["fit"]["result"] == "converged"

@@ -45,9 +45,8 @@ def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):
     assert {one.name for one in tmp_path.iterdir()} == {"one.svg", "two.json"}
 
 
-def test_every_example_is_copied_and_named(command):
-    status, out, err = command("examples")
-    assert (status, err) == (0, "")
+def test_every_example_is_copied_and_named(done):
+    out = done("examples")
     assert out.splitlines() == [f"examples/{name}" for name in EXAMPLES]
     assert all(Path("examples", name).read_bytes() == Path(path).read_bytes() for name, path in EXAMPLES.items())
 

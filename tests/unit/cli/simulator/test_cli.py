@@ -69,9 +69,8 @@ def names(folder: Path = Path()) -> set[str]:
 
 
 @pytest.mark.slow
-def test_runs_everything_and_tells_it_with_errors(command, mci):
-    status, out, err = command("run", mci)
-    assert (status, err) == (0, "")
+def test_runs_everything_and_tells_it_with_errors(done, mci):
+    out = done("run", mci)
     assert names() == {"two.mci", "first.mco", "first.npz", "second.mco", "second.npz"}
     told = out.split("run 2 of 2: second.mco")
     assert told[0].startswith("run 1 of 2: first.mco\n  2000 photons, seed 0, ")
@@ -226,7 +225,7 @@ def test_a_link_named_as_output_is_followed(command, mci):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("--resume",)])
-def test_the_same_command_resumes(command, mci, monkeypatch, more):
+def test_the_same_command_resumes(command, done, mci, monkeypatch, more):
     """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
     photons = 2 * layered_batch.BATCH_PHOTONS + 77
     words = ("run", mci, "--photons", photons)
@@ -248,8 +247,7 @@ def test_the_same_command_resumes(command, mci, monkeypatch, more):
     assert {name for name in names() if not name.startswith("at-once")} == kept | {"two.mci"}
 
     monkeypatch.setattr(layered_batch, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
-    status, out, err = command(*words, *more)
-    assert (status, err) == (0, "")
+    out = done(*words, *more)
     assert sorted(traced) == [0, 0, 1, 1, 2, 2]
     assert re.search(rf"run 1 of 2: first.mco\n  {photons} photons, seed 0, finished before\n  specular", out)
     assert re.search(rf"run 2 of 2: second.mco\n  {photons} photons, seed 0, [0-9.]+ s.*, resumed\n  specular", out)
@@ -274,17 +272,15 @@ def test_batches_of_another_run_are_not_mixed_in(command, mci):
 
 
 @pytest.mark.parametrize("words", [("--seed", 5), ("--photons", 2500), ("--precision", 1e-4), ()])
-def test_a_precision_that_was_not_reached_blocks_no_run(command, mci, words):
+def test_a_precision_that_was_not_reached_blocks_no_run(command, done, mci, words):
     """Its photons wait for a run with more of them, until another one replaces its results."""
     mci.write_text(runs(("one.mco", 2000, 10)))
     assert command("run", mci, "--precision", 1e-4)[0] == 0
     assert Path("one.photons").is_dir()
-    status, _, err = command("run", mci, *words)
-    assert (status, err) == (0, "")
-    assert command("run", mci, "--precision", 1e-4, "--seed", 7)[::2] == (0, "")
+    done("run", mci, *words)
+    done("run", mci, "--precision", 1e-4, "--seed", 7)
     mci.write_text(runs(("one.mco", 2000, 20)))
-    status, out, err = command("run", mci, "--precision", 1e-4)
-    assert (status, err) == (0, "")
+    out = done("run", mci, "--precision", 1e-4)
     assert "finished before" not in out
 
 
@@ -321,12 +317,8 @@ def test_another_runs_store_is_found_before_any_photon(command, mci):
     assert "b/first.mco" not in names()
     Path("c").mkdir()
     Path("c/second.photons").write_text("")
-    status, out, err = command("run", mci, "--out", "c")
-    assert (status, out, err) == (
-        2,
-        "",
-        "mcml-sim: cannot use c/second.photons as a store: it is there already, and no folder\n",
-    )
+    told = "mcml-sim: cannot use c/second.photons as a store: it is there already, and no folder\n"
+    assert command("run", mci, "--out", "c") == (2, "", told)
 
 
 def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci, monkeypatch):
@@ -533,9 +525,8 @@ def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, m
     assert command("run", mci)[::2] == (2, "mcml-sim: the scheduler at here has gone; the same command resumes\n")
 
 
-def test_json_is_the_totals_with_their_errors_and_nothing_else(command, mci):
-    status, out, err = command("run", mci, "--json")
-    assert (status, err) == (0, "")
+def test_json_is_the_totals_with_their_errors_and_nothing_else(command, done, mci):
+    out = done("run", mci, "--json")
     told = json.loads(out)["runs"]
     assert [one["mco"] for one in told] == ["first.mco", "second.mco"]
     for one in told:
@@ -546,7 +537,7 @@ def test_json_is_the_totals_with_their_errors_and_nothing_else(command, mci):
             assert estimate["value"] == kept.estimates[name].value
             error = kept.estimates[name].standard_error
             assert estimate["standard_error"] == (error if np.isfinite(error) else None)
-    status, out, err = command("run", mci, "--json", "--precision", 0.5, "--quantity", "absorbed")
+    out = command("run", mci, "--json", "--precision", 0.5, "--quantity", "absorbed")[1]
     assert [one["precision"] for one in json.loads(out)["runs"]] == [
         {"quantity": "absorbed", "goal": 0.5, "reached": True}
     ] * 2
