@@ -39,9 +39,9 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def modules(root: Path, package: str) -> dict[str, Path]:
+def modules(root: Path, *packages: str) -> dict[str, Path]:
     """Dotted name -> file; a folder goes by its own name."""
-    paths = sorted((root / package).rglob("*.py"))
+    paths = [path for package in packages for path in sorted((root / package).rglob("*.py"))]
     return {".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
 
 
@@ -57,6 +57,10 @@ def imported_names(tree: ast.AST, module: str, is_package: bool) -> Iterator[str
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
+def names_in(path: Path, module: str) -> set[str]:
+    return set(imported_names(parsed(path), module, path.name == "__init__.py"))
+
+
 @cache
 def import_graph(root: Path, package: str) -> Imports:
     """Module -> the modules of the same package that it names, each the deepest that exists."""
@@ -69,8 +73,7 @@ def import_graph(root: Path, package: str) -> Imports:
 
     graph: Imports = {}
     for module, path in files.items():
-        tree = parsed(path)
-        targets = {deepest(name) for name in imported_names(tree, module, path.name == "__init__.py")}
+        targets = {deepest(name) for name in names_in(path, module)}
         graph[module] = {target for target in targets if target} - {module}
     return graph
 
@@ -110,8 +113,7 @@ def inner_imports(path: Path) -> list[str]:
 
 def test_simulator_knows_nothing_of_the_fits():
     for module, path in modules(ROOT, "mcml_sim").items():
-        names = imported_names(parsed(path), module, path.name == "__init__.py")
-        assert not [name for name in names if name.split(".")[0] == "profilefit"], path
+        assert not [name for name in names_in(path, module) if name.split(".")[0] == "profilefit"], path
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -184,41 +186,37 @@ def test_a_command_that_knows_a_kind_is_seen(tmp_path):
 def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
     """Module -> the modules of all packages that import it or from it."""
     found: dict[str, set[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            tree = parsed(path)
-            for name in imported_names(tree, module, path.name == "__init__.py"):
-                for home in (name, name.rpartition(".")[0]):
-                    found.setdefault(home, set()).add(module)
+    for module, path in modules(root, *packages).items():
+        for name in names_in(path, module):
+            for home in (name, name.rpartition(".")[0]):
+                found.setdefault(home, set()).add(module)
     return found
 
 
 def test_a_file_is_one_noun():
     """Neither a crumb of one other file nor two; subcommands and kinds of records are one file each, however short."""
-    known, wrong = importers(ROOT, list(PACKAGES)), set()
-    for package in PACKAGES:
-        for module, path in modules(ROOT, package).items():
-            lines = len(path.read_text(encoding="utf-8").splitlines())
-            if path.stem in ("__init__", "__main__") or any(shelf in module for shelf in (".cli.", ".recipes.kinds.")):
-                continue
-            if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
-                wrong.add(module)
+    known, wrong = importers(ROOT, PACKAGES), set()
+    for module, path in modules(ROOT, *PACKAGES).items():
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if path.stem in ("__init__", "__main__") or any(shelf in module for shelf in (".cli.", ".recipes.kinds.")):
+            continue
+        if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
+            wrong.add(module)
     assert wrong == set()
 
 
 def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:
     """Class name -> the modules that define one."""
     found: dict[str, list[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            for node in ast.walk(parsed(path)):
-                if isinstance(node, ast.ClassDef):
-                    found.setdefault(node.name, []).append(module)
+    for module, path in modules(root, *packages).items():
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(module)
     return found
 
 
 def test_no_two_classes_have_one_name():
-    homes = class_homes(ROOT, list(PACKAGES))
+    homes = class_homes(ROOT, PACKAGES)
     assert {name for name, modules in homes.items() if len(modules) > 1} == SHARED_NAMES
 
 
@@ -291,13 +289,12 @@ SOLVED_BY_SCIPY = {"scipy.optimize.brentq", "scipy.optimize.nnls"}
 
 def imports_of(root: Path, packages: Sequence[str], library: str) -> dict[str, set[str]]:
     """Module -> what it imports of a library, by dotted names."""
-    each: dict[str, set[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            names = imported_names(parsed(path), module, path.name == "__init__.py")
-            if own := {name for name in names if f"{name}.".startswith(f"{library}.")}:
-                each[module] = own
-    return each
+    inside = f"{library}."
+    each = {
+        module: {name for name in names_in(path, module) if f"{name}.".startswith(inside)}
+        for module, path in modules(root, *packages).items()
+    }
+    return {module: names for module, names in each.items() if names}
 
 
 @pytest.mark.parametrize("library", HOMES)
