@@ -115,33 +115,11 @@ def test_what_a_stack_does_not_take_is_one_line(refused, mine, words, said):
     refused(f"export mine/stacks/heart.json {words}", said)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("illumination", "colour", "heart.toml: keys must be of title, unit, illumination, layers, "),
-        ('"diffuse"', '"sun"', "heart.toml: illumination must be one of searchlight, diffuse, got 'sun'"),
-        (STACK[STACK.rindex("[[layers]]") :], "", "heart.toml: layers must be two layers or more"),
-        (
-            "[1.13, 1.2, 1.3]\ng = 0.0",
-            "[1.13, 1.2, 1.3]\ng = 0.0\nthickness = 1",
-            "last layer must be infinitely thick",
-        ),
-    ],
-)
-def test_a_mistake_in_the_file_is_one_line_and_writes_nothing(refused, heart, old, new, said):
-    assert STACK.count(old) == 1
-    Path(heart).write_text(STACK.replace(old, new), encoding="utf-8")
+def test_a_mistake_in_the_file_is_one_line_and_writes_nothing(refused, heart):
+    Path(heart).write_text(STACK.replace('"diffuse"', '"sun"'), encoding="utf-8")
+    said = "heart.toml: illumination must be one of searchlight, diffuse, got 'sun'"
     refused(f"regenerate {heart} --out mine --quiet", said)
     assert not Path("mine/stacks").exists()
-
-
-def test_two_files_of_one_name(refused, heart):
-    Path("other").mkdir()
-    Path("other/heart.toml").write_text(STACK, encoding="utf-8")
-    refused(
-        f"regenerate {heart} other/heart.toml --out mine",
-        "stacks must have different names, as their records do, got 'heart' twice",
-    )
 
 
 def test_a_stack_is_reported_by_its_name(command, done, mine):
@@ -219,15 +197,6 @@ def test_a_damaged_stack_is_no_report(refused, mine, words):
     path.write_text(json.dumps(content), encoding="utf-8")
     said = "heart.json: is damaged: interfaces.red.quality must be 1, one an interface, got 0; regenerate it\n"
     refused(f"{words} --fits mine --quiet", said)
-
-
-def test_damaged_sums_are_no_report(refused, mine):
-    path = Path("mine/gaussians/heart.json")
-    content = json.loads(path.read_text(encoding="utf-8"))
-    del content["sums"]["diffuse"]
-    path.write_text(json.dumps(content), encoding="utf-8")
-    said = "heart.json: is damaged: sums.diffuse must be a table, got nothing; regenerate it\n"
-    refused("report heart --fits mine --quiet", said)
 
 
 @pytest.mark.slow
