@@ -1,6 +1,7 @@
 """Runs, laws, photons and OpenGL that several files of tests look at, and the thresholds they share."""
 
 import signal
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -24,6 +25,8 @@ from profilefit.scenes.stage import gather
 from profilefit.scenes.stage.stage import Stage
 from profilefit.shader.context import open_context
 
+# The files that ship as examples, by their names.
+EXAMPLES = {path.name: str(path) for path in sorted((Path(__file__).parents[1] / "examples").iterdir())}
 # A law's tests must not move with the records: this map is within 3e-6 of the exact A, its digits are frozen here.
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 

@@ -49,8 +49,8 @@ Floats = NDArray[np.float64]
 DIGITS = 1e-6  # relative: a few roundings in float32
 
 HITS, BEAM, SEGMENT = "rays with a wrong hit", "beam, cw 0.1", "segment"  # quantities
-# Searches of a hit, as `waves.wrong_shares` calls them, 3 iterations each, with the S below which each is promised to be
-# right: beyond, iterations alone find another crossing, or none. The first three are ours. From S = 1 on a ray may
+# Searches of a hit, as `waves.wrong_shares` calls them, 3 iterations each, with the S below which each is promised to
+# be right: beyond, iterations alone find another crossing, or none. The first three are ours. From S = 1 on a ray may
 # cross the floor more than once.
 SEVERAL = 1.0
 SEARCHES: dict[str, tuple[int | str, float]] = {
