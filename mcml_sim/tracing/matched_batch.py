@@ -117,7 +117,7 @@ class MatchedBins(NamedTuple):
 def _trace_visits(
     key: Array, photons: Array, stops: Array, visiting: Array, bins: MatchedBins, parts: int, lanes: int
 ) -> tuple[Ends, tuple[Array, ...]]:
-    """Return ends as `orders_batch.trace` does, and weight that arrived by ring and depth, and by depth; variances.
+    """Return ends as `orders_batch.trace` does, and weight that arrived by ring and depth, by depth, and variances.
 
     `visiting` (MAX_ORDER + 1,) int64, in UNITs.
     """
