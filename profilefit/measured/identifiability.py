@@ -25,7 +25,6 @@ from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, covariance
 from profilefit.measured import model
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.instrument import Gaussian
 from profilefit.measured.model import NAMES, SCALE, STRENGTHS, U, alpha_of, exact_light
 from profilefit.measured.noise import WITHIN
 from profilefit.measured.problem import (
@@ -284,15 +283,15 @@ def _under_widths(problem: Problem, pencil: Solution) -> dict[float, Solution]:
     """Fit under Gaussian beams, by 1/e^2 radius: the pencil beam, the widths that are tried, and near the best."""
     fits, start = {0.0: pencil}, pencil
     for w in _widths(problem):
-        start = _under(problem, w, start)
-        fits[w] = start
+        fits[w] = start = descended(problem.under({"beam": w}), start.parameters, problem.spec.free)
     for _ in range(FINER):
         best, tried = _best(fits), sorted(fits)
         at = tried.index(best)
         for low, high in ((best, tried[min(at + 1, len(tried) - 1)]), (tried[max(at - 1, 0)], best)):
             between = float(np.sqrt(low * high))
             if between > 0 and between not in fits:
-                fits[between] = _under(problem, between, fits[best])
+                there = problem.under({"beam": between})
+                fits[between] = descended(there, fits[best].parameters, problem.spec.free)
     return fits
 
 
@@ -331,12 +330,6 @@ def as_tissue(fit: MediumFit) -> Tissue | None:
         return None
     values = model.quantities(end.parameters[None], np.zeros(1))
     return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - plain.minimum.cost)
-
-
-def _under(problem: Problem, w: float, start: Solution) -> Solution:
-    instrument = replace(problem.spec.instrument, beam=Gaussian(w))
-    there = replace(problem, spec=replace(problem.spec, instrument=instrument))
-    return descended(there, start.parameters, problem.spec.free)
 
 
 def _telling(fit: MediumFit, fits: dict[float, Solution]) -> tuple[float | None, str]:
