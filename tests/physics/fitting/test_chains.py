@@ -43,19 +43,8 @@ def fitted_line(seed, law, free=None):
     alpha = np.linspace(0.1, 0.9, 12)
     energy = (0.2 + 0.6 * alpha + 0.02 * rng.standard_normal(12))[:, None]
     factor = 0.01 * rng.standard_normal((1, 12, 12)) * np.linspace(0.2, 2.0, 12)[:, None]
-    plenty, rest = np.full_like(energy, np.inf), np.zeros(12)
-    profiles = Profiles(
-        alpha,
-        np.array([0.0, 1.0]),
-        energy,
-        0 * energy,
-        plenty,
-        rest,
-        "test",
-        Setting(),
-        1000,
-        Covariance(factor, energy, 1000, 0.0),
-    )
+    noise, light = (0 * energy, np.full_like(energy, np.inf)), (np.zeros(12), "test", Setting(), 1000)
+    profiles = Profiles(alpha, np.array([0.0, 1.0]), energy, *noise, *light, Covariance(factor, energy, 1000, 0.0))
     return fit(profiles, law, "reflectance", free=free)
 
 
