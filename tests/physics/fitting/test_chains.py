@@ -111,12 +111,6 @@ def test_curvature_adjustment_is_the_identity_it_claims():
         assert np.linalg.slogdet(adjust)[1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_same_seed_same_samples_other_seed_others(line_fit):
-    first, again, other = (posterior(line_fit, "statistical", seed, max_steps=1000) for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first.samples, again.samples)
-    assert np.any(first.samples != other.samples)
-
-
 def test_other_fits_of_a_law_compile_nothing(line_fit):
     """Other data, constants and covariances of one shape: a program for each fit would fill the memory."""
     for kind in ("statistical", "misfit"):
@@ -141,14 +135,6 @@ def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
     memory, maps = np.subtract(used[-1], used[0])
     assert memory < 500e6
     assert maps < 1000
-
-
-def test_a_chain_that_is_too_short_says_so(line_fit):
-    """tau is about two steps here: 50 are no chain."""
-    found = posterior(line_fit, "misfit", max_steps=50)
-    assert found.steps == 50
-    assert found.result.startswith("chain of 50 steps is under 50 autocorrelation times")
-    assert np.all(np.isfinite(found.samples))
 
 
 def test_chain_facts(line_fit):
