@@ -166,25 +166,17 @@ def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
     return LARGEST if excess(LARGEST) > 0 else float(brentq(excess, 0.0, LARGEST, xtol=1e-8))
 
 
-def own_degrees_of_freedom(freedom: Floats, pooled: float) -> Floats:
-    """Return degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d, add up."""
+def gaussianised(residuals: Floats, freedom: Floats, pooled: float = np.inf) -> Floats:
+    """Return residuals (m,), the first of which are over errors of `freedom` (n,), as normal ones of equal chance."""
+    # Of what each row's error has for itself: errors of ln variance, 2 / d, add up.
     own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
-    return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
-
-
-def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
-    """Return residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
-    size = np.abs(residuals)
-    tail = stats.t.logsf(size, freedom)
+    own = np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
+    rows, rest = np.split(residuals, [freedom.size])
+    size = np.abs(rows)
+    tail = stats.t.logsf(size, own)
     # Where Student's tail has no float left, so many degrees of freedom are behind it that it is a normal one.
-    few = np.isfinite(freedom) & np.isfinite(tail)
-    return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)
-
-
-def gaussianised_rows(residuals: Floats, freedom: Floats, pooled: float) -> Floats:
-    """Return residuals (m,), the first of which rest on errors of `freedom` (n,), as normal ones of equal chance."""
-    own = gaussianised(residuals[: freedom.size], own_degrees_of_freedom(freedom, pooled))
-    return np.append(own, residuals[freedom.size :])
+    few = np.isfinite(own) & np.isfinite(tail)
+    return np.append(np.sign(rows) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size), rest)
 
 
 def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
