@@ -186,19 +186,14 @@ def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
     return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
-def waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows."""
-    return np.asarray(np.exp(-0.5 * _in_lengths(r, length) ** 2), float)
+def waves(r: Floats, length: float, rough: bool = False) -> Floats:
+    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows.
 
-
-def rough_waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error of this length along ln r by which rows are weighed: no smooth one."""
-    return np.asarray(np.exp(-_in_lengths(r, length)), float)
-
-
-def _in_lengths(r: Floats, length: float) -> Floats:
+    Rows are weighed by rough ones: by smooth ones neighbours would be trusted for what they say beside the error.
+    """
     distance = apart(np.log(r), np.log(r))
-    return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    far = distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    return np.asarray(np.exp(-far if rough else -0.5 * far**2), float)
 
 
 def apart(first: Floats, other: Floats) -> Floats:
