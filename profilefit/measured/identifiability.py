@@ -120,9 +120,10 @@ def _pair(fit: MediumFit) -> tuple[tuple[str, str] | None, float]:
 
 def _interval(fit: MediumFit, at: int) -> Interval:
     """Return both ends of the profile likelihood in coordinate `at`."""
-    ends = [_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0))]  # alpha falls as u rises
-    values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
-    return Interval(NAMES[at], *values, *(is_open for _, is_open in ends))
+    ends = (_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0)))  # alpha falls as u rises
+    (low, low_is_open), (high, high_is_open) = ends
+    low, high = (float(alpha_of(x)) if at == U else float(np.exp(x)) for x in (low, high))
+    return Interval(NAMES[at], low, high, low_is_open, high_is_open)
 
 
 def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
@@ -204,8 +205,8 @@ def _points(fit: MediumFit) -> list[Candidate]:
     r = r[model.shares(fit.point, r * (1.0 + width)) < WITHIN]
     inner, outer = r * (1.0 - width), r * (1.0 + width)
     light, slopes = model.linearised(fit.point, inner, outer)
-    rows = np.column_stack([inner, outer, light[:-1], data.relative_error * light[:-1]]).tolist()
-    return [_candidate(fit, "point", *row, slope) for row, slope in zip(rows, slopes[:-1], strict=True)]
+    rows = zip(inner.tolist(), outer.tolist(), light[:-1].tolist(), slopes[:-1], strict=True)
+    return [_candidate(fit, "point", a, b, value, data.relative_error * value, slope) for a, b, value, slope in rows]
 
 
 def _others(fit: MediumFit) -> list[Candidate]:
