@@ -166,25 +166,17 @@ def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
     return LARGEST if excess(LARGEST) > 0 else float(brentq(excess, 0.0, LARGEST, xtol=1e-8))
 
 
-def own_degrees_of_freedom(freedom: Floats, pooled: float) -> Floats:
-    """Return degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d, add up."""
+def gaussianised(residuals: Floats, freedom: Floats, pooled: float = np.inf) -> Floats:
+    """Return residuals (m,), the first of which are over errors of `freedom` (n,), as normal ones of equal chance."""
+    # Of what each row's error has for itself: errors of ln variance, 2 / d, add up.
     own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
-    return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
-
-
-def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
-    """Return residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
-    size = np.abs(residuals)
-    tail = stats.t.logsf(size, freedom)
+    own = np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
+    rows, rest = np.split(residuals, [freedom.size])
+    size = np.abs(rows)
+    tail = stats.t.logsf(size, own)
     # Where Student's tail has no float left, so many degrees of freedom are behind it that it is a normal one.
-    few = np.isfinite(freedom) & np.isfinite(tail)
-    return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)
-
-
-def gaussianised_rows(residuals: Floats, freedom: Floats, pooled: float) -> Floats:
-    """Return residuals (m,), the first of which rest on errors of `freedom` (n,), as normal ones of equal chance."""
-    own = gaussianised(residuals[: freedom.size], own_degrees_of_freedom(freedom, pooled))
-    return np.append(own, residuals[freedom.size :])
+    few = np.isfinite(own) & np.isfinite(tail)
+    return np.append(np.sign(rows) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size), rest)
 
 
 def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
@@ -194,19 +186,14 @@ def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
     return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
-def waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows."""
-    return np.asarray(np.exp(-0.5 * _in_lengths(r, length) ** 2), float)
+def waves(r: Floats, length: float, rough: bool = False) -> Floats:
+    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows.
 
-
-def rough_waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error of this length along ln r by which rows are weighed: no smooth one."""
-    return np.asarray(np.exp(-_in_lengths(r, length)), float)
-
-
-def _in_lengths(r: Floats, length: float) -> Floats:
+    Rows are weighed by rough ones: by smooth ones neighbours would be trusted for what they say beside the error.
+    """
     distance = apart(np.log(r), np.log(r))
-    return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    far = distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    return np.asarray(np.exp(-far if rough else -0.5 * far**2), float)
 
 
 def apart(first: Floats, other: Floats) -> Floats:

@@ -121,8 +121,8 @@ class Profiles:
             counted = np.column_stack([value, beyond]) - orders.once(albedos)
             covariance = Covariance(factor, counted, orders.photons, dropped)
         noise = np.asarray(energy.standard_error), np.asarray(energy.effective_samples)
-        run = orders.setting, orders.photons, covariance
-        return cls(albedos, orders.grid.r_edges, value, *noise, beyond, "orders", *run)
+        rings, setting = orders.grid.r_edges, orders.setting
+        return cls(albedos, rings, value, *noise, beyond, "orders", setting, orders.photons, covariance)
 
     @classmethod
     def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:

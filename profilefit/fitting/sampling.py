@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import jax
@@ -215,14 +216,11 @@ def _map(radius: Radius, edge: float, jump: float) -> tuple[Floats, list[tuple[f
     step = np.sign(np.diff(x))
     flats = _flats(radius, x, step == 0)
     step[(SCAN[:-1] <= jump) & (jump <= SCAN[1:])] = 0.0
-    turns = [
-        _zoomed(radius, SCAN[i], SCAN[i + 2], lambda x, rising=step[i]: _about(int(np.argmax(rising * x))))
-        for i in np.flatnonzero(step[1:] * step[:-1] < 0)
-    ]
-    places = [0.5 * sum(ends) for ends in turns]
+    turns = np.flatnonzero(step[1:] * step[:-1] < 0)
+    places = [0.5 * sum(_zoomed(radius, SCAN[i], SCAN[i + 2], partial(_largest, step[i]))) for i in turns]
     extremes = [float(radius(np.array([place]))[0]) for place in places]
     crossings = [
-        0.5 * sum(_zoomed(radius, SCAN[i], SCAN[i + 1], lambda x, level=level: _passing(x > level)))
+        0.5 * sum(_zoomed(radius, SCAN[i], SCAN[i + 1], partial(_passing, np.greater, level)))
         for level in {*extremes, edge}
         for i in np.flatnonzero(np.diff(np.sign(x - level)) != 0)
     ]
@@ -237,9 +235,9 @@ def _flats(radius: Radius, x: Floats, still: NDArray[np.bool_]) -> list[tuple[fl
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         low, high, value = float(SCAN[first]), float(SCAN[last]), float(x[first])
         if first > 0:
-            _, low = _zoomed(radius, SCAN[first - 1], low, lambda x, value=value: _passing(x == value))
+            _, low = _zoomed(radius, SCAN[first - 1], low, partial(_passing, np.equal, value))
         if last < SCAN.size - 1:
-            _, high = _zoomed(radius, SCAN[last + 1], high, lambda x, value=value: _passing(x == value))
+            _, high = _zoomed(radius, SCAN[last + 1], high, partial(_passing, np.equal, value))
         flats.append((low, high, value))
     return flats
 
@@ -252,12 +250,14 @@ def _zoomed(radius: Radius, low: float, high: float, pick: Callable[[Floats], tu
     return low, high
 
 
-def _passing(true: NDArray[np.bool_]) -> tuple[int, int]:
+def _passing(compare: np.ufunc, level: float, x: Floats) -> tuple[int, int]:
+    true = compare(x, level)
     first = int(np.argmax(true != true[0])) or ZOOM - 1
     return first - 1, first
 
 
-def _about(best: int) -> tuple[int, int]:
+def _largest(rising: float, x: Floats) -> tuple[int, int]:
+    best = int(np.argmax(rising * x))
     return max(best - 1, 0), min(best + 1, ZOOM - 1)
 
 

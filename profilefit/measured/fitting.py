@@ -13,7 +13,7 @@ from scipy import stats
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.fitting.misfit import Misfit, gaussianised_rows, lack_of_fit, misfit, rough_waves, waves
+from profilefit.fitting.misfit import Misfit, gaussianised, lack_of_fit, misfit, waves
 from profilefit.fitting.solver import Solution, are_apart, lowest
 from profilefit.measured import model
 from profilefit.measured.data import Measured, require_workable, widening
@@ -193,7 +193,7 @@ class MediumFit:
         if likelier <= (-np.inf if values else 0.0):
             return None
         each = zip(variances, LACK_WAVES, strict=True)
-        joint = sum(variance * rough_waves(self.data.r, length) for variance, length in each)
+        joint = sum(variance * waves(self.data.r, length, rough=True) for variance, length in each)
         return np.asarray(joint * np.outer(self.light, self.light), float)
 
     def _in_data_errors(
@@ -209,7 +209,7 @@ class MediumFit:
         times[: self.data.value.size] = np.sqrt(self.widening)
         problem = replace(self.problem, noise=own)
         rows, slopes = problem.residuals(self.point)
-        rows, both = gaussianised_rows(times * rows, self.data.freedom, self.data.pooled), np.outer(times, times)
+        rows, both = gaussianised(times * rows, self.data.freedom, self.data.pooled), np.outer(times, times)
         size = np.outer(self.light, self.light)
         shapes = [both * own.in_errors(size * waves(self.data.r, length), count) for length in lengths]
         slopes = slopes[:, list(self.spec.free)]

@@ -25,7 +25,6 @@ from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, covariance
 from profilefit.measured import model
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.instrument import Gaussian
 from profilefit.measured.model import NAMES, SCALE, STRENGTHS, U, alpha_of, exact_light
 from profilefit.measured.noise import WITHIN
 from profilefit.measured.problem import (
@@ -121,9 +120,10 @@ def _pair(fit: MediumFit) -> tuple[tuple[str, str] | None, float]:
 
 def _interval(fit: MediumFit, at: int) -> Interval:
     """Return both ends of the profile likelihood in coordinate `at`."""
-    ends = [_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0))]  # alpha falls as u rises
-    values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
-    return Interval(NAMES[at], *values, *(is_open for _, is_open in ends))
+    ends = (_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0)))  # alpha falls as u rises
+    (low, low_is_open), (high, high_is_open) = ends
+    low, high = (float(alpha_of(x)) if at == U else float(np.exp(x)) for x in (low, high))
+    return Interval(NAMES[at], low, high, low_is_open, high_is_open)
 
 
 def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
@@ -205,8 +205,8 @@ def _points(fit: MediumFit) -> list[Candidate]:
     r = r[model.shares(fit.point, r * (1.0 + width)) < WITHIN]
     inner, outer = r * (1.0 - width), r * (1.0 + width)
     light, slopes = model.linearised(fit.point, inner, outer)
-    rows = np.column_stack([inner, outer, light[:-1], data.relative_error * light[:-1]]).tolist()
-    return [_candidate(fit, "point", *row, slope) for row, slope in zip(rows, slopes[:-1], strict=True)]
+    rows = zip(inner.tolist(), outer.tolist(), light[:-1].tolist(), slopes[:-1], strict=True)
+    return [_candidate(fit, "point", a, b, value, data.relative_error * value, slope) for a, b, value, slope in rows]
 
 
 def _others(fit: MediumFit) -> list[Candidate]:
@@ -284,15 +284,15 @@ def _under_widths(problem: Problem, pencil: Solution) -> dict[float, Solution]:
     """Fit under Gaussian beams, by 1/e^2 radius: the pencil beam, the widths that are tried, and near the best."""
     fits, start = {0.0: pencil}, pencil
     for w in _widths(problem):
-        start = _under(problem, w, start)
-        fits[w] = start
+        fits[w] = start = descended(problem.under({"beam": w}), start.parameters, problem.spec.free)
     for _ in range(FINER):
         best, tried = _best(fits), sorted(fits)
         at = tried.index(best)
         for low, high in ((best, tried[min(at + 1, len(tried) - 1)]), (tried[max(at - 1, 0)], best)):
             between = float(np.sqrt(low * high))
             if between > 0 and between not in fits:
-                fits[between] = _under(problem, between, fits[best])
+                there = problem.under({"beam": between})
+                fits[between] = descended(there, fits[best].parameters, problem.spec.free)
     return fits
 
 
@@ -331,12 +331,6 @@ def as_tissue(fit: MediumFit) -> Tissue | None:
         return None
     values = model.quantities(end.parameters[None], np.zeros(1))
     return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - plain.minimum.cost)
-
-
-def _under(problem: Problem, w: float, start: Solution) -> Solution:
-    instrument = replace(problem.spec.instrument, beam=Gaussian(w))
-    there = replace(problem, spec=replace(problem.spec, instrument=instrument))
-    return descended(there, start.parameters, problem.spec.free)
 
 
 def _telling(fit: MediumFit, fits: dict[float, Solution]) -> tuple[float | None, str]:

@@ -21,7 +21,7 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting import solver
-from profilefit.fitting.misfit import DETECTED, gaussianised_rows, scatter_chance
+from profilefit.fitting.misfit import DETECTED, gaussianised, scatter_chance
 from profilefit.measured.data import Measured, require_workable, widening
 from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.instrument import Instrument
@@ -181,7 +181,7 @@ def solved_rows(medium: Medium, illumination: str, seen: Instrument, inner: byte
 def _judged(problem: _LayersProblem, names: tuple[str, ...], done: solver.Solution, expected: Floats) -> LayersFit:
     rows, data, count = problem.residuals(done.parameters), problem.data, problem.data.value.size
     rows[:count] *= math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
-    rows = gaussianised_rows(rows, data.freedom, data.pooled)
+    rows = gaussianised(rows, data.freedom, data.pooled)
     chi2, freedom = float(rows @ rows), rows.size - len(names)
     chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0

@@ -30,7 +30,7 @@ from scipy.linalg import solve_triangular
 
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.misfit import rough_waves
+from profilefit.fitting.misfit import waves
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
@@ -170,4 +170,4 @@ def law_covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_])
     if not rel:
         return None
     size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)
-    return rough_waves(data.r, WAVE) * np.outer(size, size)
+    return waves(data.r, WAVE, rough=True) * np.outer(size, size)

@@ -219,7 +219,7 @@ def fit(
     light = _light(law, constants, where.setting, records)
     _require_held(light, held)
     known = scale if isinstance(scale, Known) else None
-    if scale is not None and known is None:
+    if not (scale is None or isinstance(scale, Known)):
         held["scale"] = _positive("scale", scale)
     notes = where.notes
     if data.n is not None and not math.isclose(data.n, n):
