@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass
 from typing import Any
 
 import numpy as np
@@ -267,7 +267,7 @@ class Cells:
     error: Floats
     bound: float
     inside: Mask | bool = True
-    codes: Codes = field(default=None)  # type: ignore[assignment]
+    codes: Any = None
     unjudged: str = ""
     advice: str = ""
     judge: InitVar[Mask | bool] = True
@@ -417,12 +417,11 @@ def _region(cells: Cells, part: Mask, verdict: Verdict) -> Region:
     spans = [one.span(int(at[:, i].min()), int(at[:, i].max())) for i, one in enumerate(cells.axes)]
     place = "; ".join(one.span(int(i), int(i)) for one, i in zip(cells.axes, worst, strict=True))
     value, reference, error = (float(each[worst]) for each in (cells.value, cells.reference, cells.error))
+    advice = (cells.advice or ADVICE[cells.arithmetic]) if verdict.is_red else cells.unjudged
     return Region(
-        *(cells.subject, cells.own, cells.quantity, cells.arithmetic),
-        *(verdict, int(part.sum()), int(held.sum()), "; ".join(spans), place),
-        *(value, reference, error, float(cells.bound)),
-        (cells.advice or ADVICE[cells.arithmetic]) if verdict.is_red else cells.unjudged,
-    )
+        cells.subject, cells.own, cells.quantity, cells.arithmetic, verdict, int(part.sum()), int(held.sum()),
+        "; ".join(spans), place, value, reference, error, float(cells.bound), advice,
+    )  # fmt: skip
 
 
 NAME = "law"

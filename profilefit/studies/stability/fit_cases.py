@@ -170,8 +170,10 @@ def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) ->
 
 
 def _one_albedo(rings: Rings) -> Rings:
-    rows = {name: np.asarray(getattr(rings, name)) for name in ("alpha", "energy", "beyond", "used", "weight")}
-    return replace(rings, **{name: np.repeat(each[-1:], ALBEDOS, axis=0) for name, each in rows.items()})
+    changed: dict[str, Any] = {}
+    for name in ("alpha", "energy", "beyond", "used", "weight"):
+        changed[name] = np.repeat(np.asarray(getattr(rings, name))[-1:], ALBEDOS, axis=0)
+    return replace(rings, **changed)
 
 
 NONSENSES: dict[str, Callable[[Rings], Rings]] = {

@@ -96,7 +96,7 @@ def _value(law: AlbedoLaw, name: str, arithmetic: str, at: ArgumentAxis) -> Floa
         return np.asarray(law.alpha(given) if name == cells.ALPHA_OF else law.reflectance(given), float)
 
 
-def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Floats) -> Floats:
+def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Any) -> Floats:
     return np.asarray(RoundedText(law, dtype).call(WAYS[name][1], given), float)
 
 

@@ -9,6 +9,7 @@ known, a ball lit from one side, and an edge of light on a plane, with errors of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -141,7 +142,8 @@ def of_segment() -> Iterator[Cells]:
     text = RoundedText(segment_text("python", NAME), np.float32)
     axes = axis("1+m", TURNS), axis("c t1", LENGTHS), axis("c", RATES, "1/m")
     m, far, c = np.meshgrid(np.array(TURNS) - 1.0, LENGTHS, RATES, indexing="ij")
-    at = [one.astype(np.float32) for one in (c, np.full(c.shape, BEFORE), np.full(c.shape, BACK), m, far / c)]
+    given = c, np.full(c.shape, BEFORE), np.full(c.shape, BACK), m, far / c
+    at: list[Any] = [one.astype(np.float32) for one in given]
     exactly = segment_integral(*(one.astype(float) for one in at))
     for name, own, arithmetic, value in (
         (SEGMENT, True, TEXT32, text.call("integral", *at)),
@@ -149,8 +151,8 @@ def of_segment() -> Iterator[Cells]:
         ("segment, plain", False, FLOAT32, plain_integral(*at)),
     ):
         value = np.asarray(value, float)
-        given = value, exactly, relative(value, exactly), DIGITS
-        yield Cells(name, own, SEGMENT, arithmetic, axes, *given, advice=OF_SEGMENT)
+        judged = value, exactly, relative(value, exactly), DIGITS
+        yield Cells(name, own, SEGMENT, arithmetic, axes, *judged, advice=OF_SEGMENT)
 
 
 def plain_integral(c: Floats, s0: Floats, t0: Floats, m: Floats, t1: Floats) -> Floats:

@@ -116,7 +116,7 @@ class StackCase:
     def judged(self, name: str, arithmetic: str, *given: Any, **more: Any) -> Cells:
         """Return cells over the arguments of a quantity, given value, reference, error, bound and inside."""
         advice = OF_LAWS if self.own else OF_BORROWER
-        return Cells(self.label, self.own, name, arithmetic, _axes(name), *given, **more, advice=advice)
+        return Cells(self.label, self.own, name, arithmetic, _axes(name), *given, **{"advice": advice, **more})
 
 
 def cells_of(folder: Path) -> Iterator[Cells]:

@@ -66,9 +66,9 @@ def test_the_segment_holds_from_against_the_beam_to_along_it(segments):
         assert np.max(one.error) < 1e-6
     assert not any(one.is_failure for one in regions_of(plain))
     near, far = np.array(scenes.TURNS)[:, None, None], np.array(scenes.LENGTHS)[:, None]
-    along = np.broadcast_to(near == 0, plain.shape)
+    along = np.broadcast_to(near == 0, plain.codes.shape)
     assert np.array_equal(plain.codes == Verdict.NOT_FINITE, along)
-    x = np.broadcast_to(near * far, plain.shape)
+    x = np.broadcast_to(near * far, plain.codes.shape)
     assert np.all(plain.codes[x >= 0.1] == Verdict.RIGHT)  # 1 - e^-x has lost a digit below, and none here
     assert np.any(plain.codes[(x > 0) & (x < 0.1)] == Verdict.INACCURATE)
 
