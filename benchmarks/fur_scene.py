@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import moderngl
@@ -62,7 +61,9 @@ def gamma() -> Rows:
     found: Rows = []
     with opened() as context:
         for fine in FINER:
-            with scene.reference_render(context, replace(tradeoff.request(), supersampling=fine)) as drawn:
+            with scene.reference_render(
+                context, tradeoff.request().changed(technique={"supersampling": fine})
+            ) as drawn:
                 white, judge = drawn.judge.exposure, drawn.judge
                 encoded = scene.averaged(srgb_codes(white * drawn.fine), fine)
                 off = (encoded - srgb_codes(white * judge.reference))[judge.mask]

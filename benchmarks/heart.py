@@ -13,7 +13,6 @@ heart are over the mean light, against exact light; times are of this machine's 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,12 +124,12 @@ def sheets() -> list[tuple[str, ...]]:
 def request(size: tuple[int, int] = (160, 120)) -> scene.HeartRequest:
     """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
-    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+    return scene.read(str(path), read_toml(Path(path))).changed(camera_table={"resolution": size})
 
 
 def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tuple[str, ...]], str]:
     """Return error and cost of each way at each size; rows of them and of frames; the device."""
-    light, found, told = scene.light_of(request().stack, COUNT), {}, []
+    light, found, told = scene.light_of(request(), COUNT), {}, []
     with opened() as context:
         for size in SIZES:
             with scene.reference_render(context, request(size), light, JUDGED) as own:
@@ -149,7 +148,7 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
 def finer() -> list[tuple[str, ...]]:
     """Return errors as the atlas is refined."""
     found = []
-    light = scene.light_of(request().stack, COUNT)
+    light = scene.light_of(request(), COUNT)
     with opened() as context, scene.reference_render(context, request(), light, JUDGED) as own:
         for texel in FINER:
             with own.with_texels(texel) as of:
@@ -163,7 +162,7 @@ def edges() -> list[tuple[str, ...]]:
 
     Jitter is the mean over many frames of a pixel's place moved by a Gaussian: a blur, by its variance.
     """
-    light, columns, rows = scene.light_of(request().stack, COUNT), *request().size
+    light, columns, rows = scene.light_of(request(), COUNT), *request().size
     size = (SUPER * columns, SUPER * rows)
     with opened() as context, scene.reference_render(context, request(size), light, 1) as own:
         stage, mfp = own.stage, own.light.mfp
@@ -194,7 +193,7 @@ def edges() -> list[tuple[str, ...]]:
 def mapped() -> dict[str, np.ndarray]:
     """Return errors by texel and view."""
     with opened() as context:
-        return chart.over_texel_and_view(context, request(), scene.light_of(request().stack, COUNT), TEXELS, VIEWS)
+        return chart.over_texel_and_view(context, request(), scene.light_of(request(), COUNT), TEXELS, VIEWS)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -54,12 +54,12 @@ THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
     """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
-    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+    return scene.read(str(path), read_toml(Path(path))).changed(camera_table={"resolution": size})
 
 
 def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     """Yield error and milliseconds of each way in each pose; one table of exact light serves all."""
-    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
+    table = stack_table(request.media, request.thickness.least, request.thickness.most, request.illumination)
     rows = []
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:
@@ -92,7 +92,7 @@ def matter() -> list[tuple[str, ...]]:
 
 def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     """Return milliseconds of a whole frame over resolution and faces: figure 11 a of Zhao et al."""
-    laws, rows = scene.laws_of(request.stack), []
+    laws, rows = scene.laws_of(request), []
     with opened() as context:
         for size in SIZES:
             with Stage(context, size) as stage:
@@ -111,12 +111,12 @@ def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
 def head_picture(file: Path) -> None:
     """Draw truth, stack, first layer's dipole and half space, side by side."""
     request = request_of(LARGE)
-    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
-    laws, pictures = scene.laws_of(request.stack), []
+    table = stack_table(request.media, request.thickness.least, request.thickness.most, request.illumination)
+    laws, pictures = scene.laws_of(request), []
     with opened() as context, Stage(context, request.size) as stage:
         judge = scene.reference(stage, request, table)
         for kind in PICTURED:
-            way = scene.technique(replace(request, kind=kind), laws)
+            way = scene.technique(request.changed(technique={"kind": kind}), laws)
             sampling = replace(request.sampling, samples=64)
             radiance = stage.render(way.by, way.mfp, sampling, way.alpha)
             if not pictures:
@@ -135,14 +135,14 @@ def ear(file: Path) -> list[tuple[str, ...]]:
     request = replace(
         request_of((320, 320)), camera=BEHIND, light=Light((0.4, 0.25, -0.9)), ambient=(0.05, 0.055, 0.06)
     )
-    laws, pictures, rows = scene.laws_of(request.stack), [], []
+    laws, pictures, rows = scene.laws_of(request), [], []
     with opened() as context, Stage(context, request.size) as stage:
         stage.draw(scene.scene_of(request))
         for kind in PICTURED:
-            way = scene.technique(replace(request, kind=kind), laws)
+            way = scene.technique(request.changed(technique={"kind": kind}), laws)
             pictures.append(to_srgb(stage.render(way.by, way.mfp, request.sampling, way.alpha)[::-1], 1.5))
     image.imsave(file, np.concatenate(pictures, axis=1))
-    for channel, medium, law in zip(CHANNELS, request.stack.stack.media, laws, strict=True):
+    for channel, medium, law in zip(CHANNELS, request.media, laws, strict=True):
         plate, (*upper, core) = plate_of(medium), medium.layers
         for thickness in PARTS:
             middle = replace(core, thickness=thickness - plate.skins)

@@ -35,7 +35,7 @@ class FirstScreen(TyperGroup):
         """Print the screen to stdout, in colour on a terminal."""
         console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 80)
         console.print(Text.assemble("Usage: ", (f"{ctx.command_path} COMMAND [OPTIONS] ...", "bold")))
-        console.print(Text(f"\n{(self.help or '').strip()}\n"))
+        console.print(Text(f"{(self.help or '').strip()}\n"))
         rows = self._commands(ctx)
         titles, names = (max(len(row[at]) for row in rows) + GAP for at in (0, 1))
         for title, group in groupby(rows, key=lambda row: row[0]):

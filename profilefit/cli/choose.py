@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from profilefit.recipes.toml_tables import Table
+    from profilefit.recipes.declared import Table
 
 UNSERVED = 1  # exit status
 

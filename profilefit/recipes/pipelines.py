@@ -32,7 +32,7 @@ from profilefit.recipes.targets import albedo_values, free, law_class, require_k
 Floats = NDArray[np.float64]
 Arrays = dict[str, np.ndarray]
 Pipeline = Callable[[Recipe, RecipeRun, Orders | None], RecordContent]
-QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
+QUALITY_ALBEDOS = Albedos(low=0.05, high=0.995, count=24)
 # Indices that a law which spans them is judged at, fitted or not: from next to none to glass. And mean cosines.
 JUDGED = (1.001, 1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
 JUDGED_COSINES = (0.05, 0.2, 0.5, 0.8, 0.9, 0.95)
@@ -90,7 +90,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         **({"indices": recipe.span} if recipe.indices else {}),
         **({"cosines": (0.0, recipe.cosines[-1])} if recipe.cosines else {}),
         "protocol": {
-            **{key: getattr(recipe, key) for key in ("albedos", "rings", "weighting", "mfp", "start", "held")},
+            **recipe.model_dump(include={"albedos", "rings", "weighting", "mfp", "start", "held"}),
             **spans,
         },
         "truth": {"kind": recipe.truth},
@@ -167,7 +167,7 @@ def described_fit(recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple
         if recipe.indices:
             # Photons are of one index: those constants that it tells apart are fitted, the others held. Nothing resists
             # a law that falls with alpha: a resistance from one side only is no smooth function of the photons.
-            at_one = replace(recipe, indices=(), weighting=replace(recipe.weighting, rising=0.0))
+            at_one = recipe.changed(indices=(), weighting={"rising": 0.0})
             seen = truth_of(at_one, None)
             own = fit_from(at_one, seen, result.law)
         checks["crosscheck"] = crosscheck(own, seen, light)

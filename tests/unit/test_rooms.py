@@ -359,6 +359,23 @@ def test_a_library_has_one_home(library):
     assert set(imports_of(ROOT, PACKAGES, library)) == HOMES[library]
 
 
+# How a file is read is the machine of `declared`; others only annotate the fields of their models.
+DECLARED = "profilefit.recipes.declared"
+FIELDS = {
+    *("Field", "PrivateAttr", "ConfigDict", "Discriminator", "Tag", "ValidationInfo", "WithJsonSchema"),
+    *("AfterValidator", "BeforeValidator", "model_validator", "json_schema.models_json_schema"),
+}
+
+
+def test_files_are_declared_in_one_way():
+    homes = imports_of(ROOT, PACKAGES, "pydantic")
+    machine = homes.pop(DECLARED)
+    assert {"pydantic.BaseModel", "pydantic.ValidationError"} <= machine
+    assert {name.removeprefix("pydantic.") for names in homes.values() for name in names} == FIELDS
+    assert set(imports_of(ROOT, PACKAGES, "pydantic_core")) == {DECLARED}
+    assert set(imports_of(ROOT, PACKAGES, "tomllib")) == {"mcml_sim.files.text_file"}
+
+
 def test_scipy_minimises_nothing():
     names = set().union(*imports_of(ROOT, PACKAGES, "scipy.optimize").values())
     assert names == SOLVED_BY_SCIPY, "what is fitted is fitted by fitting.solver"

@@ -120,7 +120,7 @@ def request(name: str) -> StackRequest | None:
 
 def fit(of: StackRequest, run: RecipeRun) -> Work:
     """Return the record to be made of a stack in both lights, in one part: a minute. InputError if no law fits."""
-    for medium in of.stack.media:
+    for medium in of.media:
         stacks.require(medium)
 
     def finish(results: list[Any]) -> RecordContent:
@@ -128,7 +128,7 @@ def fit(of: StackRequest, run: RecipeRun) -> Work:
         arrays = {f"{light}_{name}": array for light, one in lights.items() for name, array in one["arrays"].items()}
         return _content(of, run, lights, arrays), arrays
 
-    part = partial(_of_lights, of.stack.media, Tracing.of(run, f"{of.name}-sums", of.stack.media[0]))
+    part = partial(_of_lights, of.media, Tracing.of(run, f"{of.name}-sums", of.media[0]))
     return Work(f"{SUMS}/{of.name}", (part,), finish, order=(LAWS, 1, 1))
 
 

@@ -31,9 +31,9 @@ from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes import catalogue
+from profilefit.recipes.declared import Refused, at
 from profilefit.recipes.run import PHOTONS, RecipeRun
 from profilefit.recipes.stack.file import LayerStack
-from profilefit.recipes.toml_tables import Tables
 
 Floats = NDArray[np.float64]
 THIN, THICK, LONGEST = 0.1, 3.0, 12.0  # thicknesses that are fitted: mean free paths; decay lengths; mean free paths
@@ -342,17 +342,15 @@ def _vector(law: StackLaw):
     return jnp.stack([jnp.asarray(getattr(law, name)) for name in StackLaw.constant_names()])
 
 
-def require_exact(tables: Tables, stack: LayerStack, what: str) -> None:
-    """Raise InputError, in words of a scene's file, on a stack whose exact light is unknown, or not in millimetres.
-
-    what  is in that unit, too
-    """
+def require_exact(stack: LayerStack) -> None:
+    """Refuse a stack of a scene's file whose exact light is unknown."""
     for medium in stack.media:
-        tables.build("layers", lambda medium=medium: require(medium))  # type: ignore[misc]
-        if any(layer.g > 0 for layer in medium.layers):
-            raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
-    if stack.unit != "mm":
-        raise tables.bad("", "unit", f"mm, which {what} is in", stack.unit)
+        with at("layers"):
+            require(medium)
+        for number, layer in enumerate(medium.layers):
+            if layer.g > 0:
+                accepted = "0, and mu_s reduced: the exact truth is of isotropic scattering"
+                raise Refused(accepted, layer.g, "layers", number, "g")
 
 
 def require(medium: Medium) -> None:

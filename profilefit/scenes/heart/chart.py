@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -21,7 +20,6 @@ from profilefit.scenes.heart.scene import (
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import ChartPoint
-from profilefit.scenes.stage.world import unit
 
 Floats = NDArray[np.float64]
 SURE = Sampling(64)  # where a map shows the error of a technique, not its noise
@@ -77,10 +75,8 @@ def over_texel_and_view(
 
 def turned(request: HeartRequest, degrees: float) -> HeartRequest:
     """Return the request seen from the front, turned by an angle about the upright."""
-    angle, camera = np.radians(degrees), request.camera
-    away = camera.distance * unit((np.sin(angle), 0.0, np.cos(angle)))
-    x, y, z = (np.array(camera.target) + away).tolist()
-    return replace(request, camera=replace(camera, eye=(x, y, z)))
+    angle, distance = np.radians(degrees), request.camera.distance
+    return request.changed(camera_table={"direction": (np.sin(angle), 0.0, np.cos(angle)), "distance": distance})
 
 
 def error(drawn: HeartRender, kind: str) -> float:

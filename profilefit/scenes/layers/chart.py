@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -82,7 +81,7 @@ def ways(
             Gaussians fitted at the thickness of the file.
         turns: how often each is timed.
     """
-    judge, laws = reference(stage, request, table), laws_of(request.stack)
+    judge, laws = reference(stage, request, table), laws_of(request)
     return {
         kind: points(stage, judge, _technique(kind, request, table, laws), request.sampling, numbers, turns)
         for kind, numbers in samples.items()
@@ -90,7 +89,7 @@ def ways(
 
 
 def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple[StackLaw, ...]) -> TechniquePair:
-    light = request.stack.illumination
+    light = request.illumination
     plates = [plate_of(medium, light) for medium in request.media]
     if kind == TABLE:
         return alone(kind, of_table(table, plates), request.mfp)
@@ -98,7 +97,7 @@ def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple
     if name == GAUSSIANS:
         sums = [shared_gaussians((medium,), light, int(count))[0] for medium in request.media]
         return alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
-    return technique(replace(request, kind=kind), laws)
+    return technique(request.changed(technique={"kind": kind}), laws)
 
 
 def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import moderngl
@@ -28,15 +27,16 @@ class MapPoint(NamedTuple):
 def over_maps(drawn: SeaRender, slices: Sequence[int]) -> list[MapPoint]:
     """Return points of each splat, and of numbers of maps in depths with the splat of the request."""
     of, splats = drawn.request, (Splat.POINTS, Splat.FACES, Splat.CELLS)
-    cases = [(f"{one.value}, {of.slices} slices", (one, one), of.slices) for one in splats]
+    cases = [(f"{one.value}, {of.technique.slices} slices", (one, one), of.technique.slices) for one in splats]
     cases += [(f"{of.splats[1].value}, {one} slices", of.splats, one) for one in slices]
     points: list[MapPoint] = []
     for name, by, count in cases:
         with Renderer(drawn.passes.renderer.context, of.size) as renderer:
-            own = drawn._replace(passes=SeaPasses(renderer, of.world, by, of.vertices, of.texels, count))
+            named = of.technique
+            own = drawn._replace(passes=SeaPasses(renderer, of.world, by, named.vertices, named.texels, count))
             own.light()  # compiled
             least = min(sum(own.light().values()) for _ in range(TURNS))
-            points.append(MapPoint(name, own.judge.rmse(own.picture(of.kind, of.sampling.samples)), least))
+            points.append(MapPoint(name, own.judge.rmse(own.picture(of.technique.kind, of.sampling.samples)), least))
     return points
 
 
@@ -44,8 +44,8 @@ def over_pixels(drawn: SeaRender, supersampling: Sequence[int]) -> list[MapPoint
     """Return points of the request's kind by views of a pixel along a side; time is the view's."""
     points = []
     for fine in supersampling:
-        own = drawn._replace(request=replace(drawn.request, supersampling=fine))
-        (one,) = own.points(own.request.kind, [own.request.sampling.samples], TURNS)
+        own = drawn._replace(request=drawn.request.changed(technique={"supersampling": fine}))
+        (one,) = own.points(own.request.technique.kind, [own.request.sampling.samples], TURNS)
         points.append(MapPoint(f"{fine} x {fine} views of a pixel", one.rmse, min(one.milliseconds)))
     return points
 
@@ -63,8 +63,8 @@ def over_water(
     """
     rows = []
     for factor in factors:
-        red, green, blue = (factor * one for one in request.b)
-        with reference_render(context, replace(request, b=(red, green, blue)), paths) as drawn:
+        red, green, blue = (factor * one for one in request.water.b)
+        with reference_render(context, request.changed(water={"b": (red, green, blue)}), paths) as drawn:
             errors = {kind: drawn.judge.rmse(drawn.picture(kind, request.sampling.samples)) for kind in KINDS}
             rows.append((float(max(drawn.request.world.omega)), errors))
     return rows

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
-from profilefit.recipes.toml_tables import LENGTHS
+from profilefit.recipes.declared import LENGTHS
 
 Floats = NDArray[np.float64]
 SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]

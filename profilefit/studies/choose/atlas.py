@@ -47,7 +47,7 @@ class AtlasNeed:
 
 def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     """Return what a heart's scene needs, by sums at some hundred pixels; a minute where no record has its layers."""
-    light = light_of(of.stack, of.gaussians)
+    light = light_of(of, of.technique.gaussians)
     size, margin = atlas_size(of.mesh, 0.0, FINE, CHARTS_END)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as fine:
         fine.draw(stage, part)
@@ -56,7 +56,7 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
         gathered = stage.scatter(by, light.mfp, SURE)
     places = world(buffers, of.camera)
     inside = buffers.mask > INSIDE
-    judged = inside & off_edges(of.surface, of.size_mm, places, light.mfp[0])
+    judged = inside & off_edges(of.surface.kind, of.surface.size, places, light.mfp[0])
     at = evenly(judged if judged.any() else inside, CHOSEN)
     places, own = places[at], buffers.irradiance[at].astype(float)
     off = occlusion_error(elements, sees(buffers, of.camera, elements.points), light.kernel, places, own)
@@ -64,4 +64,4 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     colour = np.array(light.colour)
     error, hidden = (np.sqrt(np.mean(one**2)) for one in (gathered[at] - colour * whole, colour * off))
     mean = np.mean(colour * whole)
-    return AtlasNeed(float(error / mean), float(hidden / mean), of.tolerance)
+    return AtlasNeed(float(error / mean), float(hidden / mean), of.technique.tolerance)

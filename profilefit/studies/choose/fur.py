@@ -121,18 +121,15 @@ def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:
 
     Strands that lean by f along the view's way over the skin are as upright ones seen at the tangent |tan(theta) - f|.
     """
-    if of.tolerance < LEAST_TOLERANCE:
-        raise InputError(
-            f"{of.file}: [technique] tolerance must be at least {LEAST_TOLERANCE:g} where layers are chosen by rays, "
-            f"got {of.tolerance:g}"
-        )
-    if of.length > SLENDEREST * of.radius:
-        raise InputError(
-            f"{of.file}: [fur] length must be at most {SLENDEREST:g} times the radius, {SLENDEREST * of.radius:g} mm, "
-            f"where layers are chosen by rays, got {of.length:g}"
-        )
+    strands, tolerance, rays = of.fur, of.technique.tolerance, "where layers are chosen by rays, got"
+    if tolerance < LEAST_TOLERANCE:
+        least = f"{of.file}: [technique] tolerance must be at least {LEAST_TOLERANCE:g}"
+        raise InputError(f"{least} {rays} {tolerance:g}")
+    if strands.length > (longest := SLENDEREST * strands.radius):
+        most = f"{of.file}: [fur] length must be at most {SLENDEREST:g} times the radius, {longest:g} mm,"
+        raise InputError(f"{most} {rays} {strands.length:g}")
     layers: dict[int, dict[str, int | None]] = {}
     for angle in angles:
-        fur = RandomFur(of.density, of.radius, of.length, float(np.radians(angle)), of.seed)
-        layers[angle] = {way.name: fur.least_layers(way, of.tolerance) for way in WAYS}
-    return FurNeed(layers, of.tolerance)
+        fur = RandomFur(strands.density, strands.radius, strands.length, float(np.radians(angle)), strands.seed)
+        layers[angle] = {way.name: fur.least_layers(way, tolerance) for way in WAYS}
+    return FurNeed(layers, tolerance)

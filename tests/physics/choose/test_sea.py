@@ -37,7 +37,7 @@ def test_an_error_is_that_of_the_haze():
     of = request()
     along = np.subtract(of.camera.target, of.camera.eye)
     found = [
-        sunlit_haze(0.5, 0.2 * -of.camera.eye[2], -along[2] / np.linalg.norm(along), of.lobes, kind)
+        sunlit_haze(0.5, 0.2 * -of.camera.eye[2], -along[2] / np.linalg.norm(along), of.water.lobes, kind)
         for kind in (SINGLE, BROADENED)
     ]
     assert need.haze[SINGLE] == pytest.approx(1 - found[0] / found[1], rel=1e-4)

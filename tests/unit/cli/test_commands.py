@@ -189,9 +189,9 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
     ("change", "said"),
     [
         ('law = "liang"|law = "lang"', "law must be one of liang, rational, van_de_hulst, chiang, got 'lang'"),
-        ("low = 0.1|low = 1.1", "albedos must have 0 < low < high <= 1, got low = 1.1"),
-        ("count = 9|count = 1", "albedos.count must be between 3 and 1000, got 1"),
-        ("count = 9|cuont = 9", "unknown key 'cuont'"),
+        ("low = 0.1|low = 1.1", "[albedos] low must be a number > 0 and <= 1, got 1.1"),
+        ("count = 9|count = 1", "[albedos] count must be a whole number in 3 ... 1000, got 1"),
+        ("count = 9|cuont = 9", "[albedos] keys must be of low, high, count, spacing, got 'cuont'"),
         ("[weighting]|[weighting", "is not TOML"),
         (
             'objective = "albedo"|objective = "energy"',

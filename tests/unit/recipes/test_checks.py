@@ -109,7 +109,7 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
 @pytest.mark.slow
 def test_random_starts_beat_the_printed_start_of_the_papers_inverse():
     """A known case: from (20) as printed, the search ends in the second-best optimum."""
-    from_exact = replace(recipe.find("liang-inverse-whole", FITS), truth="exact")
+    from_exact = recipe.find("liang-inverse-whole", FITS).changed(truth="exact")
     profiles = truth_of(from_exact, None)
     start = targets.starting_law(from_exact, FITS)
     xi = tuple((np.arange(64) + 0.5) / 64 * 0.99)

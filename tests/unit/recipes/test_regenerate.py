@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,13 +49,13 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     run = RecipeRun("quick", 0, tmp_path / "out", None, 1000, said.append, False)
     refracted, diffuse = Setting(n=1.4), Setting("diffuse")
     profile = recipe.find("burley-whole", FITS)
-    exactly = replace(recipe.find("albedo-rational", FITS), check="")
+    exactly = recipe.find("albedo-rational", FITS).changed(check="")
     recipes = (
-        replace(profile, name="profile-n1.4", setting=refracted),
-        replace(profile, name="profile-diffuse", truth="exact", setting=diffuse),
-        replace(exactly, name="albedo-n1.4", truth="orders", setting=refracted),
+        profile.changed("profile-n1.4.toml", setting_table={"n": 1.4}),
+        profile.changed("profile-diffuse.toml", truth="exact", setting_table={"illumination": "diffuse"}),
+        exactly.changed("albedo-n1.4.toml", truth="orders", setting_table={"n": 1.4}),
         exactly,
-        replace(exactly, name="checked", setting=diffuse, check="orders"),
+        exactly.changed("checked.toml", setting_table={"illumination": "diffuse"}, check="orders"),
     )
     monkeypatch.setitem(albedo_map.PIPELINES, "albedo", pipeline)
     monkeypatch.setitem(law.PIPELINES, "profile", pipeline)

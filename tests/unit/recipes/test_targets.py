@@ -1,7 +1,5 @@
 """What a recipe names: where albedos, rings and fits begin, its photons, and what its laws are judged with."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,7 @@ FITS = catalogue.fits_folder()
     ],
 )
 def test_albedos_are_even_in_their_spacing(spacing, even):
-    alpha = albedo_values(Albedos(0.1, 0.99, 12, spacing))
+    alpha = albedo_values(Albedos(low=0.1, high=0.99, count=12, spacing=spacing))
     assert alpha[[0, -1]] == pytest.approx([0.1, 0.99], abs=1e-6)
     steps = np.diff(even(alpha))
     # The table behind the spacing in A is linear between 4001 nodes: its steps are even to 1e-4.
@@ -52,7 +50,7 @@ def test_rings_that_the_run_cannot_make_are_refused(rings):
 def test_photons_and_exact_truth_agree_on_a_recipes_rings():
     chosen = recipe.find("liang-whole", FITS)
     light = simulate_orders(Grid.from_edges(r=RUN_EDGES), 2**19, seed=11)
-    photons, exactly = truth_of(chosen, light), truth_of(replace(chosen, truth="exact"), None)
+    photons, exactly = truth_of(chosen, light), truth_of(chosen.changed(truth="exact"), None)
     assert photons.source == "orders"
     assert exactly.source == "exact"
     # Where fewer photons arrive, the heavy ones may be missing, and the standard error with them: z is far from normal.
@@ -68,7 +66,7 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
 
 def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
-    chosen = replace(recipe.find("burley-whole", FITS), setting=Setting("diffuse", n=1.4))
+    chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
     law = starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
@@ -91,7 +89,7 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
 )
 def test_what_a_recipe_must_name(change, words):
     with pytest.raises(RecipeError, match=words):
-        require_known(replace(recipe.find("burley-whole", FITS), **change))
+        require_known(recipe.find("burley-whole", FITS).changed(**change))
 
 
 def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
@@ -108,15 +106,15 @@ def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
 
 def test_printed_sets_are_those_of_the_recipes_setting():
     burley = recipe.find("burley-whole", FITS)
-    searchlight, diffuse = printed_sets(burley), printed_sets(replace(burley, setting=Setting("diffuse")))
+    searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
     assert searchlight["published"]["s0"] == 1.85
     assert diffuse["published"]["s0"] == 1.9
-    assert printed_sets(replace(burley, setting=Setting(n=1.4))) == {}
+    assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
     assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
 
 
 def test_who_needs_photons():
-    orders, exactly = recipe.find("albedo-liang", FITS), replace(recipe.find("albedo-rational", FITS), check="")
+    orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
     assert needs_photons(orders)
     assert not needs_photons(exactly)
-    assert needs_photons(replace(exactly, check="orders"))
+    assert needs_photons(exactly.changed(check="orders"))

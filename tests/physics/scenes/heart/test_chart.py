@@ -1,7 +1,5 @@
 """Points and maps of a heart's ways, on a small picture."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ KEPT = 300  # pixels
 def request_small(monkeypatch):
     """A quarter of the example's rows and columns, its truth of coarser elements."""
     monkeypatch.setattr(scene, "FINE", 8 * scene.meshes.CHARTS_END)
-    return replace(scene.read("heart.toml", EXAMPLE), size=(48, 36))
+    return scene.read("heart.toml", EXAMPLE).changed(camera_table={"resolution": (48, 36)})
 
 
 @pytest.mark.slow

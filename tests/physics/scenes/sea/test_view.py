@@ -323,7 +323,7 @@ def test_errors_leave_the_truths_own_noise_out():
 
 @pytest.fixture(scope="module")
 def example():
-    return replace(read("sea.toml", tomllib.loads(EXAMPLE.read_text())), size=(32, 24))
+    return read("sea.toml", tomllib.loads(EXAMPLE.read_text())).changed(camera_table={"resolution": (32, 24)})
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ import hashlib
 import json
 import operator
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -243,7 +242,7 @@ DAMAGE = [
     ("layers/0", GONE, r"half_spaces must be 1, one a layer, got 2"),
     ("layers/1/thickness", 2.0, r"the last layer must be infinitely thick, got 2"),
     ("layers/0/thickness", GONE, r"\[layers\] thickness may be infinite in the last layer only"),
-    ("layers/1/mu_a", GONE, r"\[layers 2\] mu_a must be a number, got nothing"),
+    ("layers/1/mu_a", GONE, r"\[layers 2\] mu_a must be a coefficient >= 0, .*, got nothing"),
     ("layers/0/mu_s", [1], r"\[layers 1\] mu_s must be a coefficient >= 0, .*, got \[1\]"),
     ("layers/1/n", 1.5, r"layers must have one n for a law of a stack"),
     ("setting/n", 1.5, r"setting.n must be that of its layers, got 1.5"),
@@ -312,7 +311,10 @@ def test_what_a_file_says(file):
 
 
 REFUSED = [
-    (('illumination = "diffuse"', 'colour = "red"'), r"keys must be of title, unit, illumination, .*, got 'colour'"),
+    (
+        ('illumination = "diffuse"', 'colour = "red"'),
+        r"keys must be of unit, layers, title, illumination, start, got 'colour'",
+    ),
     (('"diffuse"', '"sun"'), r"illumination must be one of searchlight, diffuse, got 'sun'"),
     (('"diffuse"', "3"), r"illumination must be one of searchlight, diffuse, got 3"),
     (('illumination = "diffuse"', "start = 1"), r"start must be a table \[start\], got 1"),
@@ -320,7 +322,7 @@ REFUSED = [
         ((LAST, f"{LAST}\n[start]\n{text}"), message)
         for text, message in (
             ("violet = [[1]]", r"\[start\] keys must be of red, green, blue, got 'violet'"),
-            ("red = [[1, 2]]", r"\[start\] red must be lists of w, u, .* one an interface.*, got \[\[1, 2\]\]"),
+            ("red = [[1, 2]]", r"\[start\] red must be lists of w, u, .* one an interface.*, got \[\[1.0, 2.0\]\]"),
             ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", r"\[start\] red must be .* all but u > 0, got"),
             ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be .* w in \(0, 1\)"),
             ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] green must be .*, got nothing"),
@@ -377,7 +379,7 @@ def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
     before = path.read_bytes()
     monkeypatch.setattr(stacks, "_channel", fails)
     with pytest.raises(FloatingPointError, match="blue diverges"):
-        recorded(stacks.fit(replace(of, title="another"), RUN), tmp_path / "mine")
+        recorded(stacks.fit(of.changed(title="another"), RUN), tmp_path / "mine")
     assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
     (tmp_path / "full").write_text("in the way")
     monkeypatch.setattr(stacks, "_channel", made)
