@@ -14,14 +14,7 @@ from profilefit.errors import InputError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.scenes.layers import passes, truth
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.passes import (
-    WithSingle,
-    diffusely_once,
-    of_half_space,
-    of_stack,
-    once,
-    once_table,
-)
+from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_space, of_stack, once, once_table
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
