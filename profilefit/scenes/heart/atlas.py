@@ -267,12 +267,7 @@ def links(position: Floats, inside: NDArray[np.bool_], margin: int) -> Singles:
 
 
 def _stepped(
-    one: Floats,
-    two: Floats,
-    linked: NDArray[np.bool_],
-    inside: NDArray[np.bool_],
-    position: Floats,
-    frames: Floats,
+    one: Floats, two: Floats, linked: NDArray[np.bool_], inside: NDArray[np.bool_], position: Floats, frames: Floats
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Return the next place in the atlas after two that are `linked`, its point, and whether it is inside a chart."""
     to = 2.0 * one - two

@@ -61,11 +61,7 @@ class Beam(NamedTuple):
 
 
 def single_scattering(
-    medium: Medium,
-    cos_in: ArrayLike,
-    cos_out: ArrayLike,
-    azimuth: ArrayLike,
-    phases: Sequence[Phase] | None = None,
+    medium: Medium, cos_in: ArrayLike, cos_out: ArrayLike, azimuth: ArrayLike, phases: Sequence[Phase] | None = None
 ) -> float | Floats:
     """Return radiance outside [1/sr] of light scattered once, for unit irradiance across the beam. All broadcast.
 

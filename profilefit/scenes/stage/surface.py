@@ -164,11 +164,7 @@ class Gathered:
 
 
 def gathered(
-    surface: Surface,
-    view: View,
-    mfp: ArrayLike,
-    table: CurveTable | Setting = DIFFUSE,
-    pixels: ArrayLike | None = None,
+    surface: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, pixels: ArrayLike | None = None
 ) -> Gathered:
     """Return the reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 

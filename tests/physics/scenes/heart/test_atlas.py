@@ -189,10 +189,7 @@ def test_a_heart_is_blurred_as_its_sum(stage, apart):
         atlas.blur(kernel)
         found = atlas.read(BLURRED)[..., 0].astype(float)[inside]
         own, seams = atlas.elements(), (inside & ~binary_erosion(inside, np.ones((3, 3))))[inside]
-        for chosen, bound in (
-            (slice(None, None, 51 * apart), 0.008),
-            (np.flatnonzero(seams)[:: 4 * apart], 0.01),
-        ):
+        for chosen, bound in ((slice(None, None, 51 * apart), 0.008), (np.flatnonzero(seams)[:: 4 * apart], 0.01)):
             light = own.irradiance[chosen]
             expected = summed(fine.elements(), kernel.variances, kernel.weights, own.points[chosen], light)[:, 0]
             assert rms(found[chosen] - expected, own.areas[chosen]) < bound

@@ -23,11 +23,7 @@ KEYS = "keys must be of "
 REFUSED = [
     ("colour", 1, f"{KEYS}unit, .*, got 'colour'"),
     ("surface.colour", 1, rf"\[surface\] {KEYS}kind, size, steepness, roughness, got 'colour'"),
-    (
-        "technique.crossover",
-        1,
-        rf"\[technique\] {KEYS}samples, .*, texel, tolerance, got 'crossover'",
-    ),
+    ("technique.crossover", 1, rf"\[technique\] {KEYS}samples, .*, texel, tolerance, got 'crossover'"),
     ("surface.kind", "cow", r"\[surface\] kind must be one of heart, ball, bumps, got 'cow'"),
     ("surface.size", 0.0, r"\[surface\] size must be a number > 0 and <= 150, got 0.0"),
     ("surface.steepness", 0.1, r"\[surface\] steepness must be left out where kind is not bumps, got 0.1"),

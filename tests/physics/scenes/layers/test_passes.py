@@ -14,14 +14,7 @@ from profilefit.errors import InputError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.scenes.layers import passes, truth
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.passes import (
-    WithSingle,
-    diffusely_once,
-    of_half_space,
-    of_stack,
-    once,
-    once_table,
-)
+from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_space, of_stack, once, once_table
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
@@ -281,7 +274,7 @@ def of_thickness(medium: Medium, thickness: float) -> Medium:
     return Medium((replace(first, thickness=thickness), *others))
 
 
-def between_knots(table: StackTable, places: list[int]) -> np.ndarray:
+def halfway(table: StackTable, places: list[int]) -> np.ndarray:
     """Thicknesses half way in ln d between neighbours of the table."""
     return np.exp(0.5 * (table.u[1:] + table.u[:-1]))[places]
 
@@ -364,7 +357,7 @@ def test_between_its_thicknesses():
     """Of skin, whose first layer is thrice as thick in one place as in another: 3e-4, 1e-6 and 6e-6 were found."""
     table = stack_table((RED, GREEN, RED), 0.125, 0.375)
     accepted = np.array([1e-3, 1e-5, 2e-5])
-    for thickness in between_knots(table, [0, 3, 7]):
+    for thickness in halfway(table, [0, 3, 7]):
         for channel, medium in ((0, RED), (1, GREEN)):
             found = errors(table, medium, channel, float(thickness), "diffuse")
             assert np.all(found < accepted), found
@@ -379,7 +372,5 @@ def test_a_range_of_a_hundred_times_and_from_nothing(least):
     """Its rows are then half a unit of ln d apart: 4e-2, 1.3e-3 and 7e-4 were found."""
     table = stack_table((HEART,) * 3, least, 2.0, "searchlight")
     last = len(table.u) - 2
-    found = np.array(
-        [errors(table, HEART, 0, float(d), "searchlight") for d in between_knots(table, [last // 2, last])]
-    )
+    found = np.array([errors(table, HEART, 0, float(d), "searchlight") for d in halfway(table, [last // 2, last])])
     assert np.all(found.max(axis=0) < [5e-2, 2e-3, 1e-3]), found

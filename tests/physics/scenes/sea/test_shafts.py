@@ -8,15 +8,7 @@ from scipy.optimize import brentq
 
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from profilefit.errors import InputError
-from profilefit.scenes.sea.chart import (
-    FINE,
-    Bundle,
-    ViewRay,
-    by_lines,
-    by_prisms,
-    by_slices,
-    flux_below,
-)
+from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices, flux_below
 
 WAVES = ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))
 OVERHEAD, TILTED = Bundle(0.0, WAVES), Bundle(0.4, WAVES)
