@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-DATA = Path(__file__).parents[3] / "examples"
-PHANTOM = str(Path(__file__).parents[3] / "examples" / "phantom.csv")
-LAYERS = str(DATA / "two_layers.mco")
-STACK = str(DATA / "two_layers.toml")
+from tests.fixtures import EXAMPLES
+
+PHANTOM, LAYERS = EXAMPLES["phantom.csv"], EXAMPLES["two_layers.mco"]
 
 
 @pytest.fixture
