@@ -209,7 +209,7 @@ def kinds() -> Rows:
 
 def waters() -> Rows:
     """Judge the example in water that scatters less and more."""
-    of, rows = tradeoff.request(), []
+    of, rows = tradeoff.sea_request(), []
     with opened() as context:
         for factor in FACTORS:
             red, green, blue = (factor * one for one in of.water.b)
