@@ -191,7 +191,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
     facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
     seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
     below = 1.0 - np.sqrt(rng.random(len(way)))
-    new = np.column_stack(turn(*normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
+    new = np.column_stack(turn(*_columns(normal), below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
     new[sunny] = _turned(light.around, -beam[sunny], rng)
     lambert = np.maximum(np.sum(new * normal, axis=1), 0.0) / np.pi
@@ -261,7 +261,7 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
 def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
     """Return directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
-    return np.column_stack(turn(*way.T, below, above, 2.0 * np.pi * rng.random(len(way))))
+    return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
 
 
 def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
@@ -277,6 +277,10 @@ def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimu
     z = cosine * dz - across * sign * dx - along * dy
     norm = 1.0 / np.sqrt(x * x + y * y + z * z)
     return x * norm, y * norm, z * norm
+
+
+def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
+    return way[:, 0], way[:, 1], way[:, 2]
 
 
 def _density(phase: Phase, way: Floats, new: Floats) -> Floats:
