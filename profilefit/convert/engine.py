@@ -23,7 +23,6 @@ typed, so that rasteriser and path tracer want different numbers for one medium.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import resources
@@ -35,6 +34,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
+from mcml_sim.files.text_file import parse_toml
 from profilefit.convert.colour import MAPS, mapped_colour, reflectance_of, reflectance_rough, wrenninge_colour
 from profilefit.convert.lengths import (
     Factor,
@@ -220,7 +220,7 @@ class Engine:
 
 def _engines() -> Iterator[Engine]:
     """Yield the rows of `engines.toml` in order, each with what its product's rows share and the functions it names."""
-    products = tomllib.loads((resources.files("profilefit.convert") / "engines.toml").read_text(encoding="utf-8"))
+    products = parse_toml((resources.files("profilefit.convert") / "engines.toml").read_bytes())
     for product in products.values():
         for own in product.pop("rows"):
             row: dict[str, Any] = {"colour": None, "renders": None, **product, **own}
