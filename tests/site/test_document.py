@@ -12,8 +12,7 @@ from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import catalogue, evidence
 from profilefit.report.explorer import fragment
 from profilefit.report.page.document import PARTS, write_page
-from profilefit.report.page.fits import record_part
-from profilefit.report.page.sections import EvidenceFolder, failures, promises, shader, speed
+from profilefit.report.page.sections import EvidenceFolder, failures, promises, record_part, shader, speed
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
