@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import fur_exponent as exponent
 from benchmarks import fur_feet as feet
 from benchmarks import fur_layers as layers
 from benchmarks import fur_scene as drawn
@@ -23,7 +24,7 @@ from profilefit.scenes.fur import law
 from profilefit.scenes.fur.truth import Patch, random_patch
 from profilefit.shader import opened
 from profilefit.shader.context import renderer
-from profilefit.studies.tradeoff import fur as tradeoff
+from profilefit.studies.tradeoff import scenes as tradeoff
 
 DEGREES, DENSITIES, HEIGHTS = (0.0, 30.0, 60.0, 75.0, 85.0), (4.0, 16.0, 64.0), (0.0, 0.3, 0.6, 0.9)
 LEANS = ((0.0, 0.0), (0.4, -0.3))
@@ -56,7 +57,7 @@ def exponents() -> Rows:
     """Return p by its law and the best of each L / r0, between whole numbers of layers; their range over p."""
     found: Rows = []
     for x in XS:
-        each = [_best(x * slender, slender) for slender in law.SLENDER]
+        each = [_best(x * slender, slender) for slender in exponent.SLENDER]
         p = float(law.best_exponent(x))
         found.append((x, p, *each, (max(each) - min(each)) / p, max(abs(one / p - 1.0) for one in each)))
     return found
@@ -65,14 +66,14 @@ def exponents() -> Rows:
 def _best(number: float, slender: float) -> float:
     """Return the best N: between whole numbers of layers ln(p - 1) is a straight line of ln N."""
     low, high = int(np.floor(number + 1e-9)), int(np.ceil(number - 1e-9))
-    ends = [np.log(law.best_of(n, slender) - 1.0) for n in (low, high)]
+    ends = [np.log(exponent.best_of(n, slender) - 1.0) for n in (low, high)]
     at = np.log(number / low) / np.log(high / low) if high > low else 0.0
     return 1.0 + float(np.exp(ends[0] + at * (ends[1] - ends[0])))
 
 
 def constants() -> Rows:
     """Return the constants of the exponent, fitted now, with their errors, and as they are kept."""
-    found, error = law.fitted()
+    found, error = exponent.fitted()
     return [
         (name, *(float(getattr(one, name)) for one in (found, error, law.FITTED, law.FITTED_ERRORS)))
         for name in law.Exponent._fields
@@ -108,7 +109,7 @@ TABLES = {
     "exponent": Listed(
         "The best exponent p over x = N r0 / L, by its law and at each L / r0; range and worst over the law's p",
         {
-            **{"x": "g", "law": ".3f", **{f"L / r0 = {one:g}": ".3f" for one in law.SLENDER}},
+            **{"x": "g", "law": ".3f", **{f"L / r0 = {one:g}": ".3f" for one in exponent.SLENDER}},
             **{"range": ".1%", "worst": ".1%"},
         },
         exponents,
@@ -158,14 +159,6 @@ TABLES = {
             **{"rms": ".1%", "worst": ".1%", "head on": ".0%", "constant": ".2f", "std": ".2f"},
         },
         feet.feet_laws,
-    ),
-    "leans": Listed(
-        "Leans that differ, Gaussian: mean shadow over that of upright strands, and what rays see over it",
-        {
-            **{"rms lean": "g", "theta": "g", "factor": ".3f", "rays, z = 0": ".3f", "+- 0": ".3f"},
-            **{"rays, z = 0.5": ".3f", "+- 0.5": ".3f"},
-        },
-        feet.leans,
     ),
     "lamp": Listed(
         "Light on what an eye sees, over visibility toward the lamp, and over it without the shadows' shared part",

@@ -1,4 +1,4 @@
-"""Fur that no closed form is for: feet apart or in tufts, leans that differ; and a lamp next to the eye.
+"""Fur that no closed form is for: feet apart or in tufts; and a lamp next to the eye.
 
 What is seen is exp(-kappa n (1 - z / L)^2 A), where kappa is 1 for feet that are independent of each other.
 """
@@ -14,19 +14,18 @@ from numpy.typing import NDArray
 
 from benchmarks.fur_patches import spaced_patch, tufted_patch
 from profilefit.fitting.solver import differences, solve
-from profilefit.scenes.fur.law import shadow, shared_shadow, visibility
+from profilefit.scenes.fur.law import shadow, visibility
 from profilefit.scenes.fur.truth import Patch, cast, random_patch, struck
 
 Floats = NDArray[np.float64]
 Rows = list[tuple[str | float, ...]]
 RADIUS = 0.05
-PATCHES, SIDE, OF_LEANS = 16, 5.0, 48
+PATCHES, SIDE = 16, 5.0
 LATTICE = 50  # rays of a patch along a side, one anywhere in each of its squares
 RAYS = LATTICE**2
 DENSITIES, DEGREES, HEIGHTS = (16.0, 64.0, 144.0), (0.0, 30.0, 60.0, 75.0), (0.0, 0.3, 0.6)
 LEAST, STEP = 0.02, 1e-6  # seen, of which kappa is told; of a constant, for derivatives
 PACKING, EACH, SPREAD = 0.5, 8, 0.5  # n d^2; strands of a tuft; its radius by the tufts' mean distance
-LEANS, NODES = (0.1, 0.2, 0.4), 64
 LAMP_DENSITIES, EYES, LAMPS = (16.0, 64.0), (0.0, 45.0), (0.0, 15.0, 30.0, 60.0)
 
 
@@ -42,6 +41,40 @@ KINDS: dict[str, Callable[[float, float, int], Patch]] = {
     f"apart, n d^2 = {PACKING:g}": _spaced,
     f"tufts of {EACH}": _tufted,
 }
+
+
+class Feet(NamedTuple):
+    """Feet that are not independent: what is seen is exp(-kappa n (1 - z / L)^2 A), kappa = (1 + size q^power)^sign.
+
+    q = r0 sqrt(n) (1 - z / L), the strands' radius at their height over their distance. Fitted to rays, 30 to 75
+    degrees, r0 sqrt(n) 0.2 to 0.6 (`--only feet-laws`); seen head on kappa is nearer 1.
+    """
+
+    size: float
+    power: float
+    sign: int
+
+    def factor(self, thick: float) -> float:
+        """Return kappa [-] of thick = q, by which the density in `visibility` is multiplied."""
+        return float((1.0 + self.size * thick**self.power) ** self.sign)
+
+
+# Feet that are at least sqrt(0.5 / n) apart; and tufts of 8 over discs of half the tufts' mean distance.
+FEET = {"apart": Feet(2.06, 1.49, 1), "tufts": Feet(2.16, 1.23, -1)}
+
+
+def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: float = 0.0) -> float:
+    """Return the area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
+
+    eye, lamp  angles to the normal in [0, pi / 2);  turn  between them about the normal in [0, pi] [rad]
+
+    r0^2 (pi + tan a - a), a = max(0, min(a1, a2, (a1 + a2 - turn) / 2)), cos a_i = r0 / d_i: both are a disc and a
+    spike, which shrinks as secants of the angle about the disc's middle. Turned by 0 the shorter is within the longer.
+    What an eye sees is lit by exp(-n (1 - z / L)^2 (A(lamp) - shared)), more than `visibility` says: the hot spot.
+    """
+    ends = [float(np.arccos(min(radius / max(length * np.tan(at), radius), 1.0))) for at in (eye, lamp)]
+    a = max(min(*ends, 0.5 * (sum(ends) - turn)), 0.0)
+    return float(radius**2 * (np.pi + np.tan(a) - a))
 
 
 class Seen(NamedTuple):
@@ -144,35 +177,6 @@ def feet_laws() -> Rows:
                 *(float(kappa.mean()), float(kappa.std(ddof=1))),
             )
         )
-    return found
-
-
-def mean_shadow(theta: float, lean: float, radius: float = RADIUS) -> float:
-    """Return A of strands of length 1 that lean every way, over all: Gaussian, root mean square `lean` [-]."""
-    node, weight = np.polynomial.hermite_e.hermegauss(NODES)
-    one = node * lean / np.sqrt(2.0)  # of each of the two parts
-    aside = np.hypot(np.tan(theta) - one[:, None], one)
-    return float(weight @ shadow(radius, 1.0, np.arctan(aside)) @ weight / weight.sum() ** 2)
-
-
-def leans() -> Rows:
-    """Return <A> / A of upright strands, and ln of what rays see over -n <A>, density 16, whole and half strands."""
-    found: Rows = []
-    density, heights = DENSITIES[0], (0.0, 0.5)
-    for lean in LEANS:
-        for degrees in DEGREES:
-            theta = float(np.radians(degrees))
-            mean = mean_shadow(theta, lean)
-
-            def make(side: float, seed: int, lean: float = lean) -> Patch:
-                patch = random_patch(density, RADIUS, 1.0, side, seed)
-                own = np.random.default_rng([seed, 4]).normal(0.0, lean / 2.0**0.5, patch.feet.shape)
-                return Patch(patch.feet, side, RADIUS, 1.0, own)
-
-            share, error = seen(make, theta, heights, OF_LEANS)
-            strands = density * mean * (1.0 - np.array(heights)) ** 2
-            pairs = np.column_stack([-np.log(share) / strands, error / share / strands]).ravel().tolist()
-            found.append((lean, degrees, mean / float(shadow(RADIUS, 1.0, theta)), *pairs))
     return found
 
 

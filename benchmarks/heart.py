@@ -13,10 +13,11 @@ heart are over the mean light, against exact light; times are of this machine's 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from moderngl import Context
 from scipy.ndimage import gaussian_filter
 
 import profilefit
@@ -35,7 +36,7 @@ from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.world import unit
 from profilefit.shader import opened, renderer
-from profilefit.studies.choose.atlas import AtlasNeed
+from profilefit.studies.choose.scenes import AtlasNeed
 
 FILE = "heart.toml"
 STACKS, COUNT = ("heart", "skin"), 6
@@ -45,6 +46,7 @@ SIZES = ((512, 512), (768, 768), (1024, 1024), (1280, 1280))
 WAYS = {"split": (4, 16, 64), "texture": (1,), "screen": (4, 16, 64), "none": (1,)}
 JUDGED, TURNS = 2000, 3  # pixels; of times
 TEXELS, VIEWS = (0.1, 0.2, 0.4, 0.7), (0.0, 60.0, 120.0)  # [mm], degrees from the front
+MAPPED = (scene.SPLIT, scene.TEXTURE, scene.SCREEN)
 SUPER, JITTERS = 8, (0.3, 0.5, 1.0)  # samples of a side; sigma [pixels]
 FINER = (0.7, 0.4, 0.2, 0.1)
 # A sheet that hides light: period 10, amplitude 2, eye at 50 degrees, lamp at 40, in mean free paths of alpha = 0.9.
@@ -125,12 +127,12 @@ def sheets() -> list[tuple[str, ...]]:
 def request(size: tuple[int, int] = (160, 120)) -> scene.HeartRequest:
     """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
-    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+    return scene.read(str(path), read_toml(Path(path))).changed(camera_table={"resolution": size})
 
 
 def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tuple[str, ...]], str]:
     """Return error and cost of each way at each size; rows of them and of frames; the device."""
-    light, found, told = scene.light_of(request().stack, COUNT), {}, []
+    light, found, told = scene.light_of(request(), COUNT), {}, []
     with opened() as context:
         for size in SIZES:
             with scene.reference_render(context, request(size), light, JUDGED) as own:
@@ -149,7 +151,7 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
 def finer() -> list[tuple[str, ...]]:
     """Return errors as the atlas is refined."""
     found = []
-    light = scene.light_of(request().stack, COUNT)
+    light = scene.light_of(request(), COUNT)
     with opened() as context, scene.reference_render(context, request(), light, JUDGED) as own:
         for texel in FINER:
             with own.with_texels(texel) as of:
@@ -163,7 +165,7 @@ def edges() -> list[tuple[str, ...]]:
 
     Jitter is the mean over many frames of a pixel's place moved by a Gaussian: a blur, by its variance.
     """
-    light, columns, rows = scene.light_of(request().stack, COUNT), *request().size
+    light, columns, rows = scene.light_of(request(), COUNT), *request().size
     size = (SUPER * columns, SUPER * rows)
     with opened() as context, scene.reference_render(context, request(size), light, 1) as own:
         stage, mfp = own.stage, own.light.mfp
@@ -191,10 +193,31 @@ def edges() -> list[tuple[str, ...]]:
     return found
 
 
+def over_texel_and_view(
+    context: Context, request: scene.HeartRequest, texels: Sequence[float], degrees: Sequence[float]
+) -> dict[str, np.ndarray]:
+    """Return errors (texels, views) of texture, screen and their split, by mean sides [mm] and turns of the view."""
+    errors = {kind: np.empty((len(texels), len(degrees))) for kind in MAPPED}
+    light = scene.light_of(request, COUNT)
+    for column, one in enumerate(degrees):
+        with scene.reference_render(context, turned(request, one), light, JUDGED) as seen:
+            for row, texel in enumerate(texels):
+                with seen.with_texels(texel) as own:
+                    for kind in MAPPED:
+                        errors[kind][row, column] = chart.error(own, kind)
+    return errors
+
+
+def turned(request: scene.HeartRequest, degrees: float) -> scene.HeartRequest:
+    """Return the request seen from the front, turned by an angle about the upright."""
+    angle, distance = np.radians(degrees), request.camera.distance
+    return request.changed(camera_table={"direction": (np.sin(angle), 0.0, np.cos(angle)), "distance": distance})
+
+
 def mapped() -> dict[str, np.ndarray]:
     """Return errors by texel and view."""
     with opened() as context:
-        return chart.over_texel_and_view(context, request(), scene.light_of(request().stack, COUNT), TEXELS, VIEWS)
+        return over_texel_and_view(context, request(), TEXELS, VIEWS)
 
 
 def main(arguments: list[str] | None = None) -> None:

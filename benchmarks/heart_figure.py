@@ -73,7 +73,7 @@ def map_figure(errors: Mapping[str, np.ndarray], texels: Sequence[float], views:
 
 def heart_picture(request: scene.HeartRequest, path: Path) -> None:
     """Draw the truth, and the heart by each way, side by side."""
-    light = scene.light_of(request.stack, request.gaussians)
+    light = scene.light_of(request, request.technique.gaussians)
     with opened() as context, scene.reference_render(context, request, light) as own:
         judge, pictures = own.judge, []
         for kind in PICTURED:

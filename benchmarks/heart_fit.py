@@ -27,7 +27,7 @@ class SplitLight:
     near     (N + 1, n, 3) of the m narrow ones on the screen;  far, atlas  (N + 1, n, 3) of the others, on the screen
              and in texture space;  share  (N + 1, n) of the light of the others that the screen sees
     facing   (n,) cosine of normal and ray;  texel, pixel  mean sides [mm];  sigma  (N,) [mm]
-    occlusion  (n, 3) error of the screen by `law.occlusion_error`;  hidden  to the nearest lit place that it does
+    occlusion  (n, 3) error of the screen by `chart.occlusion_error`;  hidden  to the nearest lit place that it does
              not see [mm]
     """
 

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 from benchmarks.heart_fit import SplitLight
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
-from profilefit.scenes.heart.law import Kernel, occlusion_error
+from profilefit.scenes.heart.chart import occlusion_error
+from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.buffers import INSIDE

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import profilefit
+from benchmarks.planes import step_edge
 from benchmarks.table import show
 from mcml_sim import exact
 from profilefit.fitting.sampling import LawTarget
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.skin.material import translucent
-from profilefit.scenes.stage.buffers import step_edge
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage

@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 
 from mcml_sim import Setting
 from profilefit.scenes.skin.scene import FACE, Head, head_scene
-from profilefit.scenes.stage import surface_integral
+from profilefit.scenes.stage import surface
 from profilefit.scenes.stage.buffers import Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import EXPOSURE, Judge
 from profilefit.scenes.stage.picture import UNKNOWN, TruthError
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_integral import exitance_of, own_error
+from profilefit.scenes.stage.surface import exitance_of, own_error
 from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]
 # Brow, nose, its shadow, freckles and the band before it: 60 mm of the head, so that of 192 rows one shows 0.29 mm, and
 # the shortest mean free path is 2.2 pixels: below two the stage fades to Lambert, which the truth does not.
 CLOSE = replace(FACE, target=(14.0, 24.0, 50.0), height=60.0)
-REFERENCE = Path(surface_integral.__file__)  # a kept answer is that of another code if this file has changed
+REFERENCE = Path(surface.__file__)  # a kept answer is that of another code if this file has changed
 
 
 @dataclass(frozen=True, kw_only=True)

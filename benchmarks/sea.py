@@ -16,21 +16,24 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.sea_boxes import caustic_boxes
 from benchmarks.sea_figure import cost_figure, picture
 from benchmarks.sea_filter import adaptive_filter
 from benchmarks.sea_photons import trace_beam
 from benchmarks.table import Listed, Rows, parser_of, show_all
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.scenes.sea import chart, hits
+from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
+from profilefit.scenes.sea.passes import SeaPasses
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.scene import lobes_of, reference_render
-from profilefit.scenes.sea.truth import caustic_boxes, caustic_photons
+from profilefit.scenes.sea.scene import SeaRender, lobes_of, reference_render
+from profilefit.scenes.sea.truth import caustic_photons
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves
+from profilefit.scenes.sea.waves import Waves, wrong_shares
+from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened, renderer
-from profilefit.studies.tradeoff import sea as tradeoff
+from profilefit.studies.tradeoff import scenes as tradeoff
 
 FILE = "sea.toml"
 OMEGAS, DEPTHS = (0.2, 0.5, 0.8), (0.5, 1.0, 2.0, 4.0)
@@ -41,7 +44,7 @@ VIEWS = {"horizontal": 0.0, "30 degrees up": -0.5, "30 degrees down": 0.5}  # co
 STEEP = (0.5, 0.9, 1.5, 3.0, 5.0, 10.0)
 WAYS = ("newton_1m", "newton", "shah", 4, 8, 16)
 TILE, DEPTH, PIXELS = tradeoff.TILE, tradeoff.DEPTH, tradeoff.PIXELS
-SLICES, FINER, FACTORS = (3, 12, 24), (1, 2, 4), (0.25, 1.0, 4.0)
+SLICES, FINER, FACTORS, TURNS = (3, 12, 24), (1, 2, 4), (0.25, 1.0, 4.0), 3
 PATHS, OF_WATER = 4_000_000, 1_000_000  # of a truth
 
 
@@ -124,7 +127,7 @@ def haze() -> Rows:
 def shafts() -> Rows:
     """Return root mean square errors over twenty view rays of lines, prisms and slices, against quadrature."""
     found = {(one.method, int(one.label)): one.error.value for one in tradeoff.shafts().points}
-    return [(n, *(found[way, n] for way in tradeoff.SHAFTS)) for n in tradeoff.FULL.of_shafts]
+    return [(n, *(found[way, n] for way in tradeoff.SHAFTS)) for n in tradeoff.SEA.of_shafts]
 
 
 def exact() -> Rows:
@@ -142,7 +145,7 @@ def exact() -> Rows:
 
 def first_hits() -> Rows:
     """Return shares of rays whose hit misses by over 1 % of the depth, over S = steepest slope times tangent."""
-    shares = hits.wrong_shares(WAYS, STEEP)
+    shares = wrong_shares(WAYS, STEEP)
     names = ("3 Newton steps from 1 m, as published", "from the mean plane", "Shah's iteration", *WAYS[3:])
     return [
         (f"{name} steps + 3" if isinstance(name, int) else name, *row.tolist())
@@ -171,24 +174,49 @@ def splats() -> Rows:
     ]
 
 
+def over_maps(drawn: SeaRender) -> Rows:
+    """Return errors of the request's picture by each splat and by numbers of maps in depths, and milliseconds."""
+    of, named, splats = drawn.request, drawn.request.technique, (Splat.POINTS, Splat.FACES, Splat.CELLS)
+    cases = [(f"{one.value}, {named.slices} slices", (one, one), named.slices) for one in splats]
+    cases += [(f"{of.splats[1].value}, {one} slices", of.splats, one) for one in SLICES]
+    rows: Rows = []
+    for name, by, count in cases:
+        with Renderer(drawn.passes.renderer.context, of.size) as maps:
+            own = drawn._replace(passes=SeaPasses(maps, of.world, by, named.vertices, named.texels, count))
+            own.light()  # compiled
+            least = min(sum(own.light().values()) for _ in range(TURNS))
+            rows.append((name, "", own.judge.rmse(own.picture(named.kind, of.sampling.samples)), least))
+    return rows
+
+
+def over_pixels(drawn: SeaRender) -> Rows:
+    """Return errors of the request's kind by views of a pixel along a side, and milliseconds of the view."""
+    rows: Rows = []
+    for fine in FINER:
+        own = drawn._replace(request=drawn.request.changed(technique={"supersampling": fine}))
+        (one,) = own.points(own.request.technique.kind, [own.request.sampling.samples], TURNS)
+        rows.append((f"{fine} x {fine} views of a pixel", "", one.rmse, min(one.milliseconds)))
+    return rows
+
+
 def kinds() -> Rows:
     """Judge the example by each kind and number of samples, then by other maps of light; and name the device."""
-    with opened() as context, reference_render(context, tradeoff.request(), PATHS) as found:
+    with opened() as context, reference_render(context, tradeoff.sea_request(), PATHS) as found:
         points = tradeoff.view(found).points
-        maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
-        device = renderer(context)
-    rows: Rows = [(one.method, one.label, one.error.value, one.cost.low) for one in points]
-    return [*rows, *((one.name, "", one.rmse, one.milliseconds) for one in maps), (device, "", "", "")]
+        rows: Rows = [(one.method, one.label, one.error.value, one.cost.low) for one in points]
+        return [*rows, *over_pixels(found), *over_maps(found), (renderer(context), "", "", "")]
 
 
 def waters() -> Rows:
     """Judge the example in water that scatters less and more."""
+    of, rows = tradeoff.sea_request(), []
     with opened() as context:
-        told = chart.over_water(context, tradeoff.request(), FACTORS, OF_WATER)
-    return [
-        (factor, omega, *(errors[kind] for kind in KINDS))
-        for factor, (omega, errors) in zip(FACTORS, told, strict=True)
-    ]
+        for factor in FACTORS:
+            red, green, blue = (factor * one for one in of.water.b)
+            with reference_render(context, of.changed(water={"b": (red, green, blue)}), OF_WATER) as drawn:
+                errors = (drawn.judge.rmse(drawn.picture(kind, of.sampling.samples)) for kind in KINDS)
+                rows.append((factor, float(max(drawn.request.world.omega)), *errors))
+    return rows
 
 
 TABLES = {
@@ -245,7 +273,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the scene, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
-        with opened() as context, reference_render(context, tradeoff.request(), PATHS) as found:
+        with opened() as context, reference_render(context, tradeoff.sea_request(), PATHS) as found:
             picture(found, given.pictures / "render-sea.png")
             cost_figure(tradeoff.view(found), renderer(context), given.pictures / "render-sea-cost.png")
         return

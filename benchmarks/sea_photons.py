@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,13 +24,6 @@ Floats = NDArray[np.float64]
 GROUPS = 16  # independent, whose spread is the error: known to 18 %
 MOST_ORDERS = 2000  # of scattering: under an albedo of 0.98 light has none of it left
 HIGHEST, MOST = 0.8, 0.98  # albedos
-# Of the light toward a horizontal eye beyond ct = 2, sun overhead: ln(L / single scattering at the surface) =
-# BRIGHTER_1 omega + BRIGHTER_2 omega^2 - F(omega) ct, F = 1 - FADES_1 omega - FADES_2 omega^2. Fitted to photons of one
-# and three terms of mean cosine 0.924, omega 0.1 ... 0.8 and ct 2 ... 6: rms 2.8 %, at most 7.3 %; errors beside.
-FADES = (0.878, 0.186)
-FADES_ERRORS = (0.020, 0.030)
-BRIGHTER = (1.20, 0.97)
-BRIGHTER_ERRORS = (0.08, 0.12)
 
 
 @dataclass(frozen=True)
@@ -257,42 +249,3 @@ def _rising(name: str, value: ArrayLike) -> Floats:
     if name == "radii" and np.any(np.diff(numbers) <= 0):
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
     return numbers
-
-
-def share_once(found: ByOrder, omega: float) -> Estimate:
-    """Return the share of single scattering in the radiance toward an eye [-], by photons of `trace_view`."""
-    whole = found.at(omega)
-    once = omega * found.groups[0, 1]
-    value = once / np.asarray(whole.value)
-    return Estimate(value, value * whole.standard_error / whole.value, whole.effective_samples)
-
-
-def scaled_once(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """Horizontal radiance, sun overhead, of single scattering in water whose forward peak counts as unscattered [1/sr].
-
-    f = <P_2> of the phase function (g^2 of one term); c' = c (1 - omega f), b' = b (1 - f), p' = p / (1 - f) (Joseph,
-    Wiscombe & Weinman, J. Atmos. Sci. 33, 2452, 1976); by the sun's irradiance.
-    """
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    kept = 1.0 - some * float(phase.moment(2))
-    return (some * float(phase.pdf(0.0)) / kept * np.exp(-kept * depth))[()]
-
-
-def fading(omega: ArrayLike) -> Any:
-    """K / c = F(omega) [-] with which radiance toward a horizontal eye falls off beyond ct = 2, sun overhead."""
-    some = _albedo(omega)
-    return (1.0 - FADES[0] * some - FADES[1] * some**2)[()]
-
-
-def deep_radiance(omega: ArrayLike, ct: ArrayLike, phase: Phase) -> Any:
-    """All of that radiance for omega <= 0.8 and ct 2 ... 6 [1/sr], by the sun's irradiance; off by 7 % at most."""
-    some, depth = _albedo(omega), checked_numbers("ct", ct, "a depth >= 0")
-    rise = BRIGHTER[0] * some + BRIGHTER[1] * some**2
-    return (some * float(phase.pdf(0.0)) * np.exp(rise - fading(some) * depth))[()]
-
-
-def _albedo(omega: ArrayLike) -> Floats:
-    some = checked_numbers("omega", omega, "an albedo in [0, 1]")
-    if not np.all((some >= 0) & (some <= 1)):
-        raise InputError(f"omega must be an albedo in [0, 1], got {shown(omega)}")
-    return some

@@ -24,12 +24,13 @@ import profilefit
 from benchmarks.table import show
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError
+from profilefit.fitting.sampling import ExactTarget
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage.step_edge import (
+    UNIFORM_SHARE,
     EdgeGather,
     by_law,
     by_quantile,
-    by_uniform,
     edge_estimate,
     random_points,
     shifted_points,
@@ -82,6 +83,15 @@ def bias(law: ProfileLaw, alpha: float) -> float:
     return float(
         np.max(np.abs(step_response(PLACES, alpha, law=law) - step_response(PLACES, alpha, setting=law.setting)))
     )
+
+
+def by_uniform(alpha: float, setting: Setting) -> EdgeGather:
+    """Return the gather with radii uniform up to that of 99.5 % of the light, for the exact profile."""
+    target, low, high = ExactTarget(setting), 0.0, 1e6
+    while high - low > 1e-9 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if target.cdf(np.array([middle]), alpha)[0] < UNIFORM_SHARE else (low, middle)
+    return EdgeGather(lambda xi: xi * high, lambda x: target.density(x, alpha))
 
 
 def noise(gather: EdgeGather, points: Floats, alpha: float, setting: Setting) -> float:

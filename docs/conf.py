@@ -12,7 +12,7 @@ author = "the profilefit authors"
 release = version = version_of("profilefit")
 copyright = f"{author}, MIT licence"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "docstrings", "law_pages"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "docstrings", "law_pages", "file_keys"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "examples", "ext"]
 root_doc = "index"
@@ -48,7 +48,7 @@ nitpick_ignore = [
     ("py:class", name)
     for name in (
         "mcml_sim.tracing.deposits.Deposits",
-        "mcml_sim.tracing.counts.Counts",
-        "profilefit.fitting.objectives.Rings",
+        "mcml_sim.tracing.order_bins.Counts",
+        "profilefit.fitting.estimate.Rings",
     )
 ]

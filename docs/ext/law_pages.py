@@ -16,8 +16,7 @@ from sphinx.application import Sphinx
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
-from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.entry import EVERYWHERE, Entry, Text
+from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Text
 from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, all_profiles
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SPANS, Folder, Records, record_name, record_setting

@@ -18,6 +18,7 @@ from profilefit.cli.photo import SeveralFiles, photo
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
 from profilefit.cli.scene import scene
+from profilefit.cli.schema import schema
 from profilefit.cli.stability import stability
 from profilefit.cli.tradeoff import tradeoff
 from profilefit.errors import InputError, OutputError, ShaderError, StoreError
@@ -34,7 +35,7 @@ Closed-form profiles of subsurface scattering, fitted with error bars.
 PANELS = {
     "Make laws": (regenerate, report),
     "Use laws": (export, choose, convert, scene),
-    "Your own data": (fit, photo, examples),
+    "Your own data": (fit, photo, examples, schema),
     "What to trust": (check, stability, tradeoff),
 }
 

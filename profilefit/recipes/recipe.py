@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, Field, model_validator
 
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
+from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, printable, words
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line, is_number
+from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
 
 TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
 PAPERS = ("as-published", "evidence")
 CHECKS = ("", "orders")
-MOST_STARTS = 1000
 SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
 TRIMMED = ("r R_d", "R_d", "none")
 NEAR_MATCHED = 1.02  # laws in n are continued to 1 from here
@@ -33,90 +34,89 @@ FEWEST_RINGS, MOST_RINGS = 3, 4000  # the run has 4000 even rings
 MAX_LIMIT = 1e6  # a weight beyond this makes the rings round off beside it
 
 
-@dataclass(frozen=True)
-class Albedos:
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+Limit = Annotated[float, Field(ge=0.0, le=MAX_LIMIT)]
+Length = Annotated[float, Field(ge=MFP[0], le=MFP[1])]
+Words = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(printable)]  # it becomes comments in code
+Names = Annotated[tuple[Words, ...], LISTED, words(f"a list of texts of {LONGEST_TEXT} characters at most")]
+Numbers = Annotated[tuple[float, ...], LISTED, words("a list of finite numbers")]
+
+
+class Albedos(Declared):
     """Albedos that are fitted: `count` of them, even in `spacing`, from `low` to `high` in alpha [-]."""
 
-    low: float
-    high: float
-    count: int
-    spacing: str = "sqrt(1-alpha)"
+    low: Share
+    high: Share
+    count: Annotated[int, Field(ge=3, le=1000)]
+    spacing: Annotated[str, OneOf(*SPACINGS)] = "sqrt(1-alpha)"
 
-    def problems(self) -> str | None:
-        if not 0 < self.low < self.high <= 1:
-            return f"albedos must have 0 < low < high <= 1, got low = {self.low!r}, high = {self.high!r}"
-        if not 3 <= self.count <= 1000:
-            return f"albedos.count must be between 3 and 1000, got {self.count!r}"
-        if self.spacing not in SPACINGS:
-            return f"albedos.spacing must be one of {', '.join(SPACINGS)}, got {self.spacing!r}"
-        return None
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        if not self.low < self.high:
+            raise Refused(f"a number > low, which is {self.low!r}, and <= 1", self.high, "high")
+        return self
 
 
-@dataclass(frozen=True)
-class RingLayout:
+class RingLayout(Declared):
     """Rings that are fitted: even ones of width `dr`, or log-spaced from `first` to `last` [mfp]; `trim` is (6)."""
 
-    last: float
-    dr: float = 0.0
-    first: float = 0.0
-    count: int = 0
-    trim: str = "none"
-    epsilon: float = 0.005
+    last: Annotated[float, Field(gt=0.0, le=1000.0)]
+    dr: Annotated[float, Field(ge=0.0)] = 0.0
+    first: Annotated[float, Field(ge=0.0)] = 0.0
+    count: Annotated[int, Field(ge=0, le=1000)] = 0
+    trim: Annotated[str, OneOf(*TRIMMED)] = "none"
+    epsilon: Annotated[float, Field(gt=0.0, lt=1.0), words("a number in (0, 1)")] = 0.005
 
-    def problems(self) -> str | None:
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> Self:
         even = self.dr > 0 and self.first == 0 and self.count == 0
-        log_spaced = self.dr == 0 and self.first > 0 and self.count > 0
-        if not (even or log_spaced):
+        if not even and not (self.dr == 0 and self.first > 0 and self.count > 0):
             got = f"dr = {self.dr!r}, first = {self.first!r}, count = {self.count!r}"
-            return f"rings must have either dr > 0 or both first > 0 and count > 0, got {got}"
-        if not max(self.dr, self.first) < self.last <= 1000:
-            return f"rings.last must lie beyond the first ring and within 1000 mfp, got {self.last!r}"
-        if log_spaced and not self.first >= FINEST:
-            return f"rings.first must be at least {FINEST} mfp, the finest ring of the run, got {self.first!r}"
-        if log_spaced and not 3 <= self.count <= 1000:
-            return f"rings.count must be between 3 and 1000, got {self.count!r}"
-        if self.trim not in TRIMMED or not 0 < self.epsilon < 1:
-            accepted = f"one of {', '.join(TRIMMED)} with epsilon in (0, 1)"
-            return f"rings.trim must be {accepted}, got {self.trim!r}, epsilon = {self.epsilon!r}"
-        return None
+            raise InputError(f"rings must have either dr > 0 or both first > 0 and count > 0, got {got}")
+        if not max(self.dr, self.first) < self.last:
+            raise Refused("beyond the first ring and within 1000 mfp", self.last, "last")
+        if not even and self.first < FINEST:
+            raise Refused(f"at least {FINEST} mfp, the finest ring of the run", self.first, "first")
+        if not even and self.count < 3:
+            raise Refused("a whole number in 3 ... 1000", self.count, "count")
+        return self
 
-    def problems_at(self, mfp: float) -> str | None:
-        """Return what is impossible about even rings in a medium of this mean free path, or None."""
+    def require_fit(self, mfp: float) -> None:
+        """Refuse even rings of which a medium of this mean free path has too few or too many."""
         # Rounded: 0.15 / 0.05 is 3 rings, and 2.9999999999999996 in binary.
         if self.dr > 0 and not FEWEST_RINGS <= round(self.last * mfp / self.dr, 6) <= MOST_RINGS:
             accepted = f"between {FEWEST_RINGS} and {MOST_RINGS} rings"
             got = f"last = {self.last!r}, mfp = {mfp!r}, dr = {self.dr!r}"
-            return f"rings must have last * mfp / dr {accepted}, got {got}"
-        return None
+            raise InputError(f"rings must have last * mfp / dr {accepted}, got {got}")
 
 
-@dataclass(frozen=True)
-class Weighting:
+class Weighting(Declared):
     """Objective of a fit: its name, the weights of its limits, and shares of energy for quantiles."""
 
-    objective: str
-    energy_limit: float = 0.0
-    source_limit: float = 0.0
-    rising: float = 0.0
-    shares: int = 0
-    last_share: float = 1.0
-
-    def problems(self) -> str | None:
-        limits = (self.energy_limit, self.source_limit, self.rising)
-        if not all(0 <= limit <= MAX_LIMIT for limit in limits):
-            got = ", ".join(map(repr, limits))
-            return f"weighting limits must be between 0 and {MAX_LIMIT:g}, got {got}"
-        if not (0 <= self.shares <= 10_000 and 0 < self.last_share <= 1):
-            got = f"{self.shares!r}, {self.last_share!r}"
-            return f"weighting needs 0 <= shares <= 10000 and 0 < last_share <= 1, got {got}"
-        return None
+    objective: Words
+    energy_limit: Limit = 0.0
+    source_limit: Limit = 0.0
+    rising: Limit = 0.0
+    shares: Annotated[int, Field(ge=0, le=10_000)] = 0
+    last_share: Share = 1.0
 
 
-@dataclass(frozen=True)
-class Recipe:
+class SettingTable(Declared):
+    """Table [setting]: illumination, refractive index and mean cosine that the constants belong to."""
+
+    illumination: Words = SEARCHLIGHT.illumination
+    n: float = SEARCHLIGHT.n
+    g: float = SEARCHLIGHT.g
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        Setting(self.illumination, self.n, self.g)
+        return self
+
+
+class Recipe(Declared):
     """One fit, from its truth to its record. `held` are constants that stay at their starting value, and why.
 
-    setting        the light and the surface; the constants belong to it and to no other
     indices        refractive indices that a law which spans them is fitted to at once; the record says n = setting.n
                    where it speaks of one
     cosines        mean cosines g that a law which spans them is fitted to at once, at each index; albedos and rings are
@@ -125,25 +125,41 @@ class Recipe:
     random_starts  how many fits begin at random constants, to see whether one ends better
     """
 
-    name: str
-    title: str
-    law: str
-    equations: str
-    pipeline: str
-    truth: str
-    start: str = "published"
-    setting: Setting = SEARCHLIGHT
-    indices: tuple[float, ...] = ()
-    cosines: tuple[float, ...] = ()
-    check: str = ""
-    random_starts: int = 0
-    albedos: Albedos = Albedos(0.05, 0.995, 24)
-    weighting: Weighting = Weighting("")
+    title: Words
+    law: Words
+    equations: Words
+    pipeline: Annotated[str, OneOf(*PIPELINES)]
+    truth: Annotated[str, OneOf(*TRUTHS)]
+    start: Words = "published"
+    setting_table: SettingTable = Field(SettingTable(), alias="setting")
+    indices: Numbers = ()
+    cosines: Numbers = ()
+    check: Annotated[str, OneOf(*CHECKS), words("'orders' or absent")] = ""
+    random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
+    albedos: Albedos = Albedos(low=0.05, high=0.995, count=24)
+    weighting: Weighting = Weighting(objective="")
     rings: RingLayout | None = None
-    mfp: tuple[float, ...] = (1.0,)
-    held: tuple[str, ...] = ()
-    note: str = ""
-    path: Path = field(default=Path(), compare=False)
+    mfp: Annotated[
+        tuple[Length, ...], LISTED, Field(min_length=1), words(f"a list of lengths from {MFP[0]:g} to {MFP[1]:g}")
+    ] = (1.0,)
+    held: Names = ()
+    note: Words = ""
+
+    @property
+    def path(self) -> Path:
+        """File of the recipe."""
+        return Path(self.file)
+
+    @property
+    def name(self) -> str:
+        """Name of the recipe and of its record."""
+        return self.path.stem
+
+    @cached_property
+    def setting(self) -> Setting:
+        """Illumination and surface; the constants belong to it and to no other."""
+        table = self.setting_table
+        return Setting(table.illumination, table.n, table.g)
 
     @property
     def span(self) -> tuple[float, float]:
@@ -159,88 +175,83 @@ class Recipe:
         each = product(self.indices or (self.setting.n,), self.cosines or (self.setting.g,))
         return tuple(replace(self.setting, n=n, g=g) for n, g in each)
 
-    def problems(self) -> str | None:
-        """Return what is impossible about it, in one line, or None."""
-        if self.pipeline not in PIPELINES:
-            return f"pipeline must be one of {', '.join(PIPELINES)}, got {self.pipeline!r}"
-        if self.truth not in TRUTHS:
-            return f"truth must be one of {', '.join(TRUTHS)}, got {self.truth!r}"
-        if text := self._problems_of_setting() or self._problems_of_tests():
-            return text
-        low, high = MFP
-        if not self.mfp or not all(low <= length <= high for length in self.mfp):
-            return f"mfp must be a list of lengths from {low:g} to {high:g}, got {list(self.mfp)!r}"
+    @model_validator(mode="before")
+    @classmethod
+    def _whole(cls, content: dict[str, Any]) -> dict[str, Any]:
+        needed = () if content.get("pipeline") == "evidence" else ("albedos", "weighting")
+        if missing := [f"[{name}]" for name in needed if name not in content]:
+            raise InputError(f"missing {', '.join(missing)}")
+        return content
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self._require_setting()
+        self._require_tests()
         if len(set(self.mfp)) < len(self.mfp):
-            return f"mfp must be a list of different lengths, got {list(self.mfp)!r}"
+            raise Refused("a list of different lengths", list(self.mfp), "mfp")
         if self.pipeline == "as-published" and 1.0 not in self.mfp:
-            return f"mfp of pipeline 'as-published' must contain 1.0, got {list(self.mfp)!r}"
+            raise InputError(f"mfp of pipeline 'as-published' must contain 1.0, got {list(self.mfp)!r}")
         if self.rings is None and self.pipeline not in ("albedo", "evidence"):
-            return f"a recipe of pipeline {self.pipeline!r} needs a table [rings]"
+            raise InputError(f"a recipe of pipeline {self.pipeline!r} needs a table [rings]")
         objectives = PIPELINES[self.pipeline][0] or ("",)
         if self.weighting.objective not in objectives:
-            accepted, got = ", ".join(objectives), self.weighting.objective
-            return f"weighting.objective of pipeline {self.pipeline!r} must be one of {accepted}, got {got!r}"
+            raise Refused(f"one of {', '.join(objectives)}", self.weighting.objective, "weighting", "objective")
         if self.pipeline == "inverse" and self.weighting.shares == 0:
-            return "weighting.shares of pipeline 'inverse' must be between 1 and 10000, got 0"
-        parts: tuple[Albedos | RingLayout | Weighting | None, ...] = (self.albedos, self.rings, self.weighting)
-        if text := next((text for part in parts if part is not None and (text := part.problems())), None):
-            return text
-        lengths = self.mfp if self.pipeline == "as-published" else (1.0,)
-        return next((text for mfp in lengths if self.rings and (text := self.rings.problems_at(mfp))), None)
+            raise Refused("a whole number in 1 ... 10000 of pipeline 'inverse'", 0, "weighting", "shares")
+        for mfp in self.mfp if self.pipeline == "as-published" else (1.0,):
+            if self.rings is not None:
+                self.rings.require_fit(mfp)
+        return self
 
-    def _problems_of_setting(self) -> str | None:
+    def _require_setting(self) -> None:
         where = self.setting
-        if self.cosines and (text := self._problems_of_cosines()):
-            return text
+        if self.cosines:
+            self._require_cosines()
         if where.g != 0 and not self.cosines:
-            return f"setting.g must be 0 where there are no cosines, got {where.g!r}"
+            raise Refused("0 where there are no cosines", where.g, "setting", "g")
         if self.truth == "exact" and not where.n >= 1:
-            return f"setting.n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got {where.n!r}"
-        if self.indices and (text := self._problems_of_indices()):
-            return text
+            accepted = "at least 1 where truth is 'exact' (use truth = \"orders\")"
+            raise Refused(accepted, where.n, "setting", "n")
+        if self.indices:
+            self._require_indices()
         if self.pipeline in PAPERS and where != SEARCHLIGHT:
-            return f"setting of pipeline {self.pipeline!r} must be {SEARCHLIGHT}, got {where}"
+            raise InputError(f"setting of pipeline {self.pipeline!r} must be {SEARCHLIGHT}, got {where}")
         if self.pipeline == "inverse" and not where.is_matched_isotropic:
-            return f"setting.n of pipeline 'inverse' must be 1, got {where.n!r}"
+            raise Refused("1 of pipeline 'inverse'", where.n, "setting", "n")
         if self.albedos.spacing == "reflectance" and not where.is_matched_isotropic:
-            return f"albedos.spacing must be 'alpha' or 'sqrt(1-alpha)' where setting.n is not 1, got {where.n!r}"
-        return None
+            accepted = f"alpha or sqrt(1-alpha) where n is not 1 but {where.n!r}"
+            raise Refused(accepted, "reflectance", "albedos", "spacing")
 
-    def _problems_of_indices(self) -> str | None:
+    def _require_indices(self) -> None:
+        got = list(self.indices)
         if self.truth != "exact" or self.pipeline not in ("albedo", "profile"):
-            got = f"{self.truth!r}, {self.pipeline!r}"
-            return f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {got}"
-        if not all(1 < n <= LARGEST_INDEX for n in self.indices) or list(self.indices) != sorted(set(self.indices)):
-            return f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {list(self.indices)!r}"
-        if len(self.indices) < (fewest := FEWEST_OF_G if self.cosines else FEWEST_INDICES):
-            return f"indices must be at least {fewest}, got {list(self.indices)!r}"
-        if self.setting.n not in self.indices:
-            return f"setting.n must be one of the indices {list(self.indices)!r}, got {self.setting.n!r}"
-        return None
+            words = f"{self.truth!r}, {self.pipeline!r}"
+            raise InputError(f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {words}")
+        if not all(1 < n <= LARGEST_INDEX for n in got) or got != sorted(set(got)):
+            raise InputError(f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {got!r}")
+        if len(got) < (fewest := FEWEST_OF_G if self.cosines else FEWEST_INDICES):
+            raise InputError(f"indices must be at least {fewest}, got {got!r}")
+        if self.setting.n not in got:
+            raise Refused(f"one of the indices {got!r}", self.setting.n, "setting", "n")
 
-    def _problems_of_cosines(self) -> str | None:
-        low, high = FORWARD_N
+    def _require_cosines(self) -> None:
+        (low, high), got = FORWARD_N, list(self.cosines)
         if not self.indices or not all(low <= n <= high for n in self.indices):
-            return f"indices must be in [{low:g}, {high:g}] where there are cosines, got {list(self.indices)!r}"
-        rising = list(self.cosines) == sorted(set(self.cosines))
-        if not rising or not all(0 < g <= FORWARD_G for g in self.cosines) or len(self.cosines) < FEWEST_OF_G:
-            return f"cosines must rise, at least {FEWEST_OF_G} in (0, {FORWARD_G:g}], got {list(self.cosines)!r}"
+            accepted = f"in [{low:g}, {high:g}] where there are cosines"
+            raise InputError(f"indices must be {accepted}, got {list(self.indices)!r}")
+        if got != sorted(set(got)) or not all(0 < g <= FORWARD_G for g in got) or len(got) < FEWEST_OF_G:
+            raise InputError(f"cosines must rise, at least {FEWEST_OF_G} in (0, {FORWARD_G:g}], got {got!r}")
         if self.check:
-            return f"check must be absent where there are cosines, got {self.check!r}"
-        if self.setting.g not in self.cosines:
-            return f"setting.g must be one of the cosines {list(self.cosines)!r}, got {self.setting.g!r}"
-        return None
+            raise Refused("absent where there are cosines", self.check, "check")
+        if self.setting.g not in got:
+            raise Refused(f"one of the cosines {got!r}", self.setting.g, "setting", "g")
 
-    def _problems_of_tests(self) -> str | None:
-        if self.check not in CHECKS:
-            return f"check must be 'orders' or absent, got {self.check!r}"
+    def _require_tests(self) -> None:
         if self.check and self.truth != "exact":
-            return f'check needs truth = "exact": it compares the photons with it, got truth = {self.truth!r}'
-        if not 0 <= self.random_starts <= MOST_STARTS:
-            return f"random_starts must be between 0 and {MOST_STARTS}, got {self.random_starts!r}"
+            got = f"got truth = {self.truth!r}"
+            raise InputError(f'check needs truth = "exact": it compares the photons with it, {got}')
         if self.pipeline in PAPERS and (self.check or self.random_starts):
-            return f"pipeline {self.pipeline!r} takes neither check nor random_starts"
-        return None
+            raise InputError(f"pipeline {self.pipeline!r} takes neither check nor random_starts")
 
 
 def read(path: Path) -> Recipe:
@@ -251,18 +262,9 @@ def read(path: Path) -> Recipe:
         table = read_toml(path)
     except InputError as error:
         raise RecipeError(str(error)) from None
-    for key in ("name", "path"):
-        if key in table:
-            raise RecipeError(f"{path}: unknown key {shown(key)}: a recipe is named by its file")
-    needed = () if table.get("pipeline") == "evidence" else ("albedos", "weighting")
-    if missing := [f"[{name}]" for name in needed if name not in table]:
-        raise RecipeError(f"{path}: missing {', '.join(missing)}")
     if not is_line(path.stem):  # it names the record
         raise RecipeError(f"{str(path)!r}: the name of a recipe must be one printable line")
-    recipe = _build(Recipe, {**table, "name": path.stem, "path": path}, str(path), frozenset({"path", "name"}))
-    if problem := recipe.problems():
-        raise RecipeError(f"{path}: {problem}")
-    return recipe
+    return Recipe.of(str(path), table, RecipeError)
 
 
 def available(folder: Path) -> dict[str, Path]:
@@ -286,45 +288,3 @@ def find(name: str, folder: Path) -> Recipe:
     if name not in known:
         raise RecipeError(f"recipe must be one of {', '.join(known) or '(none)'} or a .toml file, got {name!r}")
     return read(known[name])
-
-
-def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[str] = frozenset()) -> Any:
-    """Make a dataclass from a TOML table: every key known, every needed key there, every type right."""
-    known = {f.name: f for f in fields(kind)}
-    for key in table:
-        if key not in known:
-            accepted = ", ".join(name for name in known if name not in given)
-            raise RecipeError(f"{where}: unknown key {shown(key)}, accepted: {accepted}")
-    missing = [n for n, f in known.items() if n not in table and f.default is MISSING and f.default_factory is MISSING]
-    if missing:
-        raise RecipeError(f"{where}: missing {', '.join(missing)}")
-    typed = {key: value if key in given else _typed(known[key].type, key, value, where) for key, value in table.items()}
-    try:
-        return kind(**typed)
-    except InputError as error:  # a Setting checks itself
-        raise RecipeError(f"{where}: {error}") from None
-
-
-def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
-    """Return a TOML value as the type its field declares, or raise RecipeError."""
-    tables = {"Albedos": Albedos, "RingLayout | None": RingLayout, "Weighting": Weighting, "Setting": Setting}
-    if annotation in tables:
-        if not isinstance(value, dict):
-            raise RecipeError(f"{where}: [{key}] must be a table, got {shown(value)}")
-        return _build(tables[annotation], value, f"{where}: [{key}]")
-    if annotation == "float" and is_number(value):
-        return float(value)
-    if annotation == "int" and is_number(value) and isinstance(value, int):
-        return value
-    if annotation == "str" and is_line(value):
-        return value
-    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(map(is_number, value)):
-        return tuple(float(v) for v in value)
-    if annotation == "tuple[str, ...]" and isinstance(value, list) and all(map(is_line, value)):
-        return tuple(value)
-    words = {"float": "finite number", "int": "whole number", "str": "text"}.get(annotation)
-    words = words or ("list of finite numbers" if "float" in annotation else "list of texts")
-    texts = [value] if annotation == "str" else value
-    if "str" in annotation and isinstance(texts, list) and all(isinstance(text, str) for text in texts):
-        words += f" of one printable line and {LONGEST_TEXT} characters at most"  # it becomes comments in code
-    raise RecipeError(f"{where}: {key} must be a {words}, got {shown(value)}")

@@ -20,7 +20,7 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import PHASES, STACKS
 from profilefit.recipes.kinds import Kind, gaussians, phase, stack
-from profilefit.recipes.phases.fit import BANDS
+from profilefit.recipes.phases import BANDS
 from profilefit.recipes.pipelines import read
 from profilefit.recipes.stack.gaussians import constant_names, quality
 from profilefit.report.records import Content, known_errors, largest_error

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from profilefit.scenes.stage.picture import srgb_codes, to_srgb
     from profilefit.scenes.stage.stage import Stage
     from profilefit.scenes.stage.step_edge import step_response
-    from profilefit.scenes.stage.surface import seen
-    from profilefit.scenes.stage.surface_integral import gathered
+    from profilefit.scenes.stage.surface import gathered, seen
     from profilefit.scenes.stage.technique import Lambert
     from profilefit.scenes.stage.world import Camera
 else:
@@ -39,7 +38,7 @@ else:
             "covering": "skin.chart",
             "step_response": "stage.step_edge",
             "seen": "stage.surface",
-            "gathered": "stage.surface_integral",
+            "gathered": "stage.surface",
             "Lambert": "stage.technique",
             "Camera": "stage.world",
         },
@@ -58,7 +57,7 @@ SCENES = {
 SOURCES = {
     "sea-segment": ("of light in water", "profilefit.scenes.sea.source"),
     ".toml": ("of light in water", "profilefit.scenes.sea.source"),
-    "fur": ("of fur", "profilefit.scenes.fur.source"),
+    "fur": ("of fur", "profilefit.scenes.fur.law"),
 }
 
 __all__ = [

@@ -1,6 +1,6 @@
 """A setup for photographs that are simulated: its file, its photographs as raw files, and what they could tell.
 
-`KEYS` are those of its file, and `examples/photo.toml` is one.
+`Setup` is its file, and `examples/photo.toml` is one.
 """
 
 from __future__ import annotations
@@ -8,17 +8,17 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
-from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.model import exact_light, u_of
@@ -28,25 +28,13 @@ from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
 from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.declared import LISTED, Declared, Misplaced, Refused, Share, Tolerance, words
 
 Floats = NDArray[np.float64]
-KEYS = {
-    "": ("medium", "optics", "camera", "cards"),
-    "medium": ("mu_s", "mu_a", "n", "g", "photons"),
-    "optics": ("beam", "core", "surface", "glare", "width", "falling"),
-    "camera": ("sides", "pitch", "gain", "read", "bits", "black", "well", "uneven", "corner", "tilt", "speckle",
-               "grain", "exposures", "late", "seed"),
-    "cards": ("white", "grey"),
-}  # fmt: skip
 MAX_BYTES, LEAST_SIDE, MOST_SIDE = 1 << 16, 50, 12_000
-# The largest numbers of a camera and of its optics that make a photograph; lengths in mm.
-LARGEST = {"pitch": 10.0, "gain": 1e4, "read": 1e4, "well": 1e9, "uneven": 0.1, "corner": 0.9, "speckle": 1.0,
-           "grain": 50.0, "beam": 100.0, "core": 100.0, "surface": 1.0, "glare": 0.9, "width": 1e3,
-           "falling": 10.0}  # fmt: skip
 OURS, HEAD = b"profilefit", 4096  # in the first bytes of each file
-MOST_PHOTONS = 10**9
 MOST = 1e6  # 1/mm
+LENS, SENSOR = SpotOptics(), SpotCamera()
 SHORTEST = 1e-3  # seconds, of the spot: its light is as bright as that
 STEP = 4.0  # from one exposure to the next
 FULL = 0.5  # of the sensor's range, that the shortest one reaches
@@ -55,87 +43,128 @@ GREY_ERROR, BEAM_ERROR = 0.03, 0.1  # relative, of what is told
 SCATTER = 0.003  # of a ring, by speckle and noise
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Medium, beam, lens and camera of a simulation.
+Side = Annotated[int, Field(ge=1, le=MOST_SIDE)]
+Scattering = Annotated[float, Field(ge=1e-3, le=MOST)]
+Absorption = Annotated[float, Field(ge=1e-4, le=MOST)]
+
+
+class MediumTable(Declared):
+    """Table [medium]: mu_s and mu_a of red, green and blue [1/mm], refractive index and mean cosine.
 
     photons  that are traced for each colour; 0: light is exact
-    late     relative error of stated times
-    white    whether there is such a card; grey the reflectance of the other, if there is one
     """
 
-    mu_s: tuple[float, float, float]
-    mu_a: tuple[float, float, float]
-    setting: Setting
-    photons: int
-    optics: SpotOptics
-    camera: SpotCamera
-    exposures: int
-    late: float
-    seed: int
-    white: bool
-    grey: float | None
+    mu_s: Annotated[tuple[Scattering, Scattering, Scattering], LISTED] = (1.0, 1.0, 1.0)
+    mu_a: Annotated[tuple[Absorption, Absorption, Absorption], LISTED] = (0.05, 0.05, 0.05)
+    n: Annotated[float, Field(gt=0.0)] = 1.4
+    g: Share = 0.8
+    photons: Annotated[int, Field(ge=0, le=10**9)] = 0
+
+    @property
+    def setting(self) -> Setting:
+        """Illumination and surface."""
+        return Setting(n=self.n, g=self.g)
+
+    @model_validator(mode="after")
+    def _solved(self) -> Self:
+        require_solved(self.setting)
+        return self
+
+
+class OpticsTable(Declared):
+    """Table [optics]: of beam and lens; lengths in mm."""
+
+    beam: Annotated[float, Field(gt=0.0, le=100.0)] = LENS.beam
+    core: Annotated[float, Field(gt=0.0, le=100.0)] = LENS.core
+    surface: Tolerance = LENS.surface
+    glare: Annotated[float, Field(gt=0.0, le=0.9)] = LENS.glare
+    width: Annotated[float, Field(gt=0.0, le=1e3)] = LENS.width
+    falling: Annotated[float, Field(gt=0.0, le=10.0)] = LENS.falling
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        if not self.falling > 1.0:
+            raise Refused("a number > 1, or its light is endless", self.falling, "falling")
+        return self
+
+
+class SensorTable(Declared):
+    """Table [camera]: of the sensor, its lens and its exposures; pitch in mm, tilt in degrees.
+
+    late  relative error of stated times
+    """
+
+    sides: Annotated[tuple[Side, Side], LISTED, words(f"two whole numbers of pixels in 1 ... {MOST_SIDE}")] = (
+        1200,
+        900,
+    )
+    pitch: Annotated[float, Field(gt=0.0, le=10.0)] = SENSOR.pitch
+    gain: Annotated[float, Field(gt=0.0, le=1e4)] = SENSOR.gain
+    read: Annotated[float, Field(gt=0.0, le=1e4)] = SENSOR.read
+    bits: Annotated[int, Field(ge=8, le=14)] = SENSOR.bits
+    black: Annotated[int, Field(ge=0, le=4000)] = SENSOR.black
+    well: Annotated[float, Field(gt=0.0, le=1e9)] = SENSOR.well
+    uneven: Annotated[float, Field(gt=0.0, le=0.1)] = SENSOR.uneven
+    corner: Annotated[float, Field(gt=0.0, le=0.9)] = SENSOR.corner
+    tilt: Annotated[float, Field(ge=-60.0, le=60.0)] = 0.0
+    speckle: Annotated[float, Field(gt=0.0, le=1.0)] = SENSOR.speckle
+    grain: Annotated[float, Field(gt=0.0, le=50.0)] = SENSOR.grain
+    exposures: Annotated[int, Field(ge=1, le=12)] = 5
+    late: Annotated[float, Field(gt=0.0, le=0.2)] = 0.02
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+
+    @property
+    def camera(self) -> SpotCamera:
+        """Camera of these numbers."""
+        return SpotCamera(**self.model_dump(exclude={"exposures", "late", "seed"}))
+
+    @model_validator(mode="after")
+    def _sees(self) -> Self:
+        if min(self.sides) < LEAST_SIDE:
+            raise Refused(f"at least {LEAST_SIDE} pixels each", list(self.sides), "sides")
+        if not self.black < (white := self.camera.white):
+            raise Refused(f"less than {white}, white of {self.bits} bits", self.black, "black")
+        return self
+
+
+class CardsTable(Declared):
+    """Table [cards]: whether there is a white card, and the reflectance of a grey one."""
+
+    white: bool = False
+    grey: Tolerance | None = None
+
+
+class Setup(Declared):
+    """Medium, beam, lens and camera of a simulation."""
+
+    medium: MediumTable
+    optics_table: OpticsTable = Field(OpticsTable(), alias="optics")
+    camera_table: SensorTable = Field(SensorTable(), alias="camera")
+    cards: CardsTable = CardsTable()
+
+    @property
+    def optics(self) -> SpotOptics:
+        """Beam and lens."""
+        return SpotOptics(**self.optics_table.model_dump())
+
+    @property
+    def camera(self) -> SpotCamera:
+        """Sensor."""
+        return self.camera_table.camera
+
+    @model_validator(mode="after")
+    def _resolved(self) -> Self:
+        longest = 1.0 / min(map(sum, zip(self.medium.mu_s, self.medium.mu_a, strict=True)))
+        try:
+            simulated.require_resolved(longest, self.optics, _far(self.camera))
+        except InputError as error:
+            raise Misplaced(error, "medium") from None
+        return self
 
 
 def read_setup(path: Path) -> Setup:
-    """InputError, in one line, of what is no setup."""
-    tables = read_toml(path, MAX_BYTES)
-    read = Tables(str(path), KEYS)
-    read.known("", tables, KEYS[""])
-    of, lens, camera, cards = (read.table(tables, name, {} if name != "medium" else None) for name in KEYS[""])
-    own = SpotCamera()
-    numbers: dict[str, Any] = {
-        name: read.number("camera", name, camera, getattr(own, name), LARGEST[name])
-        for name in ("pitch", "gain", "read", "well", "uneven", "corner", "speckle", "grain")
-    }
-    shown = replace(
-        own, **numbers,
-        sides=read.sides("camera", "sides", camera, (1200, 900), MOST_SIDE),
-        bits=read.whole("camera", "bits", camera, own.bits, 8, 14),
-        black=read.whole("camera", "black", camera, own.black, 0, 4000),
-        tilt=_within(read, "camera", "tilt", camera, 0.0, -60.0, 60.0),
-    )  # fmt: skip
-    if min(shown.sides) < LEAST_SIDE:
-        raise read.bad("camera", "sides", f"at least {LEAST_SIDE} pixels each", list(shown.sides))
-    if not shown.black < shown.white:
-        raise read.bad("camera", "black", f"less than {shown.white}, white of {shown.bits} bits", shown.black)
-    optics = SpotOptics(
-        **{
-            name: read.number("optics", name, lens, getattr(SpotOptics(), name), LARGEST[name])
-            for name in KEYS["optics"]
-        }
-    )
-    if not optics.falling > 1.0:
-        raise read.bad("optics", "falling", "a number > 1, or its light is endless", optics.falling)
-    setting = Setting(n=read.number("medium", "n", of, 1.4), g=_within(read, "medium", "g", of, 0.8, 0.0, 1.0))
-    read.build("medium", lambda: require_solved(setting))
-    mu_s = read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST)
-    mu_a = read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST)
-    longest = 1.0 / min(map(sum, zip(mu_s, mu_a, strict=True)))
-    read.build("medium", lambda: simulated.require_resolved(longest, optics, _far(shown)))
-    return Setup(
-        mu_s, mu_a,
-        setting, read.whole("medium", "photons", of, 0, 0, MOST_PHOTONS), optics, shown,
-        read.whole("camera", "exposures", camera, 5, 1, 12),
-        read.number("camera", "late", camera, 0.02, 0.2),
-        read.whole("camera", "seed", camera, 0, 0, 2**31 - 1),
-        _flag(read, "cards", "white", cards),
-        read.number("cards", "grey", cards, most=1.0) if "grey" in cards else None,
-    )  # fmt: skip
-
-
-def _flag(read: Tables, where: str, key: str, table: Table) -> bool:
-    value = table.get(key, False)
-    if not isinstance(value, bool):
-        raise read.bad(where, key, "true or false", value)
-    return value
-
-
-def _within(read: Tables, where: str, key: str, table: Table, default: float, least: float, most: float) -> float:
-    value = table.get(key, default)
-    if not is_number(value) or not least <= value <= most:
-        raise read.bad(where, key, f"a number in {least:g} ... {most:g}", value)
-    return float(value)
+    """Return a setup; InputError, in one line, of what is no setup."""
+    return Setup.of(str(path), read_toml(path, MAX_BYTES))
 
 
 def _far(camera: SpotCamera) -> float:
@@ -147,24 +176,27 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
-    for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)):
-        medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.setting, setup.optics, radii
-        spot[colour] = radii, simulated.light(*medium, setup.photons, len(CHANNELS) * setup.seed + at)
+    for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)):
+        medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.medium.setting, setup.optics, radii
+        spot[colour] = (
+            radii,
+            simulated.light(*medium, setup.medium.photons, len(CHANNELS) * setup.camera_table.seed + at),
+        )
     card = simulated.card(setup.optics, radii)
     scenes = {"spot": spot}
-    if setup.white:
+    if setup.cards.white:
         scenes["card"] = dict.fromkeys(CHANNELS, (radii, 0.9 * card))
-    if setup.grey is not None:
-        scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.grey * card))
-    rng = np.random.default_rng(setup.seed)
+    if setup.cards.grey is not None:
+        scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.cards.grey * card))
+    rng = np.random.default_rng(setup.camera_table.seed)
     exposures = {}
     enough = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black)
     brightest = {name: max(float(light[0]) for _, light in radial.values()) for name, radial in scenes.items()}
     electrons = enough / (SHORTEST * brightest["spot"])
     for name, radial in scenes.items():
         first = enough / (electrons * brightest[name])
-        stated = [first * STEP**at for at in range(setup.exposures)]
-        times = {one: one * (1.0 + setup.late * rng.standard_normal()) for one in stated}
+        stated = [first * STEP**at for at in range(setup.camera_table.exposures)]
+        times = {one: one * (1.0 + setup.camera_table.late * rng.standard_normal()) for one in stated}
         exposures[name] = simulated.exposures_of(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
     return exposures
 
@@ -175,8 +207,10 @@ def written(setup: Setup, out: Path) -> list[Path]:
     InputError where another camera's lie under these names, or where any lie that are not of this setup, which SPOT-*
     would name too.
     """
-    taken = {"spot": True, "card": setup.white, "grey": setup.grey is not None}
-    own = {out / f"{name}-{at}.dng" for name in taken if taken[name] for at in range(1, setup.exposures + 1)}
+    taken = {"spot": True, "card": setup.cards.white, "grey": setup.cards.grey is not None}
+    own = {
+        out / f"{name}-{at}.dng" for name in taken if taken[name] for at in range(1, setup.camera_table.exposures + 1)
+    }
     for file in sorted(one for name in taken for one in out.glob(f"{name}-*.dng")):
         if file not in own:
             raise InputError(f"{file}: expected none but photographs of this setup in its folder, got another")
@@ -192,8 +226,8 @@ def written(setup: Setup, out: Path) -> list[Path]:
 
 def room(setup: Setup) -> float:
     """Return bytes that the photographs take on a disk, and as many as a command's other files may take."""
-    scenes = 1 + setup.white + (setup.grey is not None)
-    return ROOM + scenes * setup.exposures * 2 * math.prod(setup.camera.sides)
+    scenes = 1 + setup.cards.white + (setup.cards.grey is not None)
+    return ROOM + scenes * setup.camera_table.exposures * 2 * math.prod(setup.camera.sides)
 
 
 def as_dng(exposure: SimulatedExposure) -> bytes:
@@ -229,14 +263,14 @@ def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
     surface, glare and lens what `Beliefs` have. Exposures and noise are not in it.
     """
-    grey = setup.grey or 0.18
+    grey = setup.cards.grey or 0.18
     known = Known(grey, GREY_ERROR * grey)
     of: dict[str, tuple[Known | None, ...]]
     of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
     return {
         label: {
             colour: _bounds(setup, mu_s, mu_a, cards)
-            for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
+            for colour, mu_s, mu_a in zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)
         }
         for label, cards in of.items()
     }
@@ -247,7 +281,7 @@ def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None
     edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
     beliefs = Beliefs(beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core)).over(setup.camera.sides, pixel, float(edges[-1]))
-    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.setting), beliefs)
+    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.medium.setting), beliefs)
     x = shot.middle
     x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)
     x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]

@@ -10,28 +10,29 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, model_validator
 
 from mcml_sim import Medium, Setting, exact
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
-from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
-from profilefit.recipes import catalogue, record, schema
+from profilefit.recipes import record, schema
+from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Table, Text, words
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
 from profilefit.recipes.stack import fit as stacks
-from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
-from profilefit.recipes.stack.photons import USUAL, TracedRings, Tracing
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
+from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
 
 Floats = NDArray[np.float64]
 PIPELINE = "stack"
@@ -45,14 +46,17 @@ TRACED_NOTE = (
     "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
     "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
 )
-# What shader sources and pictures take from a record besides its laws, by dotted key.
+# What shader sources and pictures take from a record besides its laws, by dotted key; what a report shows, too.
+QUALITY: Fields = {
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
+    "quality.regenerated.delta_A": NUMBER,
+}
 USED: Fields = {
     **dict.fromkeys(("unit", "equations", "note"), TEXT),
     "layers": LIST,
     "half_spaces": TABLE,
     **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     "data_digest": DIGEST,
 }
 # Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
@@ -76,45 +80,84 @@ SHOWN: Fields = {
     **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
     **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
     **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
     **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
 }
 EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
-# Of STACK.toml, those that only draw a scene among them.
-KEYS = (
-    *("title", "unit", "illumination", "layers", "start"),
-    *("scene", "surface", "uneven", "pose", "technique", "camera", "light", "choose"),
-)
+STARTS = f"lists of {', '.join(StackLaw.constant_names())}, one an interface: w in (0, 1), all but u > 0"
+OF_SCENES = ("scene", "surface", "uneven", "pose", "technique", "camera", "light", "choose")  # tables and keys
 
 
-@dataclass(frozen=True)
-class StackRequest:
-    """Content of STACK.toml: a stack under a light. Its name is that of the file.
+def _starts(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    names = StackLaw.constant_names()
+    for row in rows:
+        own = dict(zip(names, row, strict=False))
+        if len(row) != len(names) or own["w"] >= 1 or any(own[name] <= 0 for name in names if name != "u"):
+            raise Refused(STARTS, [list(one) for one in rows])
+    return rows
 
-    starts  of red, green and blue: constants of each interface at which the fit begins; empty where it searches
-    """
 
-    name: str
-    title: str
-    illumination: str
-    stack: LayerStack
-    starts: tuple[Floats, ...] = ()
+Row = Annotated[tuple[float, ...], LISTED]
+Starts = Annotated[tuple[Row, ...], LISTED, AfterValidator(_starts), words(STARTS)]
+
+
+class StartTable(Declared):
+    """Table [start]: constants of each interface at which the fit of a colour begins."""
+
+    red: Starts
+    green: Starts
+    blue: Starts
+
+
+class StackRequest(Layered):
+    """Content of STACK.toml: a stack under a light. Its name is that of the file; a fit without `start` searches."""
+
+    title: Text = TITLE
+    illumination: Annotated[str, OneOf(*ILLUMINATIONS)] = "diffuse"
+    start: StartTable | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the stack."""
+        return Path(self.file).stem
+
+    @classmethod
+    def of(cls, file: str, content: object, error: type[InputError] = InputError) -> Self:
+        """Return the stack of a file's content; InputError as for any table, and on a file without a printable name."""
+        if not schema.is_line(Path(file).stem):
+            raise error(f"{file!r}: the name of a stack must be one printable line")
+        return super().of(file, content, error)
+
+    @property
+    def media(self) -> tuple[Medium, Medium, Medium]:
+        """Stacks of red, green, blue."""
+        return self.stack.media
+
+    @cached_property
+    def starts(self) -> tuple[Floats, ...]:
+        """Constants (interfaces, 9) of each colour at which the fit begins; empty where it searches."""
+        start = self.start
+        return () if start is None else tuple(np.array(getattr(start, channel), float) for channel in CHANNELS)
+
+    @model_validator(mode="after")
+    def _fitted(self) -> Self:
+        if len(self.layers) < 2:
+            accepted = "two layers or more: one is a half space, as `profilefit export hazard` has it"
+            raise Refused(accepted, 1, "layers")
+        for channel in CHANNELS if self.start is not None else ():
+            rows = getattr(self.start, channel)
+            if len(rows) != len(self.layers) - 1:
+                raise Refused(STARTS, [list(row) for row in rows], "start", channel)
+        if self.start is not None and any(layer.g for layer in self.layers):
+            raise Refused("left out where a layer scatters forward", "a table", "start")
+        return self
 
 
 @dataclass(frozen=True)
 class StackRecord:
-    """Record of a stack.
-
-    Attributes:
-        name: name of the record.
-        stack: layers of the stack.
-        laws: laws of red, green and blue.
-        content: everything that the record says.
-        digest: SHA-256 of the record's file.
-    """
+    """Record of a stack: its layers, laws of red, green and blue, all that it says, and SHA-256 of its file."""
 
     name: str
     stack: LayerStack
@@ -125,19 +168,6 @@ class StackRecord:
     @property
     def setting(self) -> Setting:
         return self.laws[0].setting
-
-
-class StackQuality(NamedTuple):
-    """Errors of a law at one thickness.
-
-    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
-    delta_A  relative error of A [-]
-    """
-
-    rel: float
-    noise: float
-    ks: float
-    delta_A: float
 
 
 def find(name: str, folder: Path) -> StackRecord | None:
@@ -159,37 +189,22 @@ def request(name: str) -> StackRequest | None:
 
 
 def requested(file: str, content: Table) -> StackRequest:
-    """Return the stack of a file's content, checked; keys of `KEYS` that draw a scene are not looked at."""
-    tables = Tables(file, {"": KEYS})
-    tables.known("", content)
-    stack = read_layers(file, content)
-    name = Path(file).stem
-    if len(stack.names) < 2:
-        accepted = "two layers or more: one is a half space, as `profilefit export hazard` has it"
-        raise tables.bad("", "layers", accepted, 1)
-    if not schema.is_line(name):
-        raise InputError(f"{file!r}: the name of a stack must be one printable line")
-    return StackRequest(
-        name,
-        tables.text("", "title", content, TITLE),
-        tables.text("", "illumination", content, "diffuse", ILLUMINATIONS),
-        stack,
-        _starts(tables, content, stack),
-    )
+    """Return the stack of a file's content, checked; keys that draw a scene are not looked at."""
+    return StackRequest.of(file, {key: value for key, value in content.items() if key not in OF_SCENES})
 
 
 def fit(of: StackRequest, run: RecipeRun) -> Work:
     """Return the record to be made of a stack, a part for each colour that differs; InputError if no law fits."""
-    for medium in of.stack.media:
+    for medium in of.media:
         stacks.require(medium)
-    different = list(dict.fromkeys(of.stack.media))
+    different = list(dict.fromkeys(of.media))
     parts = []
     for number, medium in enumerate(different):
-        starts = list(of.starts[of.stack.media.index(medium)]) if of.starts else []
+        starts = list(of.starts[of.media.index(medium)]) if of.starts else []
         parts.append(partial(_channel, of.illumination, medium, starts, Tracing.of(run, f"{of.name}-{number}", medium)))
 
     def finish(results: list[Any]) -> RecordContent:
-        colours = zip(CHANNELS, of.stack.media, strict=True)
+        colours = zip(CHANNELS, of.media, strict=True)
         return _content(of, run, {name: results[different.index(medium)] for name, medium in colours}), {}
 
     return Work(f"{STACKS}/{of.name}", tuple(parts), finish, order=(LAWS, 1, 0))
@@ -206,8 +221,8 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
         ]
     else:
         measured = [_of_exact(interface, float(at)) for at in d]
-    kept = {name: [getattr(each, name) for each in measured] for name in ("rel", "ks", "delta_A")}
-    return {"thickness": d.tolist(), **kept}
+    rel, _, ks, delta_a = (list(values) for values in zip(*measured, strict=True))
+    return {"thickness": d.tolist(), "rel": rel, "ks": ks, "delta_A": delta_a}
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -237,7 +252,7 @@ def matching(of: StackRequest, folder: Path) -> StackRecord | None:
 
     RecordError where that one is damaged; one whose layers cannot be read is passed over, with a DamagedRecord warning.
     """
-    media = record.plain(of.stack.media)  # to the digits of a record: the mean of an image has more
+    media = record.plain(of.media)  # to the digits of a record: the mean of an image has more
     for path in record.available(folder / STACKS).values():
         try:
             content = of_stack(path)
@@ -289,7 +304,7 @@ def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED)
         if not kind.accepts(value):
             raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
     layers = [_recorded_layer(layer) for layer in content["layers"]]
-    stack = stack_of(Tables(file, {}), layers, content["unit"])
+    stack = read_layers(file, {"unit": content["unit"], "layers": layers})
     for medium in stack.media:
         stacks.require(medium)
     return stack
@@ -297,8 +312,8 @@ def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED)
 
 def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, str]) -> dict[str, Any]:
     """Return what the records of a stack say of its layers and light; notes  on exact light, and on traced light."""
-    first = of.stack.media[0].layers[0]
-    is_traced = any(layer.g > 0 for layer in of.stack.media[0].layers)
+    first = of.media[0].layers[0]
+    is_traced = any(layer.g > 0 for layer in of.media[0].layers)
     return {
         "law": pipeline,
         "pipeline": pipeline,
@@ -312,8 +327,11 @@ def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, st
     }
 
 
-def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
-    """Measure a law by traced light; rel is of rings from a tenth of the first layer's mean free path."""
+def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> tuple[float, float, float, float]:
+    """Measure a law by traced light: rel, the noise that was taken off it in quadrature, ks, relative error of A [-].
+
+    rel is of rings from a tenth of the first layer's mean free path.
+    """
     within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
     counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
     rel = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
@@ -321,12 +339,10 @@ def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQualit
     noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
     light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
     ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
-    return StackQuality(
-        float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
-    )
+    return float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
 
 
-def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
+def _of_exact(interface: stacks.Interface, thickness: float) -> tuple[float, float, float, float]:
     law, medium = interface.law, interface.medium
     light = exact.solve(medium.with_first(thickness), law.setting.illumination, stacks.NODES)
     r = stacks.radii(medium)
@@ -334,34 +350,7 @@ def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
     near = r[share <= stacks.LAST_SHARE]
     relative = np.asarray(law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
     ks = float(np.max(np.abs(np.asarray(law.cdf(r, thickness)) - share)))
-    return StackQuality(float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1)
-
-
-def _starts(tables: Tables, content: Table, stack: LayerStack) -> tuple[Floats, ...]:
-    """Return constants (interfaces, 9) of each colour from a table [start]; InputError on others."""
-    if "start" not in content:
-        return ()
-    table, starts, count = tables.table(content, "start"), [], len(stack.names) - 1
-    tables.known("start", table, CHANNELS)
-    names = StackLaw.constant_names()
-    accepted = f"lists of {', '.join(names)}, one an interface: w in (0, 1), all but u > 0"
-    for channel in CHANNELS:
-        rows = table.get(channel)
-        if not (isinstance(rows, list) and len(rows) == count and all(map(_is_start, rows))):
-            raise tables.bad("start", channel, accepted, rows)
-        starts.append(np.array(rows, float))
-    if any(layer.g > 0 for layer in stack.media[0].layers):
-        raise tables.bad("", "start", "left out where a layer scatters forward", "a table")
-    return tuple(starts)
-
-
-def _is_start(row: Any) -> bool:
-    """Return whether a row holds constants that a law may have."""
-    names = StackLaw.constant_names()
-    if not (isinstance(row, list) and len(row) == len(names) and all(map(schema.is_number, row))):
-        return False
-    own = dict(zip(names, row, strict=True))
-    return own["w"] < 1 and all(np.isfinite(value) and (value > 0 or name == "u") for name, value in own.items())
+    return float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1
 
 
 def _channel(illumination: str, medium: Medium, starts: Sequence[Floats], tracing: Tracing) -> dict[str, Any]:
@@ -441,22 +430,19 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
     if len(recorded) != len(medium.layers):
         raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
     if any(layer.g > 0 for layer in medium.layers):
-        own = [replace(setting, g=layer.g) for layer in medium.layers]
-        similar = [layer.similar for layer in medium.layers]
-        laws = [
-            ForwardHalfSpace(each, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
-            for each, values in zip(own, recorded, strict=True)
-        ]
-        return [
-            LayerLaw(each, law, layer.alpha, layer.mfp) for each, law, layer in zip(own, laws, similar, strict=True)
-        ]
-    hazard = catalogue.load("hazard", setting=setting)
-    today = hazard.constants()
+        tops = []
+        for layer, values in zip(medium.layers, recorded, strict=True):
+            own, similar = replace(setting, g=layer.g), layer.similar
+            law = ForwardHalfSpace(own, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
+            tops.append(LayerLaw(own, law, similar.alpha, similar.mfp))
+        return tops
+    tops = stacks.isotropic_tops(medium, setting)
+    today = tops[0].law.constants()
     for constants in recorded:
         same = constants.keys() == today.keys()
         if not (same and np.allclose([constants[name] for name in today], list(today.values()), rtol=EQUAL)):
             raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
-    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+    return tops
 
 
 def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequence[LayerLaw]) -> StackLaw:

@@ -27,31 +27,40 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL.ImageFile import ImageFile
 from PIL.PngImagePlugin import PngImageFile
 from PIL.TiffImagePlugin import BITSPERSAMPLE, PHOTOMETRIC_INTERPRETATION, SAMPLEFORMAT, TiffImageFile
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    PrivateAttr,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 
 from mcml_sim import Layer, Medium
 from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.checks import is_number
 from profilefit.errors import InputError
-from profilefit.materials import BY_NAME, SOURCE
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.materials import BY_NAME, SOURCE, Material
+from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
 
 Floats = NDArray[np.float32]
 Three = tuple[float, float, float]
 Refusal = Callable[..., InputError]
-LAYER_KEYS = ("name", "material", "n", "mu_a", "mu_s", "g", "thickness", "source")
 BY_MATERIAL = ("mu_a", "mu_s", "g")  # what a material says
 UNIT = "mm"  # of the materials, and of a file that names none
 MOST_LAYERS = 20  # as many as the exact light of a stack has
-LONGEST_LINE = 300  # characters of a source and of an image's path
 LARGEST_SIDE = 4096  # of an image [pixels]
 LARGEST_FILE = 64  # of an image [MiB]
 IMAGE = f"a grey PNG or TIFF of at most {LARGEST_SIDE} x {LARGEST_SIDE} pixels"
@@ -131,20 +140,126 @@ class LayerStack:
         return told
 
 
-class _LayerTable(NamedTuple):
-    """One [[layers]] of a file, as read.
+def _three(value: Any) -> Any:
+    return [value] * 3 if is_number(value) else value
 
-    Attributes:
-        colours: the layer in red, green and blue.
-        name: name of the layer, "" for none.
-        source: source of the numbers, in words.
-        map: image of the thickness, or None.
-    """
 
-    colours: tuple[Layer, ...]
-    name: str
-    source: str
-    map: ThicknessMap | None
+COLOURS = "a coefficient >= 0, or three of red, green and blue"
+ONE: Table = {"type": "number", "minimum": 0}
+THREE: Table = {"type": "array", "items": ONE, "minItems": 3, "maxItems": 3}
+OF_COLOURS = WithJsonSchema({"accepted": COLOURS, "anyOf": [ONE, THREE]})
+Coefficient = Annotated[float, Field(ge=0.0)]
+Colours = Annotated[tuple[Coefficient, Coefficient, Coefficient], LISTED, BeforeValidator(_three), OF_COLOURS]
+
+
+class ImageTable(Declared):
+    """Thickness by an image, looked for beside the file: `range` holds where the value is 0 and where it is 1."""
+
+    range: Annotated[Range, LISTED, words("two numbers >= 0, the smaller first")]
+    image: Annotated[Line, words(IMAGE)]
+    _map: ThicknessMap = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _read(self, info: ValidationInfo) -> Self:
+        least, most = self.range
+        if not 0.0 <= least < most:
+            raise Refused("two numbers >= 0, the smaller first", [least, most], "range")
+        self._map = ThicknessMap(_values(Path(str(info.context)).parent, self.image), least, most)
+        return self
+
+
+class LayerTable(Declared):
+    """Table [[layers]]: a layer in red, green and blue, its coefficients given or those of a material."""
+
+    name: Text | None = None
+    material: Annotated[str, OneOf(*BY_NAME)] | None = None
+    n: float
+    mu_a: Colours | None = None
+    mu_s: Colours | None = None
+    g: float | None = None
+    thickness: Annotated[
+        Annotated[Annotated[float, Field(gt=0.0, allow_inf_nan=True)], Tag("[number]")]
+        | Annotated[ImageTable, Tag("[image]")],
+        Discriminator(lambda value: "[image]" if isinstance(value, dict) else "[number]"),
+    ] = math.inf
+    source: Line | None = None
+    _colours: tuple[Layer, ...] = PrivateAttr()
+
+    @property
+    def map(self) -> ThicknessMap | None:
+        """Image of the thickness."""
+        return self.thickness._map if isinstance(self.thickness, ImageTable) else None
+
+    @property
+    def published(self) -> Material | None:
+        """Published material, whose scattering is the reduced one."""
+        return None if self.material is None else BY_NAME[self.material]
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        given = [key for key in BY_MATERIAL if getattr(self, key) is not None]
+        if self.material is None:
+            for key in BY_MATERIAL:
+                if key not in given:
+                    raise Refused("a finite number" if key == "g" else COLOURS, None, key)
+        elif given:
+            raise Refused(f"left out where {', '.join(given)} are given", self.material, "material")
+        known = self.published
+        mu_a, mu_s = (self.mu_a, self.mu_s) if known is None else (known.absorption, known.scattering)
+        assert mu_a is not None
+        assert mu_s is not None
+        d = self.thickness._map.mean if isinstance(self.thickness, ImageTable) else self.thickness
+        self._colours = tuple(Layer(self.n, a, s, self.g or 0.0, d) for a, s in zip(mu_a, mu_s, strict=True))
+        return self
+
+
+def _few(content: Any) -> Any:
+    """Return tables [[layers]] before they are looked at; Refused where they are none, too many, or of several maps."""
+    if isinstance(content, list) and len(content) > MOST_LAYERS:
+        raise Refused(f"at most {MOST_LAYERS}", len(content))
+    if not isinstance(content, list) or not content or not all(isinstance(layer, dict) for layer in content):
+        raise Refused("tables [[layers]]", content)
+    for number, layer in enumerate(content):
+        if number > 0 and isinstance(layer.get("thickness"), dict):
+            raise Refused("a number > 0 below the first layer", layer["thickness"], number, "thickness")
+    return content
+
+
+def _media(layers: tuple[LayerTable, ...]) -> tuple[Medium, Medium, Medium]:
+    red, green, blue = (Medium(colour) for colour in zip(*(layer._colours for layer in layers), strict=True))
+    return red, green, blue
+
+
+def _stacked(layers: tuple[LayerTable, ...]) -> tuple[LayerTable, ...]:
+    _media(layers)
+    return layers
+
+
+class Layered(Declared):
+    """File with tables [[layers]], from the surface down, and the unit of its lengths."""
+
+    unit: Text = UNIT
+    layers: Annotated[tuple[LayerTable, ...], LISTED, BeforeValidator(_few), AfterValidator(_stacked)]
+
+    @model_validator(mode="after")
+    def _in_millimetres(self) -> Self:
+        for number, layer in enumerate(self.layers):
+            if layer.material is not None and self.unit != UNIT:
+                accepted = f'left out unless unit = "{UNIT}", that of its coefficients'
+                raise Refused(accepted, layer.material, "layers", number, "material")
+        return self
+
+    @cached_property
+    def stack(self) -> LayerStack:
+        """Layers in red, green and blue."""
+        known = [(layer.name, layer.source, layer.published) for layer in self.layers]
+        return LayerStack(
+            self.unit,
+            _media(self.layers),
+            tuple(name if name is not None else of.name if of else "" for name, _, of in known),
+            tuple(source if source is not None else SOURCE if of else "" for _, source, of in known),
+            self.layers[0].map,
+        )
 
 
 def read_layers(file: Path | str, content: Table) -> LayerStack:
@@ -152,116 +267,16 @@ def read_layers(file: Path | str, content: Table) -> LayerStack:
 
     InputError in one line that names file, table and key, what was got and what is accepted.
     """
-    tables = Tables(str(file), {})
-    if "layers" not in content:
-        raise InputError(f"{file}: table [[layers]] is missing")
-    return stack_of(tables, content["layers"], tables.text("", "unit", content, UNIT))
+    return Layered.of(str(file), {key: content[key] for key in ("unit", "layers") if key in content}).stack
 
 
-def stack_of(tables: Tables, content: Any, unit: str = UNIT) -> LayerStack:
-    """Return the stack of a list of tables [[layers]] in the file that `tables` names, with lengths in `unit`.
-
-    An image is looked for beside that file. InputError as for `read_layers`.
-    """
-    if not isinstance(content, list):
-        raise tables.bad("", "layers", "tables [[layers]]", content)
-    if len(content) > MOST_LAYERS:
-        raise tables.bad("", "layers", f"at most {MOST_LAYERS}", len(content))
-    if not content or not all(isinstance(layer, dict) for layer in content):
-        raise tables.bad("", "layers", "tables [[layers]]", content)
-    rows = [_layer(tables, number, layer, unit) for number, layer in enumerate(content, start=1)]
-    red, green, blue = (
-        tables.build("layers", partial(Medium, colour)) for colour in zip(*(row.colours for row in rows), strict=True)
-    )
-    return LayerStack(
-        unit, (red, green, blue), tuple(row.name for row in rows), tuple(row.source for row in rows), rows[0].map
-    )
-
-
-def _layer(tables: Tables, number: int, table: Table, unit: str) -> _LayerTable:
-    where = f"layers {number}"
-    tables.known(where, table, LAYER_KEYS)
-    n = _number(tables, where, "n", table)
-    if "material" in table:
-        name, source, mu_a, mu_s, g = _of_material(tables, where, table, unit)
-    else:
-        name, source = "", ""
-        mu_a, mu_s = (_colours(tables, where, key, table) for key in ("mu_a", "mu_s"))
-        g = _number(tables, where, "g", table)
-    thickness, image = table.get("thickness"), None
-    if isinstance(thickness, dict):
-        if number > 1:
-            raise tables.bad(where, "thickness", "a number > 0 below the first layer", thickness)
-        image = _map(tables, where, thickness)
-        d = image.mean
-    else:
-        d = tables.number(where, "thickness", table, math.inf)
-    layers = tuple(tables.build(where, partial(Layer, n, a, s, g, d)) for a, s in zip(mu_a, mu_s, strict=True))
-    return _LayerTable(
-        layers,
-        tables.text(where, "name", table, name),
-        _line(tables, where, "source", table.get("source", source)),
-        image,
-    )
-
-
-def _number(tables: Tables, where: str, key: str, table: Table) -> float:
-    """Return a number; `Layer` checks whether such a layer can exist."""
-    value = table.get(key)
-    if not is_number(value):
-        raise tables.bad(where, key, "a number", value)
-    return float(value)
-
-
-def _colours(tables: Tables, where: str, key: str, table: Table) -> Three:
-    """Return a coefficient of red, green and blue [1/unit]."""
-    value = table.get(key)
-    if value is None:
-        raise tables.bad(where, key, "a number", value)
-    numbers = value if isinstance(value, list) else [value] * 3
-    if len(numbers) != 3 or not all(is_number(one) and 0 <= one < math.inf for one in numbers):
-        raise tables.bad(where, key, "a coefficient >= 0, or three of red, green and blue", value)
-    red, green, blue = map(float, numbers)
-    return red, green, blue
-
-
-def _of_material(tables: Tables, where: str, table: Table, unit: str) -> tuple[str, str, Three, Three, float]:
-    """Name, source, mu_a, mu_s [1/mm] and g of a published material: its scattering is the reduced one."""
-    if given := [key for key in BY_MATERIAL if key in table]:
-        raise tables.bad(where, "material", f"left out where {', '.join(given)} are given", table["material"])
-    if unit != UNIT:
-        accepted = f'left out unless unit = "{UNIT}", that of its coefficients'
-        raise tables.bad(where, "material", accepted, table["material"])
-    known = BY_NAME[tables.text(where, "material", table, accepted=tuple(BY_NAME))]
-    return known.name, SOURCE, known.absorption, known.scattering, 0.0
-
-
-def _line(tables: Tables, where: str, key: str, value: object) -> str:
-    """Return the value if it is a text of one printable line."""
-    if not isinstance(value, str) or not value.isprintable() or len(value) > LONGEST_LINE:
-        raise tables.bad(where, key, f"a text of {LONGEST_LINE} characters at most", value)
-    return value
-
-
-def _map(tables: Tables, where: str, table: Table) -> ThicknessMap:
-    tables.known(f"{where}.thickness", table, ("image", "range"))
-    ends = table.get("range")
-    numbers = isinstance(ends, list) and len(ends) == 2 and all(is_number(end) for end in ends)
-    least, most = map(float, ends) if numbers and ends else (0.0, 0.0)
-    if not 0 <= least < most < math.inf:
-        raise tables.bad(where, "thickness.range", "two numbers >= 0, the smaller first", ends)
-    if "image" not in table:
-        raise tables.bad(where, "thickness.image", IMAGE, None)
-    return ThicknessMap(_values(tables, where, _line(tables, where, "thickness.image", table["image"])), least, most)
-
-
-def _values(tables: Tables, where: str, name: str) -> Floats:
+def _values(folder: Path, name: str) -> Floats:
     """Return an image's values over their full scale; floating-point values are returned as they are."""
 
     def refused(got: str, accepted: str = IMAGE) -> InputError:
-        return InputError(f"{tables.file}: [{where}] thickness.image must be {accepted}, got {name}{got}")
+        return InputError(f"image must be {accepted}, got {name}{got}")
 
-    content = _bytes(tables, where, Path(tables.file).parent / name, refused)
+    content = _bytes(folder / name, refused)
     kind = next((kind for magic, kind in KINDS if content.startswith(magic)), None)
     if kind is None:
         raise refused(", which is neither")
@@ -287,7 +302,7 @@ def _values(tables: Tables, where: str, name: str) -> Floats:
     return values
 
 
-def _bytes(tables: Tables, where: str, path: Path, refused: Refusal) -> bytes:
+def _bytes(path: Path, refused: Refusal) -> bytes:
     """Read all of a regular file: a pipe would be waited for, and a device has no end."""
     try:
         status = path.stat()
@@ -297,7 +312,7 @@ def _bytes(tables: Tables, where: str, path: Path, refused: Refusal) -> bytes:
         raise refused(", which is no regular file")
     if not 0 < status.st_size <= LARGEST_FILE * 2**20:  # of no bytes are the files of /proc, some of which never end
         raise refused(f" of {status.st_size} bytes", f"a file of at most {LARGEST_FILE} MiB")
-    return tables.build(where, lambda: read_whole(path, LARGEST_FILE * 2**20))
+    return read_whole(path, LARGEST_FILE * 2**20)
 
 
 def _is_grey(image: ImageFile) -> bool:

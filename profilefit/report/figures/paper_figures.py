@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from profilefit.fitting import derived
+from profilefit.fitting import discrepancy
 from profilefit.fitting.staged import COEFFICIENTS, CONSTANTS_OF
 from profilefit.recipes import catalogue
 from profilefit.recipes.pipelines import inversion_error
@@ -146,9 +146,9 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) ->
     r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
     for one in laws.values():
         if one.fitted is not None:  # and states in which band the exact profile lies, which old records do not
-            known = derived.LawWithErrors.of_record(one.law, one.fitted.content, one.fitted.arrays)
+            known = discrepancy.LawWithErrors.of_record(one.law, one.fitted.content, one.fitted.arrays)
             if known.discrepancy is not None:
-                low, high = derived.profile(known, r, alpha).interval()
+                low, high = discrepancy.profile(known, r, alpha).interval()
                 band_under(ax, r, (low / truth - 1.0, high / truth - 1.0), one.style["color"], TRUTH_BAND)
         ax.plot(r, one.law.profile(r, alpha) / truth - 1.0, label=one.label, **one.style)
     edges = data.arrays["r_edges"]

@@ -13,13 +13,10 @@ from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.shader.check import half
 from profilefit.shader.check.chosen import REGENERATED, checked, chosen
 from profilefit.shader.check.dense_grid import ShaderCheck
-from profilefit.shader.check.half import HalfCheck
-from profilefit.shader.check.law_check import JUDGED, OWN, LawCheck
+from profilefit.shader.check.law_check import HALVES, JUDGED, OWN, HalfCheck, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
-from profilefit.shader.check.map_check import MapCheck
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
@@ -86,7 +83,7 @@ def _cost_rows(costs: Mapping[str, Cost]) -> list[tuple[str, ...]]:
 def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
     """Return a line a law, a column for each thing that is stored in float16."""
     columns = {"law": [_at_index(one.of) for one in checks]}
-    for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
+    for name in HALVES:
         if any(name in one.rel for one in checks):
             columns[name] = [
                 f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT

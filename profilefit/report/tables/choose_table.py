@@ -13,15 +13,11 @@ from profilefit.report.tables.cells import column_table, on_the_point, significa
 from profilefit.studies.choose.case import is_filter
 from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
 from profilefit.studies.choose.cost import Ratios
-from profilefit.studies.choose.error import CHANNELS
+from profilefit.studies.choose.error import CHANNELS, ReferenceLight, passes
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import reference_light
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
-    from profilefit.studies.choose.atlas import AtlasNeed
-    from profilefit.studies.choose.fur import FurNeed
-    from profilefit.studies.choose.sea import SeaNeed
+    from profilefit.studies.choose.scenes import AtlasNeed, FurNeed, SeaNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {"model": "its shape", "curvature": "the curved surface", "pixel": "large pixels", "noise": "noise"}
@@ -148,7 +144,7 @@ def headline(choice: Choice) -> str:
 def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> dict[str, Any]:
     """Return a choice and all options as data, with the constants that a shader needs, and layers of every colour."""
     scene, option = choice.scene, choice.nearest.option
-    filters = passes(option, middle(scene), reference_light(scene.setting)) if is_filter(option) else ()
+    filters = passes(option, middle(scene), ReferenceLight(scene.setting)) if is_filter(option) else ()
     made: dict[str, Any] = {
         "tolerance": scene.tolerance,
         "budget_ms": scene.budget.ms,

@@ -14,8 +14,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.identifiability import LOOSE, REFERENCE_ERROR, REPEATS, Candidate, relative_errors
-from profilefit.measured.model import QUANTITIES, correlation, unit_of
-from profilefit.measured.oblique import NEAR
+from profilefit.measured.model import NEAR, QUANTITIES, correlation, unit_of
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
 from profilefit.recipes import record
 from profilefit.report.tables.cells import (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from profilefit.fitting.measures import MEASURES, OF_MAP
-from profilefit.recipes.paper.reproduction import LENGTH, PUBLISHED
+from profilefit.recipes.reproduction import LENGTH, PUBLISHED
 from profilefit.report.records import (
     Content,
     at_index,

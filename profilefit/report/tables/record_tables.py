@@ -17,10 +17,10 @@ from rich.text import Text
 
 from mcml_sim.media.setting import Setting
 from profilefit.recipes import record
-from profilefit.recipes.paper.table1 import NORMALIZED_DIFFUSION
+from profilefit.recipes.checks import SAME_COST
 from profilefit.recipes.record import SPANS
+from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
     SETS,
     TOTAL,

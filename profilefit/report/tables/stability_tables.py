@@ -14,9 +14,8 @@ from rich.text import Text
 
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.studies.stability.atlas import Findings
-from profilefit.studies.stability.cells import Cells, Verdict, cell_count
+from profilefit.studies.stability.cells import Cells, Region, Verdict
 from profilefit.studies.stability.fit_cases import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
-from profilefit.studies.stability.regions import Region
 
 # Columns of the CSV, and what of a region they hold.
 COLUMNS = {
@@ -61,7 +60,7 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
         "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
         "what helps": [advice or BARE for (_, advice), _ in rows],
     }
-    total = cell_count([one for part in parts for one in part.cells])
+    total = sum(one.codes.size for part in parts for one in part.cells)
     caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
     return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
 

@@ -9,7 +9,6 @@ r0 (1 - t^p) at the height t L, t = i / N, i = 0 ... N - 1 (Fang et al., Modern 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,15 +17,11 @@ from scipy.special import gammaln
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
-from profilefit.fitting.solver import differences, solve
+from profilefit.shader import emit
+from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
 Floats = NDArray[np.float64]
 MOST_LAYERS = 4096
-SLENDER = (10.0, 20.0, 50.0)  # L / r0
-PER_DECADE = 8  # x = N r0 / L, even in its logarithm
-ANGLES = np.radians(np.arange(2.0, 80.0, 4.0))  # middles of equal parts of 0 to 80 degrees
-FIRST, LARGEST = 2.0, 8.0
-STEP, TOLERANCE = 1e-5, 1e-6  # of an exponent, for derivatives; of its search
 NODES = 48  # of quadratures over directions
 LEAST_X, MOST_X = 0.64, 6.4  # N r0 / L for which an exponent is fitted
 
@@ -35,7 +30,7 @@ class Exponent(NamedTuple):
     """Exponent that is best for N layers: p = 1 + size x^power, x = N r0 / L.
 
     By the least mean square of ln(shadow of the shells / shadow of the cone), weighed by sin cos of the angle, 0 to 80
-    degrees; L / r0 of 10, 20 and 50 (`fitted`), which differ by their errors.
+    degrees; L / r0 of 10, 20 and 50, which differ by their errors (`benchmarks.fur_exponent`).
     """
 
     size: float
@@ -44,24 +39,6 @@ class Exponent(NamedTuple):
 
 FITTED = Exponent(size=1.162, power=-1.803)
 FITTED_ERRORS = Exponent(size=0.057, power=0.020)
-
-
-class Feet(NamedTuple):
-    """Feet that are not independent: what is seen is exp(-kappa n (1 - z / L)^2 A), kappa = (1 + size q^power)^sign.
-
-    q = r0 sqrt(n) (1 - z / L), the strands' radius at their height over their distance. Fitted to rays, 30 to 75
-    degrees, r0 sqrt(n) 0.2 to 0.6 (`python -m benchmarks.fur --only feet-laws`); seen head on kappa is nearer 1.
-    """
-
-    size: float
-    power: float
-    sign: int
-    size_error: float
-    power_error: float
-
-
-# Feet that are at least sqrt(0.5 / n) apart; and tufts of 8 over discs of half the tufts' mean distance.
-FEET = {"apart": Feet(2.06, 1.49, 1, 0.12, 0.04), "tufts": Feet(2.16, 1.23, -1, 0.20, 0.07)}
 
 
 def shadow(radius: ArrayLike, length: ArrayLike, theta: ArrayLike, lean: tuple[float, float] = (0.0, 0.0)) -> Any:
@@ -104,39 +81,6 @@ def visibility(
     if not np.all(height <= tall):
         raise InputError(f"z must be at most the length, {shown(length)}, got {shown(z)}")
     return np.exp(-count * (1.0 - height / tall) ** 2 * area)[()]
-
-
-def feet_factor(feet: str, thick: ArrayLike) -> Any:
-    """Return kappa [-] of `Feet`, by which the density in `visibility` is multiplied.
-
-    feet  "apart" or "tufts";  thick  r0 sqrt(n) (1 - z / L) in [0, 1]
-    """
-    if feet not in FEET:
-        raise InputError(f"feet must be one of {', '.join(FEET)}, got {shown(feet)}")
-    q = checked_numbers("thick", thick, "a number in [0, 1]")
-    if not np.all((q >= 0) & (q <= 1)):
-        raise InputError(f"thick must be a number in [0, 1], got {shown(thick)}")
-    of = FEET[feet]
-    return ((1.0 + of.size * q**of.power) ** of.sign)[()]
-
-
-def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: float = 0.0) -> float:
-    """Return the area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
-
-    eye, lamp  angles to the normal in [0, pi / 2);  turn  between them about the normal in [0, pi] [rad]
-
-    r0^2 (pi + tan a - a), a = max(0, min(a1, a2, (a1 + a2 - turn) / 2)), cos a_i = r0 / d_i: both are a disc and a
-    spike, which shrinks as secants of the angle about the disc's middle. Turned by 0 the shorter is within the longer.
-    What an eye sees is lit by exp(-n (1 - z / L)^2 (A(lamp) - shared)), more than `visibility` says: the hot spot.
-    """
-    if not (is_number(turn) and 0 <= turn <= np.pi):
-        raise InputError(f"turn must be an angle in [0, pi] radians, got {shown(turn)}")
-    ends = []
-    for at in (eye, lamp):
-        root, tall, angle = (float(one) for one in _checked(radius=radius, length=length, theta=at))
-        ends.append(float(np.arccos(min(root / max(tall * np.tan(angle), root), 1.0))))
-    a = max(min(*ends, 0.5 * (sum(ends) - turn)), 0.0)
-    return float(radius**2 * (np.pi + np.tan(a) - a))
 
 
 def shell_shadow(
@@ -189,42 +133,6 @@ def lobe_mean(exponent: ArrayLike) -> Any:
     return (0.5 * np.sqrt(np.pi) * np.exp(gammaln(0.5 * p + 1.0) - gammaln(0.5 * p + 1.5)))[()]
 
 
-def misfit(layers: int, exponent: float, slender: float) -> float:
-    """Return the mean square of ln(shadow of shells / shadow of the cone), weighed by sin cos, over 0 to 80 degrees."""
-    return float(np.sum(_residual(layers, exponent, slender) ** 2))
-
-
-def best_of(layers: int, slender: float) -> float:
-    """Return the exponent of the least misfit."""
-    at = differences(lambda p: _residual(layers, float(p[0]), slender), STEP, LARGEST)
-    return float(solve(at, np.array([FIRST]), (1.0, LARGEST), tolerance=TOLERANCE).parameters[0])
-
-
-def _residual(layers: int, exponent: float, slender: float) -> Floats:
-    """Return ln(shadow of the shells / shadow of the cone) at each angle, times the root of its share of the weight."""
-    logs = np.log([shell_shadow(layers, exponent, 1.0 / slender, 1.0, float(angle)) for angle in ANGLES])
-    weight = np.sin(ANGLES) * np.cos(ANGLES)
-    return logs * np.sqrt(weight / weight.sum())
-
-
-def fitted(slender: Sequence[float] = SLENDER) -> tuple[Exponent, Exponent]:
-    """Fit p = 1 + size x^power by least squares of ln(p - 1), and return the constants and their errors.
-
-    The errors are the standard deviations of constants fitted to one slenderness each: what the law leaves out.
-    """
-    each, rows = [], []
-    for one in slender:
-        count = int(PER_DECADE * np.log10(MOST_X / LEAST_X)) + 1
-        numbers = np.unique(np.ceil(one * np.geomspace(LEAST_X, MOST_X, count) - 1e-9).astype(int))
-        numbers = numbers[numbers <= MOST_X * one]
-        own = [(np.log(n / one), np.log(best_of(int(n), one) - 1.0)) for n in numbers]
-        rows += own
-        each.append(_line(own))
-    size, power = _line(rows)
-    spread = np.std(each, axis=0, ddof=1)
-    return Exponent(float(np.exp(size)), power), Exponent(float(np.exp(size) * spread[0]), float(spread[1]))
-
-
 def _union(middle: Floats, radius: Floats) -> float:
     """Return the area of discs whose middles (n,), rising, are on a line."""
     seen = radius > 0
@@ -271,7 +179,55 @@ def _checked(**values: ArrayLike) -> list[Floats]:
     return found
 
 
-def _line(rows: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    x, y = np.array(rows).T
-    power, size = np.polyfit(x, y, 1)
-    return float(size), float(power)
+# Shader source of these closed forms, and of where a ray comes into a cone.
+FUR = "fur"  # what names begin with
+OWN = "strand_"  # in the GLSL beside
+TITLE = "random cones of fur: what they hide, their discs on shells, and where a ray comes into one"
+NAMES = (
+    ("shadow(radius, aside)", "area A that one hides of the skin [length^2]"),
+    ("shared(radius, first, second, turn)", "area that one hides from an eye and from a lamp at once [length^2]"),
+    ("visibility(density, shadow, z)", "chance that a ray meets none above z [-]"),
+    ("slice(t, exponent)", "radius of its disc on a shell at t, over that of the root [-]"),
+    ("swept(qx, qy, mx, my, r, k)", "how far along a ray it comes into one [length], 1e8 if it does not"),
+)
+NOTE = (
+    "any length unit, the same for all; radius > 0 is that of the root",
+    "aside >= 0 is how far from the root the tip is seen [length]: length tan(theta) of an upright cone, of one that",
+    "leans |length (tan(theta) v - lean)|, v the direction of the view along the skin",
+    "first and second are such asides, of an eye and of a lamp, turn the angle between them, 0 to pi [rad]: what the",
+    "eye sees is lit by the visibility of a lamp's shadow less what both share",
+    "density of strands [1/length^2]; z and t heights over the length, 0 at the skin, 1 at the tip; exponent > 0",
+    "q is where the ray is across a cone's axis, r the cone's radius at that height [length], m and k what they change",
+    "a length of ray [-]",
+    "roots before the ray's begin or beyond the cone's ends are found too: leave them out",
+)
+EQUATIONS = (
+    "A = r0^2 (pi + u - atan u), u = sqrt(max(d^2 - r0^2, 0)) / r0, d aside",
+    "shared = r0^2 (pi + v - atan v), v = min(u1, u2, max(0, 1 / tan((b1 + b2 + turn) / 2))), tan b = 1 / u",
+    "visibility = exp(-density A (1 - z)^2), slice = 1 - t^exponent",
+    "swept = the first s of |q + m s| = r + k s where that is >= 0",
+)
+
+
+def strand_text(lang: str = "glsl", name: str = FUR) -> str:
+    """Return the five functions of floats of `NAMES`, ready to include; any length unit, the same for all.
+
+    lang, name  as for `emit.law_text`;  `swept` is finite, 1e8 where there is no root
+    InputError on another language, and on a name that no language takes.
+    """
+    own = emit.text_beside(__name__, "glsl/strand.glsl").replace(OWN, emit.PLACEHOLDER)
+    return emit.filled([emit.read_text("common"), own], name, {}, 0, lang, {})
+
+
+def source(subject: str, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of cones in one of `law_file.LANGUAGES`, under a head of its functions and units.
+
+    subject  "fur";  lang, name  and errors as of `strand_text`; InputError on a name for JSON, which has no functions.
+    """
+    require_language(lang, name)
+    if lang == "json":
+        content: dict[str, Any] = {"law": FUR, "title": TITLE, "functions": dict(NAMES)}
+        return json_file({**content, "equations": "; ".join(EQUATIONS), "note": " ".join(NOTE)})
+    start = name or FUR
+    head = [TITLE, *function_lines(start, NAMES), "", *EQUATIONS, "", *NOTE]
+    return text_file(head, lang, strand_text(TRANSLATED.get(lang, lang), start))

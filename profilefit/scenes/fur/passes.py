@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.checks import checked_whole
-from profilefit.errors import InputError
 from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.truth import Patch
@@ -134,8 +133,6 @@ def strand_text(*more: str) -> str:
 
 def nearest_ways(patch: Patch, texels: int) -> list[Singles]:
     """Return maps (texels, texels, 4) of the ways from a texel's middle to the nearest foot, and to the next."""
-    if len(patch.leans) > 1:
-        raise InputError(f"lean must be one of all strands where they are drawn, got {len(patch.leans)}")
     middle = (np.arange(texels) + 0.5) / texels * patch.side
     places = np.stack(np.meshgrid(middle, middle), axis=-1)
     feet = np.mod(patch.feet, patch.side)

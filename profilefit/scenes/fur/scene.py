@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from mcml_sim.media.checks import is_number
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, Tolerance, words
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import EXPONENTS, HITS, RIM, SHIFTS, STRENGTHS, Coat, FurSurface, Shading
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
-from profilefit.scenes.stage import request
 from profilefit.scenes.stage.judge import TURNS, Judge
 from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import Defaults, Viewpoint, ViewRequest
-from profilefit.scenes.stage.world import Rgb
+from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance, Samples, TechniqueTable, Viewpoint, ViewRequest
 
 Floats = NDArray[np.float64]
-TABLES = {
-    "": ("title", "scene", "unit", "fur", "shading", *request.TABLES),
-    "fur": ("density", "radius", "length", "force", "ball", "colour", "skin", "seed"),
-    "shading": ("exponents", "shifts", "strengths", "normalised", "rim"),
-    **request.TABLES,
-    "technique": ("kind", "strands", "exponent", "tolerance", "supersampling", *request.TABLES["technique"]),
-}
-DENSITY, RADIUS, LENGTH, BALL = 0.64, 0.5, 10.0, 30.0
-FORCE, COLOUR, SKIN, SEED = (0.0, -0.4, 0.0), (0.55, 0.38, 0.22), (0.35, 0.22, 0.16), 1
 KINDS = ("swept", "shells")
-TOLERANCE = 0.05
-STRANDS = 2
-SUPERSAMPLING = 4
-VIEW, DEFAULTS = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0), Defaults(samples=22)
+VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
 LARGEST = 150.0  # of the ball, and of strands [mm]
 SLENDEREST = 140.0  # the ball's radius over a strand's: what a map of them resolves
 MOST_STRANDS = 1 << 16
@@ -45,129 +30,135 @@ MOST_FORCE = 0.9
 WHITE = 0.99  # of the ball's pixels, the brightest of which becomes white
 
 
-@dataclass(frozen=True)
-class FurRequest(ViewRequest):
-    """Picture of a furred ball that a file requests; its samples are layers.
+Length = Annotated[float, Field(gt=0.0, le=LARGEST)]
+Force = Annotated[float, Field(ge=-MOST_FORCE, le=MOST_FORCE)]
+Exponent = Annotated[float, Field(ge=0.0, le=1e4)]
+Shift = Annotated[float, Field(ge=-1.0, le=1.0)]
+Rim = Annotated[float, Field(ge=0.0, le=100.0)]
 
-    density        strands of the skin [1/mm^2];  radius, length  of a strand [mm], along the skin's normal
-    force          of the tips, by the length [-];  ball  its radius [mm];  colour, skin  reflectances
-    way            of drawing;  tolerance  of `choose`: rms error of the heights of hits over the length [-]
-    supersampling  rays of a pixel along a side, averaged
+
+def pair(least: float, most: float) -> Any:
+    """Return an annotation of two numbers, of the first lobe and the other."""
+    return words(f"two numbers in {least:g} ... {most:g}, of the first lobe and the other")
+
+
+class FurTable(Declared):
+    """Table [fur]: strands of a ball's skin.
+
+    density  of strands [1/mm^2];  radius, length  of a strand [mm], along the skin's normal
+    force    of the tips, by the length [-];  ball  its radius [mm];  colour, skin  reflectances
     """
 
-    density: float
-    radius: float
-    length: float
-    force: Rgb
-    ball: float
-    colour: Rgb
-    skin: Rgb
-    seed: int
-    way: LayerTechnique
-    tolerance: float
-    shading: Shading
-    supersampling: int
+    density: Annotated[float, Field(gt=0.0)] = 0.64
+    radius: Length = 0.5
+    length: Length = 10.0
+    force: Annotated[tuple[Force, Force, Force], LISTED] = (0.0, -0.4, 0.0)
+    ball: Length = 30.0
+    colour: Shares = (0.55, 0.38, 0.22)
+    skin: Shares = (0.35, 0.22, 0.16)
+    seed: Seed = 1
 
     @property
     def count(self) -> int:
         """Number of strands."""
         return max(round(self.density * 4.0 * np.pi * self.ball**2), 1)
 
+    @property
+    def reach(self) -> float:
+        """Distance from the ball's middle that no tip is beyond [mm]."""
+        return self.ball + self.length * (1.0 + float(np.linalg.norm(self.force)))
 
-def read(file: str, content: Table) -> FurRequest:
-    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    for key in ("title", "unit"):
-        tables.text("", key, content, "mm")
-    fur, named, shaded = (tables.table(content, name, {}) for name in ("fur", "technique", "shading"))
-    found = FurRequest(
-        **request.view(tables, content, VIEW.camera, DEFAULTS),
-        density=tables.number("fur", "density", fur, DENSITY),
-        radius=tables.number("fur", "radius", fur, RADIUS, LARGEST),
-        length=tables.number("fur", "length", fur, LENGTH, LARGEST),
-        force=tables.three("fur", "force", fur, FORCE, -MOST_FORCE, MOST_FORCE),
-        ball=tables.number("fur", "ball", fur, BALL, LARGEST),
-        colour=tables.three("fur", "colour", fur, COLOUR, 0.0, 1.0),
-        skin=tables.three("fur", "skin", fur, SKIN, 0.0, 1.0),
-        seed=tables.whole("fur", "seed", fur, SEED, 0, 2**31),
-        way=_way(tables, named),
-        tolerance=tables.number("technique", "tolerance", named, TOLERANCE, 1.0),
-        shading=_shading(tables, shaded),
-        supersampling=tables.whole("technique", "supersampling", named, SUPERSAMPLING, 1, 8),
-    )
-    _require_fur(tables, found)
-    return found
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        spacing, area = self.density**-0.5, 4.0 * np.pi * self.ball**2
+        if self.radius > spacing:
+            accepted = f"at most the strands' mean distance, 1 / sqrt(density) = {spacing:.4g} mm"
+            raise Refused(accepted, self.radius, "radius")
+        if self.ball > SLENDEREST * self.radius:
+            raise Refused(f"at most {SLENDEREST:g} times the strands' radius", self.ball, "ball")
+        if not self.density * area <= MOST_STRANDS:
+            most = f"{MOST_STRANDS} at most, {MOST_STRANDS / area:.4g}"
+            raise Refused(f"so many strands [1/mm^2] that the ball has {most}", self.density, "density")
+        if not np.linalg.norm(self.force) <= MOST_FORCE:
+            accepted = f"three numbers whose root of squares is {MOST_FORCE:g} at most"
+            raise Refused(accepted, list(self.force), "force")
+        return self
 
 
-def _way(tables: Tables, named: Table) -> LayerTechnique:
-    kind = tables.text("technique", "kind", named, KINDS[0], KINDS)
-    swept = kind == KINDS[0]
-    if (other := "exponent" if swept else "strands") in named:
-        raise tables.bad("technique", other, f"left out where kind is {kind}", named[other])
-    if swept:
-        return (SWEPT, SWEPT_TWO)[tables.whole("technique", "strands", named, STRANDS, 1, 2) - 1]
-    exponent: Any = named.get("exponent", FITTED.name)
-    if exponent == FITTED.name:
-        return FITTED
-    if not (is_number(exponent) and 0 < exponent <= 100):
-        raise tables.bad("technique", "exponent", f'a number > 0 and <= 100, or "{FITTED.name}"', exponent)
-    return LayerTechnique(f"shells, p = {exponent:g}", float(exponent))
+class ShadingTable(Declared):
+    """Table [shading]: two lobes of the strands, and the light of their rim."""
+
+    exponents: Annotated[tuple[Exponent, Exponent], LISTED, pair(0.0, 1e4)] = EXPONENTS
+    shifts: Annotated[tuple[Shift, Shift], LISTED, pair(-1.0, 1.0)] = SHIFTS
+    strengths: Annotated[tuple[Irradiance, Irradiance], LISTED, pair(0.0, MOST_LIGHT)] = STRENGTHS
+    normalised: bool = True
+    rim: Annotated[tuple[Rim, Rim, Rim], LISTED] = RIM
+
+    @property
+    def shading(self) -> Shading:
+        """Shading of these numbers."""
+        return Shading(self.exponents, self.shifts, self.strengths, self.normalised, self.rim)
 
 
-def _shading(tables: Tables, shaded: Table) -> Shading:
-    normalised = shaded.get("normalised", True)
-    if type(normalised) is not bool:
-        raise tables.bad("shading", "normalised", "true or false", normalised)
-    return Shading(
-        _two(tables, "exponents", shaded, EXPONENTS, 0.0, 1e4),
-        _two(tables, "shifts", shaded, SHIFTS, -1.0, 1.0),
-        _two(tables, "strengths", shaded, STRENGTHS, 0.0, request.MOST_LIGHT),
-        normalised,
-        tables.three("shading", "rim", shaded, RIM, 0.0, 100.0),
-    )
+class FurTechnique(TechniqueTable):
+    """Table [technique]; its samples are layers.
+
+    strands   of a swept layer that a ray is held against;  exponent  of the shells' opacity
+    tolerance  of `choose`: rms error of the heights of hits over the length [-]
+    supersampling  rays of a pixel along a side, averaged
+    """
+
+    kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
+    samples: Samples = 22
+    strands: Annotated[int, Field(ge=1, le=2)] = 2
+    exponent: Annotated[
+        Annotated[float, Field(gt=0.0, le=100.0)] | Literal["fitted"],
+        words(f'a number > 0 and <= 100, or "{FITTED.name}"'),
+    ] = "fitted"
+    tolerance: Tolerance = 0.05
+    supersampling: Annotated[int, Field(ge=1, le=8)] = 4
+
+    @property
+    def way(self) -> LayerTechnique:
+        """Technique of drawing layers."""
+        if self.kind == KINDS[0]:
+            return (SWEPT, SWEPT_TWO)[self.strands - 1]
+        if isinstance(self.exponent, str):
+            return FITTED
+        return LayerTechnique(f"shells, p = {self.exponent:g}", self.exponent)
+
+    @model_validator(mode="after")
+    def _of_kind(self) -> Self:
+        other = "exponent" if self.kind == KINDS[0] else "strands"
+        if other in self.model_fields_set:
+            raise Refused(f"left out where kind is {self.kind}", getattr(self, other), other)
+        return self
 
 
-def _two(
-    tables: Tables, key: str, table: Table, default: tuple[float, float], least: float, most: float
-) -> tuple[float, float]:
-    value: Any = table.get(key, list(default))
-    numbers = value if isinstance(value, list) else []
-    if len(numbers) != 2 or not all(is_number(one) and least <= one <= most for one in numbers):
-        raise tables.bad(
-            "shading", key, f"two numbers in {least:g} ... {most:g}, of the first lobe and the other", value
-        )
-    return float(numbers[0]), float(numbers[1])
+class FurRequest(ViewRequest):
+    """Picture of a furred ball that a file requests."""
+
+    scene: Annotated[str, OneOf("fur")] = "fur"
+    unit: Text = "mm"
+    fur: FurTable = FurTable()
+    shading_table: ShadingTable = Field(ShadingTable(), alias="shading")
+    technique: FurTechnique = FurTechnique()
+
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """Camera of a file that says nothing."""
+        return VIEW
+
+    @model_validator(mode="after")
+    def _outside(self) -> Self:
+        least = 1.1 * self.fur.reach
+        if np.linalg.norm(self.camera.eye) < least:
+            accepted = f"so long that the eye is {least:.4g} mm from the ball's middle"
+            raise Refused(accepted, self.camera.distance, "camera", "distance")
+        return self
 
 
-def _require_fur(tables: Tables, of: FurRequest) -> None:
-    spacing = of.density**-0.5
-    if of.radius > spacing:
-        accepted = f"at most the strands' mean distance, 1 / sqrt(density) = {spacing:.4g} mm"
-        raise tables.bad("fur", "radius", accepted, of.radius)
-    if of.ball > SLENDEREST * of.radius:
-        raise tables.bad("fur", "ball", f"at most {SLENDEREST:g} times the strands' radius", of.ball)
-    if not of.density * 4.0 * np.pi * of.ball**2 <= MOST_STRANDS:
-        most = MOST_STRANDS / (4.0 * np.pi * of.ball**2)
-        raise tables.bad(
-            "fur",
-            "density",
-            f"so many strands [1/mm^2] that the ball has {MOST_STRANDS} at most, {most:.4g}",
-            of.density,
-        )
-    if not np.linalg.norm(of.force) <= MOST_FORCE:
-        raise tables.bad(
-            "fur", "force", f"three numbers whose root of squares is {MOST_FORCE:g} at most", list(of.force)
-        )
-    reach = of.ball + of.length * (1.0 + float(np.linalg.norm(of.force)))
-    if np.linalg.norm(of.camera.eye) < 1.1 * reach:
-        raise tables.bad(
-            "camera",
-            "distance",
-            f"so long that the eye is {1.1 * reach:.4g} mm from the ball's middle",
-            of.camera.distance,
-        )
-    of.require_light()
+read = FurRequest.of
 
 
 class FurRender(NamedTuple):
@@ -194,7 +185,7 @@ class FurRender(NamedTuple):
     def picture(self, by: LayerTechnique, layers: int) -> Floats:
         """Return the radiance (h, w, 3) of pixels by a technique."""
         rays = self.renderer.image(*self._passes(by, layers))
-        return averaged(rays[..., :3].astype(float), self.request.supersampling)
+        return averaged(rays[..., :3].astype(float), self.request.technique.supersampling)
 
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
@@ -217,9 +208,10 @@ def averaged(fine: Floats, each: int) -> Floats:
 @contextmanager
 def reference_render(context: moderngl.Context, of: FurRequest) -> Iterator[FurRender]:
     """Open the passes and the reference image of a request."""
-    ball, each = random_ball(of.count, of.ball, of.radius, of.length, of.force, of.seed), of.supersampling
+    fur, each = of.fur, of.technique.supersampling
+    ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.force, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
-    shade = Coat(ball, of.density, of.colour, of.skin, of.light, of.ambient, of.shading).shade(view)
+    shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table.shading).shade(view)
     with Renderer(context, size) as renderer:
         hits = ball.cast(view, size)
         renderer.write(HITS, hits)
@@ -245,6 +237,6 @@ def _standard_error(fine: Floats, each: int, mask: NDArray[np.bool_]) -> TruthEr
 def draw(context: moderngl.Context, of: FurRequest) -> RenderResult:
     """Draw the picture beside its reference, with error and cost: half a minute."""
     with reference_render(context, of) as drawn:
-        chart, samples = drawn.points(of.way, of.numbers), of.sampling.samples
+        chart, samples = drawn.points(of.technique.way, of.numbers), of.sampling.samples
         frame = next(point.milliseconds for point in chart if point.samples == samples)
-        return drawn.judge.result(drawn.picture(of.way, samples), chart, samples, frame, of="the fur's light")
+        return drawn.judge.result(drawn.picture(of.technique.way, samples), chart, samples, frame, of="the fur's light")

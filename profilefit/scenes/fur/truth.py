@@ -6,7 +6,6 @@ toward -x; what it finds is the height of its first hit, 0 where it meets the sk
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,29 +24,14 @@ MOST_STRANDS = 1 << 20
 class Patch:
     """Equal cones, upright or leaning, feet (k, 2) within a square of this side, which repeats.
 
-    radius, length  of a strand;  lean  of the tip along x and y, by the length [-]: of all, or of each (k, 2)
+    radius, length  of a strand;  lean  of the tips along x and y, by the length [-]
     """
 
     feet: Floats
     side: float
     radius: float
     length: float
-    lean: tuple[float, float] | Floats = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        for name in ("side", "radius", "length"):
-            value = getattr(self, name)
-            if not (is_number(value) and 0 < value < np.inf):
-                raise InputError(f"{name} must be a finite length > 0, got {shown(value)}")
-        if self.feet.ndim != 2 or self.feet.shape[1] != 2 or not 1 <= len(self.feet) <= MOST_STRANDS:
-            raise InputError(f"feet must be 1 to {MOST_STRANDS} strands (k, 2), got shape {self.feet.shape}")
-        if self.leans.shape not in ((1, 2), self.feet.shape):
-            raise InputError(f"lean must be two numbers, or two of each strand, got shape {np.shape(self.lean)}")
-
-    @property
-    def leans(self) -> Floats:
-        """Lean of all strands (1, 2), or of each (k, 2)."""
-        return np.atleast_2d(np.asarray(self.lean, float))
+    lean: tuple[float, float] = (0.0, 0.0)
 
     @property
     def density(self) -> float:
@@ -86,7 +70,7 @@ def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[n
     A cone that is met is within its radius and half a step of one of the places along a ray that are tried, at most a
     root apart; what is met above the lower end of a step needs no further one.
     """
-    rate, trees = float(np.max(np.hypot(*_rate(patch, theta).T))), _trees(patch)
+    rate, tree = float(np.hypot(*_rate(patch, theta))), _tree(patch)
     steps = int(np.ceil(rate * patch.length / patch.radius)) + 1
     found, which = np.zeros(len(start)), np.full(len(start), -1)
     left = np.arange(len(start))
@@ -94,9 +78,8 @@ def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[n
         z, half = patch.length * (1.0 - (number + 0.5) / steps), 0.5 * patch.length / steps
         place = _at(patch, theta, start[left], z)
         widest = patch.radius * (1.0 - (z - half) / patch.length) + half * rate
-        near = cKDTree(place, boxsize=patch.side).sparse_distance_matrix(
-            trees(z), 1.0001 * widest, output_type="ndarray"
-        )
+        tried = cKDTree(place, boxsize=patch.side)
+        near = tried.sparse_distance_matrix(tree, 1.0001 * widest, output_type="ndarray")
         ray, strand = near["i"], near["j"]
         heights = _heights(patch, place[ray], strand, z, theta)
         order = np.argsort(heights)  # of those of one ray, the last to be written is the highest
@@ -111,13 +94,13 @@ def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[n
 def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: float) -> Floats:
     """Return those heights against discs on N shells of radius r0 (1 - t^p)."""
     count = checked_whole("layers", layers, 1, MOST_LAYERS)
-    trees, found = _trees(patch), np.zeros(len(start))
+    tree, found = _tree(patch), np.zeros(len(start))
     left = np.arange(len(start))
     for layer in reversed(range(count)):
         t = layer / count
         z = t * patch.length
         radius = patch.radius * (1.0 - t**exponent)
-        distance, _ = trees(z).query(_at(patch, theta, start[left], z), distance_upper_bound=radius)
+        distance, _ = tree.query(_at(patch, theta, start[left], z), distance_upper_bound=radius)
         hit = distance < radius
         found[left[hit]] = z
         left = left[~hit]
@@ -128,16 +111,14 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
     """Return those heights against the cone nearest to the middle of a ray in each of N slabs, from the top.
 
     tested  strands, the nearest ones;  a cone counts wherever the ray comes into it, within the slab or not
-
-    Where leans differ that does not tend to the cones: a ray along one strand meets it far below, and others before.
     """
     count, near = checked_whole("layers", layers, 1, MOST_LAYERS), checked_whole("tested", tested, 1, len(patch.feet))
-    trees, found = _trees(patch), np.zeros(len(start))
+    tree, found = _tree(patch), np.zeros(len(start))
     left = np.arange(len(start))
     for layer in reversed(range(count)):
         middle = (layer + 0.5) / count * patch.length
         place = _at(patch, theta, start[left], middle)
-        _, nearest = trees(middle).query(place, near)
+        _, nearest = tree.query(place, near)
         z = _heights(patch, np.repeat(place, near, axis=0), nearest.ravel(), middle, theta)
         best = z.reshape(len(left), near).max(axis=1)
         found[left] = best
@@ -145,17 +126,8 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
     return found
 
 
-def _trees(patch: Patch) -> Callable[[float], cKDTree]:
-    """Return a function from height to a tree of the strands' axes, less how far the first one has moved: `_at`'s."""
-    apart = patch.leans - patch.leans[0]
-
-    def at(z: float) -> cKDTree:
-        return cKDTree(_wrapped(patch, patch.feet + apart * z), boxsize=patch.side)
-
-    if np.any(apart):
-        return at
-    same = at(0.0)
-    return lambda z: same
+def _tree(patch: Patch) -> cKDTree:
+    return cKDTree(_wrapped(patch, patch.feet), boxsize=patch.side)
 
 
 def _wrapped(patch: Patch, place: Floats) -> Floats:
@@ -165,22 +137,21 @@ def _wrapped(patch: Patch, place: Floats) -> Floats:
 
 def _heights(patch: Patch, place: Floats, strand: NDArray[np.intp], z: float, theta: float) -> Floats:
     """Return heights (n,) where rays come into strands (n,), next to `_at`'s places (n, 2) at a height z; or 0."""
-    one = len(patch.leans) == 1
-    away = place - patch.feet[strand] - (0.0 if one else (patch.leans[strand] - patch.leans[0]) * z)
+    away = place - patch.feet[strand]
     away -= patch.side * np.round(away / patch.side)
-    rate = _rate(patch, theta)[[0] if one else strand]
+    rate = _rate(patch, theta)
     down = _first(patch, away - rate * (patch.length - z), rate)
     return np.where(np.isfinite(down), patch.length - down, 0.0)
 
 
 def _rate(patch: Patch, theta: float) -> Floats:
-    """Return how far a ray moves from the strands' axes a unit of height that it goes down (1 or k, 2)."""
-    return patch.leans - np.array([np.tan(theta), 0.0])
+    """Return how far a ray moves from the strands' axes a unit of height that it goes down (2,)."""
+    return patch.lean - np.array([np.tan(theta), 0.0])
 
 
 def _at(patch: Patch, theta: float, start: Floats, z: float) -> Floats:
-    """Return where rays are at a height, seen from the first strand's foot if its axis is there: within the patch."""
-    found = start - patch.leans[0] * patch.length + _rate(patch, theta)[0] * (patch.length - z)
+    """Return where rays are at a height, from where the strands' axes have moved to: within the patch."""
+    found = start - np.array(patch.lean) * patch.length + _rate(patch, theta) * (patch.length - z)
     return _wrapped(patch, found)
 
 

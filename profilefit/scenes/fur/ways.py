@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.checks import checked_whole, is_number, shown
+from mcml_sim.media.checks import is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
@@ -43,50 +43,6 @@ SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
 
 
-class SweptError(NamedTuple):
-    """Error of swept slabs: rms of the heights of hits over L = size y^steep q^thick, and errors of the constants.
-
-    y = |L tan(theta) - lean| sqrt(n) / N, how many strands' distances a ray moves aside in a slab;  q = r0 sqrt(n)
-    scatter  standard deviation that is left in the logarithm, over 63 furs and angles
-    """
-
-    size: float
-    steep: float
-    thick: float
-    errors: tuple[float, float, float]
-    scatter: float
-
-
-# By the strands that a slab tests. `python -m benchmarks.fur --only swept` fits them again.
-SWEPT_ERRORS = {
-    1: SweptError(0.0316, 1.70, -0.69, (0.0014, 0.08, 0.04), 0.25),
-    2: SweptError(0.0110, 2.36, -0.67, (0.0010, 0.13, 0.05), 0.30),
-}
-ERRORS, THICK = (0.01, 0.1), (0.2, 0.6)  # rms and r0 sqrt(n) that they are fitted to
-
-
-def swept_layers(goal: float, density: float, radius: float, aside: float, tested: int = 1) -> int:
-    """Return the swept slabs for an error, by `SweptError`; scatter is a factor of 1.3 in error, 1.2 in layers.
-
-    goal    root mean square error of the heights of hits over the length, 0.01 to 0.1 [-]
-    aside   of a ray from the tips to the skin, |L tan(theta) - lean| > 0;  density [1/length^2], radius [length]
-    tested  strands, 1 or 2
-
-    InputError where r0 sqrt(n) is beyond 0.2 to 0.6. Rays say it of any fur: `trial`, `least_layers`.
-    """
-    of = SWEPT_ERRORS[checked_whole("tested", tested, 1, 2)]
-    numbers = {"goal": goal, "density": density, "radius": radius, "aside": aside}
-    for name, value in numbers.items():
-        if not (is_number(value) and 0 < value < np.inf):
-            raise InputError(f"{name} must be a finite number > 0, got {shown(value)}")
-    thick = float(radius * density**0.5)
-    for what, value, (low, high) in (("goal", goal, ERRORS), ("radius sqrt(density)", thick, THICK)):
-        if not low <= value <= high:
-            raise InputError(f"{what} must be in [{low:g}, {high:g}], got {value:g}")
-    y = (goal / (of.size * thick**of.thick)) ** (1.0 / of.steep)
-    return int(np.ceil(aside * density**0.5 / y))
-
-
 @dataclass(frozen=True, eq=False)
 class FurTrial:
     """Rays at one angle to the normal, start (n, 2) where they pass the tips, and the heights of their first hits."""
@@ -99,18 +55,16 @@ class FurTrial:
     def __post_init__(self) -> None:
         object.__setattr__(self, "true", cast(self.patch, self.theta, self.start))
 
-    def heights(self, way: LayerTechnique, layers: int) -> Floats:
-        """Return heights of first hits (n,) by so many layers."""
-        patch = self.patch
-        if way.tested:
-            return by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
-        exponent = way.exponent_of(layers, patch.length / patch.radius)
-        return by_shells(patch, self.theta, self.start, layers, exponent)
-
     @lru_cache  # noqa: B019, a trial lives as long as what it is asked for
     def error(self, way: LayerTechnique, layers: int) -> float:
-        """Return the root mean square of the heights' errors over the length [-]."""
-        return float(np.sqrt(np.mean((self.heights(way, layers) - self.true) ** 2)) / self.patch.length)
+        """Return the root mean square of the errors of first hits' heights over the length, by so many layers [-]."""
+        patch = self.patch
+        if way.tested:
+            heights = by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
+        else:
+            exponent = way.exponent_of(layers, patch.length / patch.radius)
+            heights = by_shells(patch, self.theta, self.start, layers, exponent)
+        return float(np.sqrt(np.mean((heights - self.true) ** 2)) / patch.length)
 
 
 def trial(patch: Patch, theta: float, count: int, seed: int = 0) -> FurTrial:

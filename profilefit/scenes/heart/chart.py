@@ -1,32 +1,21 @@
-"""Cost of each technique for a heart, and where texture, screen or both are right: points and maps for a report."""
+"""Error of each technique for a heart over its cost, and of a screen that does not see all of the surface."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from profilefit.scenes.heart.scene import (
-    SCREEN,
-    SPLIT,
-    TEXTURE,
-    HeartRender,
-    HeartRequest,
-    Scattering,
-    reference_render,
-)
+from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart.scene import HeartRender, HeartRequest
+from profilefit.scenes.heart.truth import Elements, summed
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import ChartPoint
-from profilefit.scenes.stage.world import unit
 
 Floats = NDArray[np.float64]
-SURE = Sampling(64)  # where a map shows the error of a technique, not its noise
-CHOSEN = 2000  # pixels of a map's errors
-MAPPED = (SPLIT, TEXTURE, SCREEN)
+SURE = Sampling(64)  # where the error of a technique is asked for, not its noise
 
 
 def ways(
@@ -44,45 +33,33 @@ def ways(
 
 def frames(drawn: HeartRender, kinds: Sequence[str], turns: int = TURNS, sampling: Sampling = SURE) -> dict[str, float]:
     """Return the least milliseconds of a whole frame by each kind, taken in turns."""
-    stage, pairs = drawn.stage, [drawn.pair(kind) for kind in kinds]
-    times = [[stage.time(one.by, one.mfp, sampling, 1, "frame")[0] for one in pairs] for _ in range(turns)]
+    pairs = [drawn.pair(kind) for kind in kinds]
+    times = [[drawn.stage.time(one.by, one.mfp, sampling, 1, "frame")[0] for one in pairs] for _ in range(turns)]
     return dict(zip(kinds, np.min(times, axis=0).tolist(), strict=True))
-
-
-def over_texel_and_view(
-    context: moderngl.Context,
-    request: HeartRequest,
-    light: Scattering,
-    texels: Sequence[float],
-    degrees: Sequence[float],
-) -> dict[str, Floats]:
-    """Return errors (texels, views) of texture, screen and their split.
-
-    Args:
-        context: of OpenGL.
-        request: of the scene.
-        light: of its stack.
-        texels: mean sides [mm].
-        degrees: by which views are turned about the upright.
-    """
-    errors = {kind: np.empty((len(texels), len(degrees))) for kind in MAPPED}
-    for column, one in enumerate(degrees):
-        with reference_render(context, turned(request, one), light, CHOSEN) as seen:
-            for row, texel in enumerate(texels):
-                with seen.with_texels(texel) as own:
-                    for kind in MAPPED:
-                        errors[kind][row, column] = error(own, kind)
-    return errors
-
-
-def turned(request: HeartRequest, degrees: float) -> HeartRequest:
-    """Return the request seen from the front, turned by an angle about the upright."""
-    angle, camera = np.radians(degrees), request.camera
-    away = camera.distance * unit((np.sin(angle), 0.0, np.cos(angle)))
-    x, y, z = (np.array(camera.target) + away).tolist()
-    return replace(request, camera=replace(camera, eye=(x, y, z)))
 
 
 def error(drawn: HeartRender, kind: str) -> float:
     """Return the root mean square error of a technique with many samples, over the mean of the reference [-]."""
     return drawn.judge.rmse(drawn.stage.scatter(drawn.technique(kind), drawn.light.mfp, SURE))
+
+
+def occlusion_error(elements: Elements, seen: ArrayLike, kernel: Kernel, at: ArrayLike, own: ArrayLike) -> Floats:
+    """Return the error of a screen-space gather that is caused by hidden surface: (m, 3), in the irradiance's unit.
+
+    seen  (n,) of the elements, 0 or 1;  at, own  (m, 3) points that gather, and their irradiance
+    Light of what is seen less that of all, each over its share of the kernel: as gathers on a screen have it.
+    """
+    light, one = elements.irradiance, np.ones_like(elements.irradiance)
+    visible = np.asarray(seen, float)[:, None]
+    columns = np.concatenate([visible * light, visible * one, light, one], axis=1)
+    here, unity = np.asarray(own, float), np.ones(np.shape(own))
+    gathered = summed(
+        elements._replace(irradiance=columns),
+        kernel.variances,
+        np.tile(kernel.weights, (1, 4)),
+        at,
+        np.concatenate([here, unity, here, unity], axis=1),
+    )
+    part, share, whole, energy = np.split(gathered, 4, axis=1)
+    least = np.finfo(float).tiny
+    return part / np.maximum(share, least) - whole / np.maximum(energy, least)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.truth import Elements, summed, surface_blur
+from profilefit.scenes.heart.truth import surface_blur
 
 Floats = NDArray[np.float64]
 
@@ -77,28 +77,6 @@ def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: K
         for light in (visible, np.ones_like(visible))
     )
     return some / np.maximum(whole, np.finfo(float).tiny)
-
-
-def occlusion_error(elements: Elements, seen: ArrayLike, kernel: Kernel, at: ArrayLike, own: ArrayLike) -> Floats:
-    """Return the error of a screen-space gather that is caused by hidden surface: (m, 3), in the irradiance's unit.
-
-    seen  (n,) of the elements, 0 or 1;  at, own  (m, 3) points that gather, and their irradiance
-    Light of what is seen less that of all, each over its share of the kernel: as gathers on a screen have it.
-    """
-    light, one = elements.irradiance, np.ones_like(elements.irradiance)
-    visible = np.asarray(seen, float)[:, None]
-    columns = np.concatenate([visible * light, visible * one, light, one], axis=1)
-    here, unity = np.asarray(own, float), np.ones(np.shape(own))
-    gathered = summed(
-        elements._replace(irradiance=columns),
-        kernel.variances,
-        np.tile(kernel.weights, (1, 4)),
-        at,
-        np.concatenate([here, unity, here, unity], axis=1),
-    )
-    part, share, whole, energy = np.split(gathered, 4, axis=1)
-    least = np.finfo(float).tiny
-    return part / np.maximum(share, least) - whole / np.maximum(energy, least)
 
 
 def balance(near: ArrayLike, far_on_screen: ArrayLike, far_in_atlas: ArrayLike, share: ArrayLike, threshold: float):

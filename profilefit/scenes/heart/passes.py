@@ -14,16 +14,7 @@ from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel, split
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.renderer import Pass, Read
-from profilefit.scenes.stage.technique import (
-    EXITANCE,
-    LAW,
-    Frame,
-    LawText,
-    Technique,
-    Unwraps,
-    maps,
-    through_text,
-)
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, Unwraps, maps, through_text
 from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 from profilefit.shader.stack_text import gaussians_text

@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, Self
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from mcml_sim import Medium
 from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
+from profilefit.recipes.declared import Declared, OneOf, Refused, Tolerance
 from profilefit.recipes.folder import LOCAL, fits_folder
 from profilefit.recipes.kinds import gaussians
-from profilefit.recipes.kinds.stack import StackRequest, matching, requested
+from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.gaussians import SumLight, dense, joint, lights_of
-from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel, crossover_of
@@ -31,19 +31,13 @@ from profilefit.scenes.stage import request
 from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.picture import RenderResult, TruthError
-from profilefit.scenes.stage.request import Viewpoint, ViewRequest
+from profilefit.scenes.stage.request import TechniqueTable, Viewpoint, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import evenly, world
 from profilefit.scenes.stage.technique import Lambert, Technique, TechniquePair, alone
 from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
 Floats = NDArray[np.float64]
-TABLES = {
-    **request.TABLES,
-    "": ("title", "scene", "unit", "illumination", "layers", "start", "surface", *request.TABLES),
-    "surface": ("kind", "size", "steepness", "roughness"),
-    "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel", "tolerance"),
-}
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
 GAUSSIANS, TEXEL, TOLERANCE = 6, 0.4, 0.02
@@ -53,39 +47,68 @@ FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
-@dataclass(frozen=True)
-class HeartRequest(ViewRequest):
-    """Picture of a heart that a file requests.
+class SurfaceTable(Declared):
+    """Table [surface]: kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period.
 
-    surface    its kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period
     roughness  of the one lobe that is mirrored, GGX [-]
-    kind       of the technique;  gaussians  of its kernel;  texel  mean side of the atlas's [mm]
+    """
+
+    kind: Annotated[str, OneOf(*meshes.KINDS)] = meshes.KINDS[0]
+    size: Annotated[float, Field(gt=0.0, le=LARGEST)] = SIZE
+    steepness: Tolerance = STEEPNESS
+    roughness: Tolerance = WET
+
+    @model_validator(mode="after")
+    def _of_bumps(self) -> Self:
+        if self.kind != "bumps" and "steepness" in self.model_fields_set:
+            raise Refused("left out where kind is not bumps", self.steepness, "steepness")
+        return self
+
+
+class HeartTechnique(TechniqueTable):
+    """Table [technique]: kind;  gaussians  of its kernel;  texel  mean side of the atlas's [mm].
+
     tolerance  of what the screen by itself may be wrong by, over the mean of the light [-]
     """
 
-    stack: StackRequest
-    surface: str
-    size_mm: float
-    steepness: float
-    roughness: float
-    kind: str
-    gaussians: int
-    texel: float
-    tolerance: float
+    kind: Annotated[str, OneOf(*KINDS)] = SPLIT
+    gaussians: Annotated[int, Field(ge=1, le=MOST)] = GAUSSIANS
+    texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = TEXEL
+    tolerance: Tolerance = TOLERANCE
+
+
+class HeartRequest(ViewRequest, StackRequest):
+    """Picture of a heart that a file requests."""
+
+    scene: Annotated[str, OneOf("heart")] = "heart"
+    surface: SurfaceTable = SurfaceTable()
+    technique: HeartTechnique = HeartTechnique()
 
     @property
-    def media(self) -> tuple[Medium, Medium, Medium]:
-        """Stacks of red, green, blue."""
-        return self.stack.stack.media
+    def viewpoint(self) -> Viewpoint:
+        """Camera of a file that says nothing."""
+        return Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * self.surface.size)
 
     @cached_property
     def mesh(self) -> Mesh:
-        return meshes.surface(self.surface, self.size_mm, self.steepness)
+        """Surface."""
+        return meshes.surface(self.surface.kind, self.surface.size, self.surface.steepness)
 
     @property
     def pixel(self) -> float:
         """Side of a pixel at the target [mm]."""
         return self.camera.height / self.size[1]
+
+    @model_validator(mode="after")
+    def _drawable(self) -> Self:
+        fit.require_exact(self.stack)
+        if self.stack.map is not None:
+            raise Refused("one number: light is blurred alike all over", "an image", "layers", "thickness")
+        (columns, rows), margin = atlas_size(self.mesh, self.technique.texel, 10 * MOST_TEXELS)
+        if max(columns, rows) - 2 * margin > MOST_TEXELS:
+            accepted = f"a length [mm] of which {MOST_TEXELS} at most make a side of the atlas"
+            raise Refused(accepted, self.technique.texel, "technique", "texel")
+        return self
 
 
 class Scattering(NamedTuple):
@@ -105,46 +128,13 @@ class Scattering(NamedTuple):
         return (float(np.sqrt(self.kernel.variances[-1])),) * 3
 
 
-def read(file: str, content: Table) -> HeartRequest:
-    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    stack = requested(file, content)
-    fit.require_exact(tables, stack.stack, "the surface")
-    if stack.stack.map is not None:
-        raise tables.bad("layers", "thickness", "one number: light is blurred alike all over", "an image")
-    surface, named = (tables.table(content, name, {}) for name in ("surface", "technique"))
-    kind = tables.text("surface", "kind", surface, meshes.KINDS[0], meshes.KINDS)
-    if kind != "bumps" and "steepness" in surface:
-        raise tables.bad("surface", "steepness", "left out where kind is not bumps", surface["steepness"])
-    size = tables.number("surface", "size", surface, SIZE, LARGEST)
-    count = named.get("gaussians", GAUSSIANS)
-    if type(count) is not int or not 1 <= count <= MOST:
-        raise tables.bad("technique", "gaussians", f"a whole number in 1 ... {MOST}", count)
-    seen = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * size)
-    found = HeartRequest(
-        **request.view(tables, content, seen.camera),
-        stack=stack,
-        surface=kind,
-        size_mm=size,
-        steepness=tables.number("surface", "steepness", surface, STEEPNESS, 1.0),
-        roughness=tables.number("surface", "roughness", surface, WET, 1.0),
-        kind=tables.text("technique", "kind", named, SPLIT, KINDS),
-        gaussians=count,
-        texel=tables.number("technique", "texel", named, TEXEL, LARGEST),
-        tolerance=tables.number("technique", "tolerance", named, TOLERANCE, 1.0),
-    )
-    (columns, rows), margin = atlas_size(found.mesh, found.texel, 10 * MOST_TEXELS)
-    if max(columns, rows) - 2 * margin > MOST_TEXELS:
-        accepted = f"a length [mm] of which {MOST_TEXELS} at most make a side of the atlas"
-        raise tables.bad("technique", "texel", accepted, found.texel)
-    return found
+read = HeartRequest.of
 
 
 def draw(context: moderngl.Context, of: HeartRequest) -> RenderResult:
     """Draw the picture beside its reference: a minute, half of it for exact light if no record has these layers."""
-    with reference_render(context, of, light_of(of.stack, of.gaussians)) as drawn:
-        return request.rendered(drawn.stage, drawn.judge, of, drawn.pair(of.kind))
+    with reference_render(context, of, light_of(of, of.technique.gaussians)) as drawn:
+        return request.rendered(drawn.stage, drawn.judge, of, drawn.pair(of.technique.kind))
 
 
 @dataclass(frozen=True)
@@ -181,7 +171,7 @@ class HeartRender:
 @contextmanager
 def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
     """Open a stage that has drawn what is requested, and its one part."""
-    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
+    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.surface.roughness)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
         stage.draw(Scene((part,), of.light, of.ambient, of.camera, f0))
@@ -194,12 +184,12 @@ def reference_render(
     context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = request.MOST_PIXELS
 ) -> Iterator[HeartRender]:
     """Open the passes and the reference image of a request, judged at so many pixels at most."""
-    size, margin = atlas_size(of.mesh, of.texel, MOST_TEXELS)
+    size, margin = atlas_size(of.mesh, of.technique.texel, MOST_TEXELS)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
         buffers = stage.buffers()
         atlas.draw(stage, part)
         places, inside = world(buffers, of.camera), buffers.mask > INSIDE
-        judged = inside & meshes.off_edges(of.surface, of.size_mm, places, light.mfp[0])
+        judged = inside & meshes.off_edges(of.surface.kind, of.surface.size, places, light.mfp[0])
         if not judged.any():
             raise InputError(f"{of.file}: the view must show some of the sheet that is not next to its edge")
         if np.count_nonzero(judged) > most:
@@ -238,17 +228,16 @@ def _reference(
     return reference, TruthError.of(np.abs(sums[1] - sums[0]) / np.mean(sums[0]))
 
 
-def light_of(stack: StackRequest, count: int) -> Scattering:
+def light_of(of: StackRequest, count: int) -> Scattering:
     """Return the light of a record of these very layers, in ./fits or shipped; solved and fitted now where none is."""
-    media = stack.stack.media
     for folder in (LOCAL, fits_folder()):
-        found = matching(stack, folder)
+        found = matching(of, folder)
         record = None if found is None else gaussians.find(found.name, folder)
         if record is not None:
-            units = [medium.layers[0].similar.mfp for medium in media]
-            kernel = kernel_of(record.laws(stack.illumination, count), units)
-            return _light(kernel, record.lights(stack.illumination))
-    lights = lights_of(media, stack.illumination)
+            units = [medium.layers[0].similar.mfp for medium in of.media]
+            kernel = kernel_of(record.laws(of.illumination, count), units)
+            return _light(kernel, record.lights(of.illumination))
+    lights = lights_of(of.media, of.illumination)
     best = joint(lights, count)
     return _light(Kernel(best.variances, best.weights.T), lights)
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from profilefit.errors import InputError
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
 NEIGHBOURS = 24  # points that gather together
@@ -123,6 +124,5 @@ def _finite(name: str, value: ArrayLike) -> Floats:
         array = np.asarray(value, float)
     except (TypeError, ValueError):
         raise InputError(f"{name} must be numbers, got {value!r}") from None
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]:g}")
+    require(name, array, np.isfinite(array), "finite")
     return array

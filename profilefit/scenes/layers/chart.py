@@ -1,30 +1,21 @@
-"""Error against cost of each technique for layers, and error of one half space: points and maps for a report."""
+"""Error against cost of each technique for layers, and the shares of their light."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcml_sim import Layer, Medium, exact
+from mcml_sim import Medium, exact
 from mcml_sim.media.fresnel import fresnel
-from profilefit.laws.stack import StackLaw
-from profilefit.recipes.stack.gaussians import medium_gaussians
-from profilefit.scenes.layers.half_space import one_half_space
-from profilefit.scenes.layers.law import plate_of
-from profilefit.scenes.layers.passes import diffusely_once, of_gaussians, of_table, once
+from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.scene import LayersRequest, laws_of, reference, technique
 from profilefit.scenes.layers.truth import StackTable
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import TechniquePair, alone
-
-Floats = NDArray[np.float64]
-TABLE, GAUSSIANS = "exact table", "gaussians"
+from profilefit.scenes.stage.technique import TechniquePair
 
 
 class Split(NamedTuple):
@@ -53,53 +44,19 @@ def split(medium: Medium, illumination: str = "searchlight") -> Split:
     return Split(first, max(light.reflectance - first, 0.0), mirror)
 
 
-def one_half_space_errors(
-    thicknesses: Sequence[float], mfps: Sequence[float], above: float = 0.95, below: float = 0.98, n: float = 1.4
-) -> Floats:
-    """Return the error of the one half space nearest to two layers, as a share of white: (thicknesses, mfps).
-
-    thicknesses  of the first layer, mfps of what lies below, both in mean free paths of the first
-    above, below  albedos [-];  n  of both. Root mean square near a step edge of diffuse light; exact.
-    """
-    return np.array(
-        [
-            [one_half_space(Medium((_layer(n, above, 1.0, d), _layer(n, below, mfp, np.inf)))).error for mfp in mfps]
-            for d in thicknesses
-        ]
-    )
-
-
 def ways(
-    stage: Stage, request: LayersRequest, table: StackTable, samples: Mapping[str, Sequence[int]], turns: int = TURNS
+    stage: Stage,
+    request: LayersRequest,
+    table: StackTable,
+    samples: Mapping[str, Sequence[int]],
+    others: Mapping[str, TechniquePair],
+    turns: int = TURNS,
 ) -> dict[str, list[ChartPoint]]:
-    """Return error and cost of each kind of technique with each of its numbers of samples, of the scene requested.
+    """Return error and cost of techniques with each of their numbers of samples, of the scene that a stage draws.
 
-    Args:
-        stage: that draws the scene.
-        request: of the scene.
-        table: exact light of its stack.
-        samples: of the kinds of a file, of `TABLE`, exact light by tables of each thickness, and of "gaussians:N", N
-            Gaussians fitted at the thickness of the file.
-        turns: how often each is timed.
+    table    exact light of the scene's stack
+    samples  of the kinds of a file, and of `others` by their names
     """
-    judge, laws = reference(stage, request, table), laws_of(request.stack)
-    return {
-        kind: points(stage, judge, _technique(kind, request, table, laws), request.sampling, numbers, turns)
-        for kind, numbers in samples.items()
-    }
-
-
-def _technique(kind: str, request: LayersRequest, table: StackTable, laws: tuple[StackLaw, ...]) -> TechniquePair:
-    light = request.stack.illumination
-    plates = [plate_of(medium, light) for medium in request.media]
-    if kind == TABLE:
-        return alone(kind, of_table(table, plates), request.mfp)
-    name, _, count = kind.partition(":")
-    if name == GAUSSIANS:
-        sums = [medium_gaussians(medium, light, int(count)) for medium in request.media]
-        return alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
-    return technique(replace(request, kind=kind), laws)
-
-
-def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:
-    return Layer(n, (1.0 - alpha) / mfp, alpha / mfp, 0.0, thickness)
+    judge, laws = reference(stage, request, table), laws_of(request)
+    pairs = {kind: others.get(kind) or technique(request.changed(technique={"kind": kind}), laws) for kind in samples}
+    return {kind: points(stage, judge, pairs[kind], request.sampling, samples[kind], turns) for kind in samples}

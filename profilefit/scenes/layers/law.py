@@ -39,9 +39,7 @@ from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
-from profilefit.recipes.stack.fit import stack_law
-
-__all__ = ["Plate", "beams", "plate_of", "single_scattering", "stack_law"]
+from profilefit.recipes.stack.fit import stack_law as stack_law
 
 Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
@@ -50,23 +48,20 @@ STEP = 1e-6  # of ln of a constant, for derivatives
 
 
 class Beam(NamedTuple):
-    """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-]."""
+    """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-].
+
+    sine, cosine  of its angle to the normal in the layer; sine is above 1 where no light of that direction gets there
+    down, up      share that passes the layer's top on its way down, and its bottom on its way up, as often as it does
+    """
 
     sine: Floats
-    """Sine of its angle to the normal in the layer; above 1 where no light of that direction gets there."""
     cosine: Floats
     down: Floats
-    """Share that passes the layer's top on its way down, as often as it does."""
     up: Floats
-    """Share that passes the layer's bottom on its way up, as often as it does."""
 
 
 def single_scattering(
-    medium: Medium,
-    cos_in: ArrayLike,
-    cos_out: ArrayLike,
-    azimuth: ArrayLike,
-    phases: Sequence[Phase] | None = None,
+    medium: Medium, cos_in: ArrayLike, cos_out: ArrayLike, azimuth: ArrayLike, phases: Sequence[Phase] | None = None
 ) -> float | Floats:
     """Return radiance outside [1/sr] of light scattered once, for unit irradiance across the beam. All broadcast.
 

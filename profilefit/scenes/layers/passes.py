@@ -13,24 +13,19 @@ from numpy.typing import NDArray
 
 from mcml_sim import Medium
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.gaussians import MediumGaussians
 from profilefit.laws.stack import StackLaw
-from profilefit.materials import CHANNELS
 from profilefit.scenes.layers.law import Plate, single_scattering
-from profilefit.scenes.layers.truth import LEFT, StackTable
-from profilefit.scenes.stage.exact_law import columns, row, table_text
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
-from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
+from profilefit.shader.stack_text import single_text, stack_text
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 SCATTERED = "scattered_map"
 COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4
 LEAST = 1e-9  # mean free paths that stand for no first layer
-ROWS = 32  # thicknesses of a table of exact light
 GRAZING = 1e-3  # cosine that stands for 0, where a quadrature is of no use
 RULE = 24  # directions of its quadrature, for slope and azimuth each
 
@@ -70,40 +65,6 @@ def of_stack(laws: Sequence[StackLaw], least: float, most: float, plates: Sequen
     """Return samples of a stack's law with the thickness at each pixel."""
     shape = f"{LAW}_shape(float(c), {thickness_text(least, most)})"
     law = LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)")
-    return StackGather(law, tuple(plates))
-
-
-def of_table(table: StackTable, plates: Sequence[Plate]) -> StackGather:
-    """Return samples of exact light by tables, of the nearest of ROWS thicknesses at each pixel."""
-    values = np.repeat(np.linspace(0.0, 1.0, ROWS), len(CHANNELS))
-    curves, (t, x) = table.curves(values), columns()
-    every = np.broadcast_to(x, (values.size, x.size))
-    shares = np.maximum.accumulate(curves.share(every), axis=1)
-    rings = 2.0 * np.pi * x * curves.density(every)
-    rows = [row(_radii(t, x, share), ring, share) for share, ring in zip(shares, rings, strict=True)]
-    drawn, known = (np.stack(column) for column in zip(*rows, strict=True))
-    text = table_text(LAW, curves.reflectance)
-    shape = f"{LAW}_Shape(c + {len(CHANNELS)} * int(surface.r * {ROWS - 1}.0 + 0.5))"
-    textures = {f"{LAW}_drawn": drawn, f"{LAW}_known": known}
-    return StackGather(LawText("table", text, textures, shape, f"{LAW}_reflectance(shape)"), tuple(plates))
-
-
-def _radii(t: Floats, x: Floats, share: Floats) -> Floats:
-    """Return x at which all but e^-t of the light is within; beyond what a table tells, as it goes on."""
-    depth = -np.log(np.maximum(1.0 - share, LEFT))
-    told = np.searchsorted(depth, depth[-1])  # the first column with all that is told
-    ln = np.interp(t, depth[: told + 1], np.log(x[: told + 1]))
-    first = t < depth[0]  # R_d is as good as even there, or as 1 / r: next to none of the light
-    far = t > depth[told]
-    before = np.searchsorted(depth, depth[told] - 1.0)
-    rate = (x[told] - x[before]) / (depth[told] - depth[before])
-    return np.where(far, x[told] + rate * (t - depth[told]), np.where(first, x[0] * t / depth[0], np.exp(ln)))
-
-
-def of_gaussians(sums: Sequence[MediumGaussians], plates: Sequence[Plate]) -> StackGather:
-    """Return samples of sums of Gaussians, of red, green and blue, which are of one thickness everywhere."""
-    text = gaussians_text(sums, name=LAW)
-    law = LawText("gaussians", text, {}, f"{LAW}_shape(float(c))", f"{LAW}_reflectance(shape)")
     return StackGather(law, tuple(plates))
 
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Annotated, Literal, Self
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from mcml_sim import Medium, Setting
+from mcml_sim import Setting
 from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
+from profilefit.recipes.declared import OneOf, Refused, Tolerance, words
 from profilefit.recipes.folder import LOCAL, fits_folder
-from profilefit.recipes.kinds.stack import StackRequest, matching, requested
+from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.stack.file import ThicknessMap
 from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
@@ -25,17 +27,12 @@ from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.judge import Judge, surface_judge
 from profilefit.scenes.stage.picture import RenderResult
-from profilefit.scenes.stage.request import ViewRequest
+from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import TechniquePair, alone
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
 Floats = NDArray[np.float64]
-TABLES = {
-    **request.TABLES,
-    "": ("title", "scene", "unit", "illumination", "layers", "start", "uneven", "pose", *request.TABLES, "choose"),
-    "technique": ("kind", *request.TABLES["technique"], "tolerance", "single"),
-}
 KINDS = ("stack", "dipole", "half space", "none")
 OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
 POSES = ("rest", "turn", "nod")
@@ -44,51 +41,57 @@ NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
 COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
 
 
-@dataclass(frozen=True)
-class LayersRequest(ViewRequest):
-    """Picture of a layered head that a file requests.
+class LayersTechnique(TechniqueTable):
+    """Table [technique]: kind  of the technique;  single  whether light scattered once leaves in its own directions."""
 
-    least, most  thickness of the first layer where values (rows, columns) are 0 and 1 [mm];  row 0 at the top
-    single       whether light scattered once leaves in its own directions
-    """
+    kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
+    single: Annotated[bool | Literal["auto"], words("true, false or auto")] = "auto"
+    tolerance: Tolerance = 0.02
 
-    stack: StackRequest
-    least: float
-    most: float
-    values: NDArray[np.float32]
-    pose: str
-    kind: str
-    single: bool
 
-    @property
-    def media(self) -> tuple[Medium, Medium, Medium]:
-        """Stacks of red, green, blue."""
-        return self.stack.stack.media
+class LayersRequest(ViewRequest, StackRequest):
+    """Picture of a layered head that a file requests; `choose` is read by `profilefit choose`."""
+
+    scene: Annotated[str, OneOf("layers")] = "layers"
+    technique: LayersTechnique = LayersTechnique()
+    uneven: Annotated[float, Field(ge=0.0, lt=1.0), words("a share in [0, 1)")] = 0.5
+    pose: Annotated[str, OneOf(*POSES)] = POSES[0]
+    choose: OfChoose = None
 
     @property
     def mfp(self) -> Rgb:
         """Transport mean free path of the first layer, red, green, blue [mm]."""
         return rgb(medium.layers[0].mfp for medium in self.media)
 
+    @property
+    def kind(self) -> str:
+        """Kind of the technique."""
+        return self.technique.kind
 
-def read(file: str, content: Table) -> LayersRequest:
-    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    stack = requested(file, content)
-    fit.require_exact(tables, stack.stack, "the head")
-    named = tables.table(content, "technique", {})
-    least, most, values = _thickness(tables, content, stack)
-    return LayersRequest(
-        **request.view(tables, content),
-        stack=stack,
-        least=least,
-        most=most,
-        values=values,
-        pose=tables.text("", "pose", content, POSES[0], POSES),
-        kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
-        single=_single(tables, named, stack),
-    )
+    @property
+    def single(self) -> bool:
+        """Whether light scattered once is drawn by itself: as the file says, else where it is not negligible."""
+        said = self.technique.single
+        return said if isinstance(said, bool) else max(map(passes.alike_error, self.media)) > NEGLIGIBLE
+
+    @cached_property
+    def thickness(self) -> ThicknessMap:
+        """Thickness of the first layer [mm] over u and v; row 0 at the top."""
+        if self.stack.map is not None:
+            return self.stack.map
+        d, apart = self.media[0].layers[0].thickness, max(self.uneven, 1e-3)
+        values = mottled() if self.uneven > 0 else np.full((1, 1), 0.5, np.float32)
+        return ThicknessMap(values, d * (1.0 - apart), d * (1.0 + apart))
+
+    @model_validator(mode="after")
+    def _drawable(self) -> Self:
+        fit.require_exact(self.stack)
+        if self.stack.map is not None and "uneven" in self.model_fields_set:
+            raise Refused("left out where the thickness is an image", self.uneven, "uneven")
+        return self
+
+
+read = LayersRequest.of
 
 
 def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
@@ -97,10 +100,10 @@ def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
     with Stage(context, of.size) as stage:
         stage.draw(scene)
         request.require_lit(of.file, stage.buffers())  # before the minutes that exact light takes
-        table = stack_table(of.media, of.least, of.most, of.stack.illumination)
-        pair = technique(of, laws_of(of.stack) if of.kind in OF_LAW else None)
+        table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
+        pair = technique(of, laws_of(of) if of.kind in OF_LAW else None)
         if of.single:
-            pair = pair._replace(seen=passes.WithSingle.of(pair.by, of.media, of.least, of.most))
+            pair = pair._replace(seen=passes.WithSingle.of(pair.by, of.media, of.thickness.least, of.thickness.most))
         return request.rendered(stage, surface_judge(stage, scene, of.mfp, table), of, pair)
 
 
@@ -121,12 +124,12 @@ def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Technique
         of: the request.
         laws: of red, green and blue, which the first and the last of these need.
     """
-    light, n = of.stack.illumination, of.media[0].layers[0].n
+    light, n = of.illumination, of.media[0].layers[0].n
     if of.kind in OF_LAW:  # of which the last one's light does not leave its pixel
         assert laws is not None
         plates = [plate_of(medium, light) for medium in of.media]
         lengths = of.mfp if of.kind == "stack" else (NO_LENGTH,) * 3
-        return alone(of.kind, passes.of_stack(laws, of.least, of.most, plates), lengths)
+        return alone(of.kind, passes.of_stack(laws, of.thickness.least, of.thickness.most, plates), lengths)
     if of.kind == "dipole":
         dipole = catalogue.load("dipole", setting=Setting(n=n))
         alpha = rgb(medium.layers[0].alpha for medium in of.media)
@@ -137,12 +140,12 @@ def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Technique
     return alone(of.kind, passes.of_half_space(hazard), lengths, albedos)
 
 
-def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
+def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
     """Return the laws of a record of these very layers, in ./fits or shipped; fitted now where there is none."""
     for folder in (LOCAL, fits_folder()):
-        if (record := matching(stack, folder)) is not None:
+        if (record := matching(of, folder)) is not None:
             return record.laws
-    found = [fit.stack_law(medium, stack.illumination) for medium in stack.stack.media]
+    found = [fit.stack_law(medium, of.illumination) for medium in of.media]
     red, green, blue = (one for one in found if isinstance(one, StackLaw))  # a file has two layers or more
     return red, green, blue
 
@@ -150,7 +153,7 @@ def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 def scene_of(of: LayersRequest) -> Scene:
     """Return the head in its pose; its texture is the share of the way from the least thickness to the most."""
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
-    values = np.repeat(of.values[::-1, :, None], len(CHANNELS), axis=-1)
+    values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
     parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
     return Scene(parts, of.light, of.ambient, of.camera, f0)
@@ -169,21 +172,6 @@ def posed(points: Floats, pose: str) -> Floats:
     return np.stack([c * x + s * out, y, c * out - s * x - 22.0], axis=1)
 
 
-def _thickness(tables: Tables, content: Table, stack: StackRequest) -> tuple[float, float, NDArray[np.float32]]:
-    """Return least and most of the first layer [mm], and where between it is over u and v, row 0 at the top."""
-    given = stack.stack.map
-    if given is not None:
-        if "uneven" in content:
-            raise tables.bad("", "uneven", "left out where the thickness is an image", content["uneven"])
-        return given.least, given.most, given.values
-    uneven = content.get("uneven", 0.5)
-    if not isinstance(uneven, int | float) or isinstance(uneven, bool) or not 0 <= uneven < 1:
-        raise tables.bad("", "uneven", "a share in [0, 1)", uneven)
-    d, apart = stack.stack.media[0].layers[0].thickness, max(float(uneven), 1e-3)
-    values = mottled() if uneven > 0 else np.full((1, 1), 0.5, np.float32)
-    return d * (1.0 - apart), d * (1.0 + apart), values
-
-
 def mottled() -> NDArray[np.float32]:
     """Return (rows, columns) in [0, 1]: soft blotches of several sizes over the head, the same each time."""
     random = np.random.default_rng(SEED)
@@ -195,13 +183,3 @@ def mottled() -> NDArray[np.float32]:
         across = np.minimum(across, 1.0 - across)  # u runs around
         total += sign * np.exp(-((across / size) ** 2) - ((v - at_v) / (1.4 * size)) ** 2)
     return (0.5 + 0.5 * np.tanh(1.5 * total)).astype(np.float32)
-
-
-def _single(tables: Tables, named: Table, stack: StackRequest) -> bool:
-    """Return whether light scattered once is drawn by itself: as the file says, else where it is not negligible."""
-    value: Any = named.get("single", "auto")
-    if isinstance(value, bool):
-        return value
-    if value != "auto":
-        raise tables.bad("technique", "single", "true, false or auto", value)
-    return max(map(passes.alike_error, stack.stack.media)) > NEGLIGIBLE

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from mcml_sim import Medium, exact
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
-from profilefit.scenes.stage.exact_table import Curves, held, hermite, knots
+from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
 Floats = NDArray[np.float64]
 Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A
@@ -44,15 +44,10 @@ class StackTable:
     reflectance: tuple[CubicSpline, ...]
     kappa: tuple[float, ...]
 
-    def colour(self, values: ArrayLike) -> Floats:
-        """Return A [-] of red, green and blue along a last axis, at values in [0, 1] of any shape."""
-        u = self._place(np.asarray(values, float))
-        return np.stack([spline(u) for spline in self.reflectance], axis=-1)
-
     def curves(self, values: ArrayLike, /) -> Curves:
         """Return the curves, as `CurveTable.curves`."""
         given, y = np.asarray(values, float), knots()
-        u = self._place(given)
+        u = np.log(np.maximum(self.least + (self.most - self.least) * given, np.exp(self.u[0])))
         size = (given.size, y.size - 1, 4)
         reflectance, kappa = np.empty(given.size), np.empty(given.size)
         profile, cdf = np.empty(size), np.empty(size)
@@ -63,10 +58,6 @@ class StackTable:
             profile[own] = hermite(self.profile[channel], u[own], y)
             cdf[own] = hermite(self.cdf[channel], u[own], y)
         return Curves(np.zeros(given.size), reflectance, kappa, profile, cdf)
-
-    def _place(self, values: Floats) -> Floats:
-        thickness = self.least + (self.most - self.least) * values
-        return np.log(np.maximum(thickness, np.exp(self.u[0])))
 
 
 def stack_table(

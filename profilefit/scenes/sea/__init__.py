@@ -5,14 +5,14 @@ from mcml_sim.cli.lazy import attributes
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
     from profilefit.laws.phases import haltrin
-    from profilefit.scenes.sea.hits import first_hit
     from profilefit.scenes.sea.law import beam_share, segment_integral
     from profilefit.scenes.sea.truth import caustic_irradiance
+    from profilefit.scenes.sea.waves import first_hit
 else:
     __getattr__ = attributes(
         __name__,
         {
-            "first_hit": "hits",
+            "first_hit": "waves",
             **dict.fromkeys(("beam_share", "haltrin", "segment_integral"), "law"),
             "caustic_irradiance": "truth",
         },

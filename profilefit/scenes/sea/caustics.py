@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted
+from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
@@ -36,29 +36,24 @@ class Splat(Enum):
     DERIVATIVES = "derivatives"  # the product of the lengths of two derivatives in its place, as shaders often have it
     CELLS = "cells"  # flux over that area times the area of the triangle within each pixel: exact for flat triangles
 
-    @property
-    def texts(self) -> tuple[str, str]:
-        """Sources of fragments and vertices."""
-        vertex = {"WIREFRAME": "lines", "WIREFRAME_ENERGY": "lines", "DERIVATIVES": "faces"}.get(self.name)
-        fragment = {"DERIVATIVES": "derivatives", "CELLS": "cells"}.get(self.name, "deposit")
-        return _text(f"{fragment}.frag"), _text("lattice.glsl") + _text(f"{vertex or self.value}.vert")
 
-    @property
-    def shapes(self) -> tuple[int, int]:
-        """Shape that is drawn, and vertices per cell."""
-        if self is Splat.POINTS:
-            return POINTS, 1
-        return (LINES if self in (Splat.WIREFRAME, Splat.WIREFRAME_ENERGY) else TRIANGLES), 6
+# Shaders of fragments and vertices, the shape that is drawn, and vertices per cell.
+SHADERS = {
+    Splat.POINTS: ("deposit", "points", POINTS, 1),
+    Splat.WIREFRAME: ("deposit", "lines", LINES, 6),
+    Splat.WIREFRAME_ENERGY: ("deposit", "lines", LINES, 6),
+    Splat.FACES: ("deposit", "faces", TRIANGLES, 6),
+    Splat.DERIVATIVES: ("derivatives", "faces", TRIANGLES, 6),
+    Splat.CELLS: ("cells", "cells", TRIANGLES, 6),
+}
 
 
 class CausticMap(NamedTuple):
     """Irradiance of a tile.
 
-    Attributes:
-        light: (pixels, pixels) irradiance, row 0 at y = 0, relative to the mean of the flux that entered [-].
-        entered: mean of the flux that entered, over the sun's irradiance across its rays [-].
-        fragments: number of fragments that were blended into the map.
-        milliseconds: time of the passes, hits included, until OpenGL had finished.
+    light    (pixels, pixels), row 0 at y = 0, relative to the mean of the flux that entered [-]
+    entered  mean of the flux that entered, over the sun's irradiance across its rays [-]
+    fragments, milliseconds  that were blended into the map, and time of the passes, hits included
     """
 
     light: Floats
@@ -91,10 +86,9 @@ class Caustics:
 
     Waves that face away from the sun send nothing down; that they shade others is not drawn.
 
-    Attributes:
-        map: name of the map, of one channel, 1 the mean; its first column is `drift` whole pixels toward +x of x = 0.
-        drift: whole pixels by which the map is aside of the tile, toward the light's +x.
-        entered: mean of the flux that entered, over the sun's irradiance across its rays [-].
+    map      name of the map, of one channel, 1 the mean; its first column is `drift` whole pixels toward +x of x = 0
+    drift    whole pixels by which the map is aside of the tile, toward the light's +x
+    entered  mean of the flux that entered, over the sun's irradiance across its rays [-]
     """
 
     def __init__(
@@ -109,28 +103,16 @@ class Caustics:
         floor: Waves | None = None,
         name: str = "caustics",
     ):
-        """Draw the hits once, by which the maps' margins are known.
+        """Draw the hits once, by which the maps' margins are known; arguments as of `caustic_map`.
 
-        Args:
-            renderer: whose maps have names that begin with `name`.
-            waves: the sea's surface.
-            vertices: rays along a side of the tile.
-            pixels: pixels of the map along a side of the tile.
-            depth: depth of a level floor [m].
-            tilt: angle of the sun from the vertical; light goes toward +x [rad].
-            n: refractive index of the water [-].
-            floor: an uneven floor in place of the level one, with the sea's tile.
-            name: of this sea and floor among those of a renderer.
+        name  of this sea and floor among those of a renderer, with which the names of maps begin
         """
         self.renderer, self.waves = renderer, waves
         deep, angle, index = checked_sun(depth, tilt, n)
         self.vertices = checked_whole("vertices", vertices, 2, MOST_VERTICES)
         self.pixels = checked_whole("pixels", pixels, 1, MOST_PIXELS)
         bed = floor or Waves(waves.tile, mean=-deep)
-        if bed.tile != waves.tile:
-            raise InputError(f"floor must have the sea's tile of {waves.tile:g} m, got {bed.tile:g}")
-        if bed.highest >= waves.lowest:
-            raise InputError(f"floor must be below the sea's lowest trough, {waves.lowest:g} m, got {bed.highest:g}")
+        require_below(waves, bed)
         self._pixel = waves.tile / self.pixels
         # Light is drawn as many whole pixels aside as a calm sea bends it: margins need hold the waves' share alone.
         drift = (deep * float(refracted(angle, (np.zeros(1), np.zeros(1)), index)[0][0])) / self._pixel
@@ -165,7 +147,7 @@ class Caustics:
         """Return the passes that fill `map`: hits, deposits by a splat, and their fold into the tile."""
         if not isinstance(splat, Splat):
             raise InputError(f"splat must be one of {', '.join(map(str, Splat))}, got {splat!r}")
-        (fragment, vertex), (shape, count) = splat.texts, splat.shapes
+        fragment, vertex, shape, count = SHADERS[splat]
         given: dict[str, object] = {
             "pixel": self._pixel,
             "margin": float(self._margin),
@@ -178,9 +160,9 @@ class Caustics:
             splat.value,
             {"hit_map": self._hits},
             self._splats,
-            fragment,
+            _text(f"{fragment}.frag"),
             given,
-            vertex,
+            _text("lattice.glsl") + _text(f"{vertex}.vert"),
             drawn=count * self.vertices**2,
             shape=shape,
             kept=SUM,

@@ -23,18 +23,7 @@ from scipy.special import hankel1
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
-from profilefit.laws.phases import haltrin
-
-__all__ = [
-    "beam_share",
-    "failing_depth",
-    "haltrin",
-    "onward",
-    "segment_between",
-    "segment_integral",
-    "water_gaussians",
-    "water_mtf",
-]
+from profilefit.laws.phases import haltrin as haltrin
 
 Floats = NDArray[np.float64]
 Lobes = Sequence[tuple[float, float]]
@@ -72,6 +61,8 @@ MOST_GAUSSIANS = 8
 MOVED, TOLERANCE = 1e-6, 1e-6  # of ln of a variance, for derivatives and of a search
 GAIN = 1e-10  # of a sum of squares, that another step must gain
 HALVINGS = 60
+UNBOUNDED = "a number >= 0, or inf", np.inf
+RANGES = {"omega": ("an albedo in [0, 1]", 1.0), "cw": UNBOUNDED, "t1": UNBOUNDED}
 
 
 def beam_share(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes) -> Any:
@@ -302,12 +293,7 @@ def _checked(**values: ArrayLike) -> list[Floats]:
     """Return numbers that broadcast: omega in [0, 1], cw and t1 >= 0 or inf, the others finite and >= 0."""
     found = []
     for name, value in values.items():
-        if name == "omega":
-            accepted, highest = "an albedo in [0, 1]", 1.0
-        elif name in ("cw", "t1"):
-            accepted, highest = "a number >= 0, or inf", np.inf
-        else:
-            accepted, highest = "a finite number >= 0", np.finfo(float).max
+        accepted, highest = RANGES.get(name, ("a finite number >= 0", np.finfo(float).max))
         numbers = checked_numbers(name, value, accepted)
         fits = (numbers >= 0) & (numbers <= highest)
         if not np.all(fits):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from profilefit.scenes.sea.law import water_gaussians
 from profilefit.scenes.sea.water import World
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass, Read, Renderer
-from profilefit.scenes.stage.world import Camera, unit
+from profilefit.scenes.stage.world import Camera, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 Floats = NDArray[np.float64]
@@ -31,30 +30,11 @@ GLOW, DEPTHS = 128, 32  # cosines and depths of the sky's and the floor's light
 CONE = 512  # angles of that light to the vertical
 
 
-class SeaIrradiance(NamedTuple):
-    """Light of red, green and blue (3,).
-
-    Attributes:
-        sun, sky: that come in, per horizontal area.
-        sky_on_floor: share of the sky's that comes to the floor [-].
-        interreflection: irradiance of the floor by its own light, which the surface mirrors.
-        exitance: mean radiant exitance of the floor.
-    """
-
-    sun: Floats
-    sky: Floats
-    sky_on_floor: Floats
-    interreflection: Floats
-    exitance: Floats
-
-
 class SeaPasses:
     """Passes of one world in maps of a renderer.
 
-    Attributes:
-        world: what light meets.
-        reach: how far one sees at most [m].
-        light: passes of the floor's map and its levels of detail, and of the maps in depths, by their names.
+    reach  how far one sees at most [m]
+    light  passes of the floor's map and its levels of detail, and of the maps in depths, by their names
     """
 
     def __init__(
@@ -68,13 +48,8 @@ class SeaPasses:
     ) -> None:
         """Draw hits once, and lay out the maps.
 
-        Args:
-            renderer: that has the maps.
-            world: what light meets.
-            splats: of the floor's map, and of each depth's.
-            vertices: rays along a side of the tile.
-            texels: texels of a map along a side of the tile.
-            slices: maps in depths.
+        splats  of the floor's map, and of each depth's;  slices  maps in depths
+        vertices, texels  rays, and texels of a map, along a side of the tile
         """
         self.renderer, self.world, self.reach = renderer, world, reach_of(world)
         count = checked_whole("slices", slices, 2, 64)
@@ -103,17 +78,13 @@ class SeaPasses:
     def view(self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int) -> Pass:
         """Return the pass of the radiance that a camera sees, after those of `light`: z is up.
 
-        Args:
-            camera: whose picture it is.
-            size: columns and rows.
-            kind: one of `haze.KINDS`.
-            pieces: of a ray through the water.
-            steps: of the search for a hit.
+        size  columns and rows;  kind  one of `haze.KINDS`
+        pieces, steps  of a ray through the water, and of the search for a hit
         """
         self.renderer.declare(VIEW, size)
         world, (right, up, forward) = self.world, axes(camera, size)
         fade, blur, glowing = self._of_kind(kind)
-        light = self._irradiance(kind)
+        sun, sky, sky_on_floor, interreflection, _ = self._irradiance(kind)
         reads: dict[str, Read] = {
             "sea_waves": world.sea.texels,
             "floor_waves": world.floor.texels,
@@ -130,24 +101,24 @@ class SeaPasses:
             "crest": max(world.sea.highest, 1e-6),
             "steps": checked_whole("steps", steps, 1, 64),
             "eye": camera.eye,
-            "forward": _rgb(forward),
-            "right": _rgb(right),
-            "up": _rgb(up),
+            "forward": rgb(forward),
+            "right": rgb(right),
+            "up": rgb(up),
             "angle": camera.pixel(size[1]),
             "reach": self.reach,
             "n": world.n,
-            "beam": _rgb(world.beam),
+            "beam": rgb(world.beam),
             "floor_drift": self._floor.drift * world.sea.tile / self._floor.pixels,
             "shaft": min(world.shaft, 1e6),
             "first_depth": self._top,
             "depth_step": self._step,
             "b": world.b,
-            "sunlight": _rgb(light.sun),
-            "skylight": _rgb(light.sky),
+            "sunlight": rgb(sun),
+            "skylight": rgb(sky),
             "sky": world.sky,
             "reflectance": world.reflectance,
-            "sky_on_floor": _rgb(light.sky_on_floor),
-            "again": _rgb(light.interreflection),
+            "sky_on_floor": rgb(sky_on_floor),
+            "again": rgb(interreflection),
             "glow_depth": self._deepest,
             "turn": TURN,
             "rate": float(np.min(world.c)),
@@ -156,7 +127,12 @@ class SeaPasses:
         source = "".join((*map(read_text, ("common", "near_zero")), *map(_text, SOURCES)))
         return Pass("view", reads, VIEW, source, given)
 
-    def _irradiance(self, kind: str) -> SeaIrradiance:
+    def _irradiance(self, kind: str) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Return light of red, green and blue, each (3,).
+
+        Of sun and sky, as they come in per horizontal area; share of the sky's that comes to the floor; irradiance of
+        the floor by its own light, which the surface mirrors; mean radiant exitance of the floor.
+        """
         world = self.world
         entered, sky = np.array(world.sun) * self._floor.entered, np.array(world.sky) * world.diffuse_in
         inside, weight = window(world)
@@ -164,15 +140,15 @@ class SeaPasses:
         from_sun = np.exp(-optical(world, kind, np.array(world.depth * world.slant))[2])
         first, back = entered * from_sun + sky * on_floor, np.array(world.reflectance) * mirrored(world, kind)
         more = first * back / (1.0 - back)
-        return SeaIrradiance(entered, sky, on_floor, more, (first + more) * np.array(world.reflectance))
+        return entered, sky, on_floor, more, (first + more) * np.array(world.reflectance)
 
     def _of_kind(self, kind: str) -> tuple[Singles, Singles, Singles]:
         """Return tables of what the water leaves, of the blur of the floor's light, and of what sky and floor add."""
         if kind not in self._tables:
-            world, light = self.world, self._irradiance(kind)
+            world, (_, sky, _, _, exitance) = self.world, self._irradiance(kind)
             lengths, depths = np.linspace(0.0, self.reach, FADING), np.linspace(0.0, self._deepest, DEPTHS)
             fade = fade_table(world.c, world.omega, world.shaft, world.lobes, kind, lengths)
-            self._tables[kind] = fade, self._blur(kind), glow(world, kind, depths, light.sky, light.exitance)
+            self._tables[kind] = fade, self._blur(kind), glow(world, kind, depths, sky, exitance)
         return self._tables[kind]
 
     def _blur(self, kind: str) -> Singles:
@@ -266,11 +242,6 @@ def _four(array: NDArray) -> NDArray[np.float32]:
     found = np.zeros((*array.shape[:2], 4), np.float32)
     found[..., : array.shape[2]] = array
     return found
-
-
-def _rgb(values: Floats) -> tuple[float, float, float]:
-    x, y, z = np.asarray(values, float).tolist()
-    return x, y, z
 
 
 def _text(file: str) -> str:

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
-from profilefit.scenes.sea.hits import first_hit
 from profilefit.scenes.sea.truth import Photons, boxes
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves, refracted
+from profilefit.scenes.sea.waves import Waves, first_hit, newton_hit, refracted
 
 Floats = NDArray[np.float64]
 LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile
@@ -80,14 +79,12 @@ class Sunlight:
 
 
 class Event(NamedTuple):
-    """Event of paths.
+    """Event of n paths.
 
-    Attributes:
-        seen: (n, 3) radiance that comes in at the event.
-        kept: (n or 1, 3 or 1) share of the path's light that goes on [-].
-        turned: (n,) density of the turn that light would take, over the density that the turn was drawn from [-].
-        place: (n, 3) start of the path's next part.
-        way: (n, 3) direction of the path's next part.
+    seen    (n, 3) radiance that comes in at the event
+    kept    (n or 1, 3 or 1) share of the path's light that goes on [-]
+    turned  (n,) density of the turn that light would take, over that which the turn was drawn from [-]
+    place, way  (n, 3) start and direction of the path's next part
     """
 
     seen: Floats
@@ -171,20 +168,15 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
 
 def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
     """Return what is scattered in the water: sunlight that turns into the path, and where it goes on backward."""
-    seen, sunward = _sunlit(world, light, place, way)
+    flux, beam = light.at(*place.T)
+    turned, sunward = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0), -beam
+    seen = (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam)
     new = _turned(world.phase, way, rng)
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
     new[sunny] = _turned(light.around, sunward[sunny], rng)
     straight, aside = _density(world.phase, way, new), _density(light.around, sunward, new)
     factor = straight / ((1.0 - SUNWARD) * straight + SUNWARD * aside)
     return Event(seen, np.ones((1, 3)), factor, place, new)
-
-
-def _sunlit(world: World, light: Sunlight, place: Floats, way: Floats) -> tuple[Floats, Floats]:
-    """Return sunlight (n, 3) that is scattered into a ray, which `way` follows backward; and the way to the sun."""
-    flux, beam = light.at(*place.T)
-    turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
-    return (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam), -beam
 
 
 def _come(world: World, place: Floats, beam: Floats) -> Floats:
@@ -245,12 +237,7 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
         return found
     steep = surface.steepest * np.hypot(way[:, 0], way[:, 1]) > ONCE * np.abs(way[:, 2])
     once, often = np.flatnonzero(~steep), np.flatnonzero(steep)
-    k, start, along = found[once], place[once], way[once]
-    for _ in range(NEWTON):
-        x, y, z = (start + k[:, None] * along).T
-        slope = surface.slope(x, y)
-        gap, rate = z - surface.height(x, y), along[:, 2] - slope[0] * along[:, 0] - slope[1] * along[:, 1]
-        k = k - gap / rate
+    k = newton_hit(surface.height, surface.slope, place[once], way[once], found[once], NEWTON)
     found[once] = np.maximum(k, 0.0)
     if len(often):
         flip = np.array([1.0, 1.0, -rises])

@@ -4,216 +4,225 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
-from mcml_sim.media.checks import is_number
 from mcml_sim.media.phase import Mixture
-from profilefit.errors import InputError
+from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, words
 from profilefit.recipes.kinds import phase
-from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.sea.caustics import Splat, focus, splat_for
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.passes import SeaPasses, axes
 from profilefit.scenes.sea.paths import Sunlight, traced
 from profilefit.scenes.sea.water import World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
-from profilefit.scenes.stage import request
 from profilefit.scenes.stage.judge import TURNS, Judge
 from profilefit.scenes.stage.picture import ChartPoint, RenderResult
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import Defaults, ViewRequest
-from profilefit.scenes.stage.world import Camera, Light, Rgb
+from profilefit.scenes.stage.request import (
+    Direction,
+    Irradiances,
+    LightTable,
+    Resolution,
+    ResolutionTable,
+    Samples,
+    TechniqueTable,
+    ViewRequest,
+)
+from profilefit.scenes.stage.world import Camera
 
 Floats = NDArray[np.float64]
-TABLES = {
-    "": ("title", "scene", "unit", "water", "sea", "floor", "technique", "camera", "light"),
-    "water": ("a", "b", "phase", "n", "source"),
-    "sea": ("slope", "tile", "wind", "seed"),
-    "floor": ("depth", "slope", "reflectance", "seed"),
-    "technique": (
-        "kind",
-        "splat",
-        *request.TABLES["technique"],
-        "vertices",
-        "texels",
-        "slices",
-        "steps",
-        "supersampling",
-    ),
-    "camera": ("resolution", "eye", "target", "angle"),
-    "light": request.TABLES["light"],
-}
 PHASE = "petzold"
 FORM = "3-terms"  # of its record: four are nearer, and cost a third more
 INDEX = 1.34
-SLOPE, TILE, SEA_SEED = 0.12, 5.0, 4
-DEPTH, FLOOR_SLOPE, FLOOR_SEED, REFLECTANCE = 4.0, 0.08, 2, (0.42, 0.38, 0.30)
 AUTO = "auto"
 SPLATS = {"points": Splat.POINTS, "wireframe": Splat.WIREFRAME_ENERGY, "faces": Splat.FACES, "cells": Splat.CELLS}
-# Of whole numbers in [technique]: least, most, and what is taken if a file says nothing.
-RANGES = {
-    "vertices": (2, 1024, 128),
-    "texels": (2, 1024, 256),
-    "slices": (2, 32, 6),
-    "steps": (1, 64, 16),
-    "supersampling": (1, 8, 2),
-}
 MOST_ROWS = 16384  # of a column of maps
-EYE, TARGET, ANGLE = (6.0, 2.5, -2.2), (0.0, 2.5, -2.4), 1.1
 WIDEST = 2.5  # [rad]
-DEFAULTS = Defaults(
-    samples=12,
-    size=(128, 96),
-    light=Light((-0.5, 0.0, 0.9), (3.0, 2.9, 2.7)),
-    ambient=(0.25, 0.32, 0.42),
-    limit="whose truth is traced",
-)
 LARGEST = 1000.0  # length [m]
 MOST_WATER = 100.0  # a coefficient [1/m]
 PATHS, MOST_PATHS = 2_000_000, 1024  # of a reference, and of one of its pixels
 WHITE = 0.99  # share of the reference that a picture does not clip
 
 
-@dataclass(frozen=True)
-class SeaRequest(ViewRequest):
-    """Picture of a sea that a file requests; lengths are metres, and z is up.
+Coefficient = Annotated[float, Field(ge=0.0, le=MOST_WATER)]
+Coefficients = Annotated[
+    tuple[Coefficient, Coefficient, Coefficient], LISTED, words(f"three numbers in 0 ... {MOST_WATER:g} [1/m]")
+]
+Slope = Annotated[float, Field(ge=0.0, le=2.0)]
+Length = Annotated[float, Field(gt=0.0, le=LARGEST)]
+Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], LISTED]
+Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
+Side = Annotated[int, Field(ge=2, le=1024)]
+WINDS = "two speeds in -100 ... 100 [m/s], not both 0"
 
-    a, b     absorption and scattering of red, green and blue [1/m];  lobes  (weight, g) of the phase function's terms
-    n        refractive index;  sea, floor  surfaces, each by (slope, seed), tile and depth [m], wind [m/s]
-    kind     of the technique;  splat  by its name, or `AUTO`;  vertices, texels  of a side of maps of light
-    slices   maps in depths;  steps  of a search for a hit;  supersampling  views of a pixel along a side, averaged
+
+class WaterTable(Declared):
+    """Table [water]: absorption `a` and scattering `b` of red, green and blue, refractive index, phase function.
+
+    phase  a fitted one by its name, or pairs [weight, g] of Henyey and Greenstein's terms
     """
 
-    a: Rgb
-    b: Rgb
-    lobes: tuple[tuple[float, float], ...]
-    n: float
-    tile: float
-    slope: float
-    wind: tuple[float, float]
-    sea_seed: int
-    depth: float
-    floor_slope: float
-    floor_seed: int
-    reflectance: Rgb
-    kind: str
-    splat: str
-    vertices: int
-    texels: int
-    slices: int
-    steps: int
-    supersampling: int
+    a: Coefficients
+    b: Coefficients
+    phase: Annotated[
+        str | Annotated[list[Any], LISTED], words("the name of a phase function, or pairs [weight, g]")
+    ] = PHASE
+    n: Annotated[float, Field(gt=0.0, le=2.0)] = INDEX
+    source: Annotated[Text, words("a text that says where a and b are from")]
+
+    @cached_property
+    def lobes(self) -> tuple[tuple[float, float], ...]:
+        """Weight and g of the phase function's terms."""
+        if isinstance(self.phase, str):
+            return lobes_of(self.phase)
+        checked_lobes(self.phase)
+        return tuple((float(weight), float(g)) for weight, g in self.phase)
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        _ = self.lobes
+        return self
+
+
+class SeaTable(Declared):
+    """Table [sea]: root mean square slope [-], side of the tile [m], wind [m/s]."""
+
+    slope: Slope = 0.12
+    tile: Length = 5.0
+    wind: Annotated[tuple[Speed, Speed], LISTED, words(WINDS)] = (WIND, 0.0)
+    seed: Seed = 4
+
+    @model_validator(mode="after")
+    def _blows(self) -> Self:
+        if not any(self.wind):
+            raise Refused(WINDS, list(self.wind), "wind")
+        return self
+
+
+class FloorTable(Declared):
+    """Table [floor]: mean depth [m], root mean square slope [-], reflectance of red, green and blue [-]."""
+
+    depth: Length = 4.0
+    slope: Slope = 0.08
+    reflectance: Shares = (0.42, 0.38, 0.30)
+    seed: Seed = 2
+
+
+class SeaTechnique(TechniqueTable):
+    """Table [technique]: kind;  splat  of the maps of light, by its name;  vertices, texels  of a side of these.
+
+    slices  maps in depths;  steps  of a search for a hit;  supersampling  views of a pixel along a side, averaged
+    """
+
+    kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
+    splat: Annotated[str, OneOf(AUTO, *SPLATS)] = AUTO
+    samples: Samples = 12
+    vertices: Side = 128
+    texels: Side = 256
+    slices: Annotated[int, Field(ge=2, le=32)] = 6
+    steps: Annotated[int, Field(ge=1, le=64)] = 16
+    supersampling: Annotated[int, Field(ge=1, le=8)] = 2
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.texels * self.slices > MOST_ROWS:
+            raise Refused(f"so many that texels times slices is {MOST_ROWS} at most", self.slices, "slices")
+        return self
+
+
+class SeaCamera(ResolutionTable):
+    """Table [camera]: eye and target [m];  angle  the picture's height [rad]."""
+
+    limit: ClassVar[str] = "whose truth is traced"
+    resolution: Resolution = (128, 96)
+    eye: Point = (6.0, 2.5, -2.2)
+    target: Point = (0.0, 2.5, -2.4)
+    angle: Annotated[
+        float, Field(gt=0.0, le=WIDEST), words(f"the picture's height as an angle in 0 ... {WIDEST:g} radians")
+    ] = 1.1
+
+    @model_validator(mode="after")
+    def _aslant(self) -> Self:
+        x, y, z = np.subtract(self.target, self.eye)
+        if not np.hypot(x, y) > 1e-3 * abs(z):
+            raise Refused("a point that is not straight above or below the eye", list(self.target), "target")
+        return self
+
+
+class SeaLight(LightTable):
+    """Table [light]: direction toward the sun."""
+
+    direction: Direction = (-0.5, 0.0, 0.9)
+    irradiance: Irradiances = (3.0, 2.9, 2.7)
+    ambient: Irradiances = (0.25, 0.32, 0.42)
+
+    @model_validator(mode="after")
+    def _along(self) -> Self:
+        x, y, z = self.direction
+        if not (x <= 0 and y == 0 and z > 0):
+            accepted = "toward the sun, [x <= 0, 0, z > 0]: its light goes toward +x"
+            raise Refused(accepted, list(self.direction), "direction")
+        return self
+
+
+class SeaRequest(ViewRequest):
+    """Picture of a sea that a file requests; lengths are metres, and z is up."""
+
+    scene: Annotated[str, OneOf("sea")] = "sea"
+    unit: Text = "m"
+    water: WaterTable
+    sea: SeaTable = SeaTable()
+    floor: FloorTable = FloorTable()
+    technique: SeaTechnique = SeaTechnique()
+    camera_table: SeaCamera = Field(SeaCamera(), alias="camera")  # type: ignore[assignment]
+    light_table: SeaLight = Field(SeaLight(), alias="light")
+
+    @property
+    def camera(self) -> Camera:
+        """Lens and place."""
+        eye, target = self.camera_table.eye, self.camera_table.target
+        away = np.linalg.norm(np.subtract(target, eye))
+        return Camera(eye, target, float(2.0 * np.tan(0.5 * self.camera_table.angle) * away))
 
     @property
     def world(self) -> World:
         """World that it is a picture of."""
-        level = -float(self.depth)
-        sea, bed = Waves(self.tile), Waves(self.tile, mean=level)
-        if self.slope:
-            sea = random_sea(self.slope, self.tile, self.sea_seed, wind=self.wind)
-        if self.floor_slope:
-            bed = random_floor(self.floor_slope, self.tile, self.depth, self.floor_seed)
+        water, sea, floor = self.water, self.sea, self.floor
+        waves, bed = Waves(sea.tile), Waves(sea.tile, mean=-float(floor.depth))
+        if sea.slope:
+            waves = random_sea(sea.slope, sea.tile, sea.seed, wind=sea.wind)
+        if floor.slope:
+            bed = random_floor(floor.slope, sea.tile, floor.depth, floor.seed)
         x, _, z = self.light.direction
-        return World(
-            self.a,
-            self.b,
-            self.lobes,
-            self.n,
-            sea,
-            bed,
-            self.reflectance,
-            float(np.arctan2(-x, z)),
-            self.light.irradiance,
-            self.ambient,
-        )
+        tilt = float(np.arctan2(-x, z))
+        sun, sky = self.light.irradiance, self.ambient
+        return World(water.a, water.b, water.lobes, water.n, waves, bed, floor.reflectance, tilt, sun, sky)
 
     @property
     def splats(self) -> tuple[Splat, Splat]:
         """Splats of the floor's map, and of those in depths."""
-        if self.splat != AUTO:
-            return (SPLATS[self.splat],) * 2
+        if self.technique.splat != AUTO:
+            return (SPLATS[self.technique.splat],) * 2
         world = self.world
-        f = focus(world.sea, world.depth, world.n, world.tilt)
-        return (splat_for(f),) * 2
+        return (splat_for(focus(world.sea, world.depth, world.n, world.tilt)),) * 2
+
+    @model_validator(mode="after")
+    def _in_water(self) -> Self:
+        world, z = self.world, self.camera.eye[2]
+        if not world.floor.highest < z < world.sea.lowest:
+            accepted = f"in the water, with z in {world.floor.highest:.3g} ... {world.sea.lowest:.3g} m"
+            raise Refused(accepted, list(self.camera.eye), "camera", "eye")
+        return self
 
 
-def read(file: str, content: Table) -> SeaRequest:
-    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    for key in ("title", "unit"):
-        tables.text("", key, content, "m")
-    water, sea, floor, named = (tables.table(content, name, {}) for name in list(TABLES)[1:5])
-    for key in ("a", "b"):
-        if key not in water:
-            raise tables.bad("water", key, f"three numbers in 0 ... {MOST_WATER:g} [1/m]", None)
-    if "source" not in water:
-        raise tables.bad("water", "source", "a text that says where a and b are from", None)
-    tables.text("water", "source", water)
-    numbers: dict[str, Any] = {
-        key: tables.whole("technique", key, named, default, least, most)
-        for key, (least, most, default) in RANGES.items()
-    }
-    found = SeaRequest(
-        **request.view(tables, content, _camera, DEFAULTS, _toward),
-        **numbers,
-        a=tables.three("water", "a", water, (0.0,) * 3, 0.0, MOST_WATER),
-        b=tables.three("water", "b", water, (0.0,) * 3, 0.0, MOST_WATER),
-        lobes=_lobes(tables, water),
-        n=tables.number("water", "n", water, INDEX, 2.0),
-        tile=tables.number("sea", "tile", sea, TILE, LARGEST),
-        slope=_slope(tables, "sea", sea, SLOPE),
-        wind=_wind(tables, sea),
-        sea_seed=tables.whole("sea", "seed", sea, SEA_SEED, 0, 2**31),
-        depth=tables.number("floor", "depth", floor, DEPTH, LARGEST),
-        floor_slope=_slope(tables, "floor", floor, FLOOR_SLOPE),
-        floor_seed=tables.whole("floor", "seed", floor, FLOOR_SEED, 0, 2**31),
-        reflectance=tables.three("floor", "reflectance", floor, REFLECTANCE, 0.0, 1.0),
-        kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
-        splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
-    )
-    if found.texels * found.slices > MOST_ROWS:
-        accepted = f"so many that texels times slices is {MOST_ROWS} at most"
-        raise tables.bad("technique", "slices", accepted, found.slices)
-    try:
-        world = found.world
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
-    _require_sight(tables, found, world)
-    return found
-
-
-def _camera(tables: Tables, seen: Table) -> Camera:
-    eye = tables.three("camera", "eye", seen, EYE, -LARGEST, LARGEST)
-    target = tables.three("camera", "target", seen, TARGET, -LARGEST, LARGEST)
-    if not np.hypot(*np.subtract(target, eye)[:2]) > 1e-3 * abs(target[2] - eye[2]):
-        raise tables.bad("camera", "target", "a point that is not straight above or below the eye", list(target))
-    angle = tables.number("camera", "angle", seen, ANGLE)
-    if angle > WIDEST:
-        raise tables.bad("camera", "angle", f"the picture's height as an angle in 0 ... {WIDEST:g} radians", angle)
-    return Camera(eye, target, float(2.0 * np.tan(0.5 * angle) * np.linalg.norm(np.subtract(target, eye))))
-
-
-def _toward(tables: Tables, lit: Table, default: Rgb) -> Rgb:
-    direction = tables.three("light", "direction", lit, default, -1e6, 1e6)
-    x, y, z = direction
-    if not (x <= 0 and y == 0 and z > 0):
-        accepted = "toward the sun, [x <= 0, 0, z > 0]: its light goes toward +x"
-        raise tables.bad("light", "direction", accepted, list(direction))
-    return direction
-
-
-def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
-    named: Any = water.get("phase", PHASE)
-    if isinstance(named, str):
-        return tables.build("water", lambda: lobes_of(named))
-    tables.build("water", lambda: checked_lobes(named))
-    return tuple((float(weight), float(g)) for weight, g in named)
+read = SeaRequest.of
 
 
 def lobes_of(name: str) -> tuple[tuple[float, float], ...]:
@@ -221,28 +230,6 @@ def lobes_of(name: str) -> tuple[tuple[float, float], ...]:
     found = phase.named(name).phase(FORM)
     assert isinstance(found, Mixture)
     return tuple((float(w), float(one.mean_cosine)) for w, one in zip(found.weights, found.phases, strict=True))
-
-
-def _slope(tables: Tables, where: str, table: Table, default: float) -> float:
-    """Return the root mean square of a slope, 0 of a level surface."""
-    value = table.get("slope", default)
-    return 0.0 if value == 0 else tables.number(where, "slope", table, default, 2.0)
-
-
-def _wind(tables: Tables, sea: Table) -> tuple[float, float]:
-    value = sea.get("wind", [WIND, 0.0])
-    numbers = value if isinstance(value, list) else []
-    if len(numbers) != 2 or not all(is_number(one) and abs(one) <= 100 for one in numbers) or not any(numbers):
-        raise tables.bad("sea", "wind", "two speeds in -100 ... 100 [m/s], not both 0", value)
-    return float(numbers[0]), float(numbers[1])
-
-
-def _require_sight(tables: Tables, of: SeaRequest, world: World) -> None:
-    z = of.camera.eye[2]
-    if not world.floor.highest < z < world.sea.lowest:
-        accepted = f"in the water, with z in {world.floor.highest:.3g} ... {world.sea.lowest:.3g} m"
-        raise tables.bad("camera", "eye", accepted, list(of.camera.eye))
-    of.require_light()
 
 
 class SeaRender(NamedTuple):
@@ -254,7 +241,7 @@ class SeaRender(NamedTuple):
 
     def picture(self, kind: str, samples: int) -> Floats:
         """Return the radiance (h, w, 3) of pixels by a technique."""
-        (columns, rows), fine = self.request.size, self.request.supersampling
+        (columns, rows), fine = self.request.size, self.request.technique.supersampling
         views = self.passes.renderer.image(self._view(kind, samples))[..., :3].astype(float)
         return views.reshape(rows, fine, columns, fine, 3).mean(axis=(1, 3))
 
@@ -272,16 +259,16 @@ class SeaRender(NamedTuple):
         return self.judge.points(kind, numbers, draw, time, turns)
 
     def _view(self, kind: str, samples: int) -> Pass:
-        of, fine = self.request, self.request.supersampling
-        return self.passes.view(of.camera, (of.size[0] * fine, of.size[1] * fine), kind, samples, of.steps)
+        of, fine = self.request, self.request.technique.supersampling
+        return self.passes.view(of.camera, (of.size[0] * fine, of.size[1] * fine), kind, samples, of.technique.steps)
 
 
 @contextmanager
 def reference_render(context: moderngl.Context, of: SeaRequest, paths: int = PATHS) -> Iterator[SeaRender]:
     """Open the passes and the reference image of a request; paths  of the reference, all pixels together."""
-    world = of.world
+    world, named = of.world, of.technique
     with Renderer(context, of.size) as renderer:
-        passes = SeaPasses(renderer, world, of.splats, of.vertices, of.texels, of.slices)
+        passes = SeaPasses(renderer, world, of.splats, named.vertices, named.texels, named.slices)
         drawn = SeaRender(of, passes, Judge.of_halves(halves_of(of, world, paths), WHITE))
         drawn.light()
         yield drawn
@@ -303,10 +290,10 @@ def halves_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -
 def draw(context: moderngl.Context, of: SeaRequest) -> RenderResult:
     """Draw the picture beside its reference, with error and cost: a minute."""
     with reference_render(context, of) as drawn:
-        chart, samples = drawn.points(of.kind, of.numbers), of.sampling.samples
+        chart, samples = drawn.points(of.technique.kind, of.numbers), of.sampling.samples
         view = next(point.milliseconds for point in chart if point.samples == samples)
         maps = [drawn.light() for _ in range(TURNS)]
         passes = {**{name: tuple(one[name] for one in maps) for name in maps[0]}, "view": view}
         frame = tuple(map(sum, zip(*passes.values(), strict=True)))
-        picture = drawn.picture(of.kind, samples)
+        picture = drawn.picture(of.technique.kind, samples)
         return drawn.judge.result(picture, chart, samples, frame, of="light", passes=passes)

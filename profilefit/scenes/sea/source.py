@@ -40,7 +40,15 @@ BLUR_NAMES = (
 def source(subject: str, lang: str = "glsl", name: str | None = None) -> str:
     """Return the whole file of the segment, or of the blur of a SEA.toml, in one of `law_file.LANGUAGES`."""
     if not subject.endswith(".toml"):
-        return export_segment(lang, name)
+        require_language(lang, name)
+        title = "what a beam of sun brings to a segment of a view ray in water, and that to the eye, per scattering"
+        if lang == "json":
+            equations = "e^{-c (s0 + t0)} t1 phi(c (1 + m) t1), phi(x) = (1 - e^-x) / x"
+            about = {"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)}
+            return json_file(about)
+        start = name or SEGMENT
+        head = [title, *function_lines(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
+        return text_file(head, lang, segment_text(TRANSLATED.get(lang, lang), start))
     content = read_toml(Path(subject))
     if (scene := content.get("scene")) != "sea":
         raise InputError(f"{subject}: scene must be sea, whose water has a text, got {scene!r}")
@@ -77,18 +85,6 @@ def blur_text(blurs: Sequence[WaterGaussians], c: Sequence[float], lang: str = "
             constants |= {f"{channel}_{key}{i}": value for i, value in enumerate(one[key], start=1)}
     parts = [emit.read_text(part) for part in ("common", "channel", "sea_blur")]
     return emit.filled(parts, name, constants, blurs[0].weights.size, lang, {})
-
-
-def export_segment(lang: str = "glsl", name: str | None = None) -> str:
-    """Return the whole file of the segment in one of `law_file.LANGUAGES`; arguments as of `segment_text`."""
-    require_language(lang, name)
-    title = "what a beam of sun brings to a segment of a view ray in water, and that to the eye, per scattering"
-    if lang == "json":
-        equations = "e^{-c (s0 + t0)} t1 phi(c (1 + m) t1), phi(x) = (1 - e^-x) / x"
-        return json_file({"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)})
-    start = name or SEGMENT
-    head = [title, *function_lines(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
-    return text_file(head, lang, segment_text(TRANSLATED.get(lang, lang), start))
 
 
 def export_blur(

@@ -15,19 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import STILL, SUN, Waves, checked_sun, refracted
+from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
 Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
 PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
 MOST_SAMPLES = 2**23
 HALVINGS = 60  # of a bracket, until its ends are neighbours in floating point
-SUNS = 32  # directions within the sun's disc, in the plane of the waves
 # Central differences of eighth order (Fornberg, Mathematics of Computation 51, 1988, table 1).
 FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
-# Gauss's points and weights on [0, 1], of the flux between two samples.
-GAUSS = [(0.5 * (1.0 + point), 0.5 * weight) for point, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)]
 BRIGHT, DARK = 2.0, 0.6  # of the mean
 FEW, EXTREME = 0.01, 0.05  # shares of pixels: where fewer are bright, or dark, so many of the extremest count as that
 
@@ -54,8 +52,9 @@ def caustic_irradiance(
     The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
     Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
     """
-    rays = _Rays(surface, _finite("x", x), depth, tilt, n, slope, curvature, spacing)
-    where = np.asarray(x, float)
+    where = checked_numbers("x", x, "finite numbers [m]")
+    require("x", where, np.isfinite(where), "finite numbers [m]")
+    rays = Rays(surface, where, depth, tilt, n, slope, curvature, spacing)
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -64,41 +63,11 @@ def caustic_irradiance(
     return float(found) if found.ndim == 0 else found
 
 
-def caustic_boxes(
-    surface: Surface,
-    edges: ArrayLike,
-    depth: float,
-    tilt: float,
-    n: float,
-    *,
-    sun: float = 0.0,
-    slope: Surface | None = None,
-    curvature: Surface | None = None,
-    spacing: float | None = None,
-) -> Floats:
-    """Return that irradiance (m,) [-] averaged over pixels between edges (m + 1,); others as of `caustic_irradiance`.
+class Rays:
+    """Rays that a surface sends to a floor, between the places from where they can come to these x.
 
-    sun  half-width of its even disc in air, `SUN` of the real one [rad]: averaged over 32 directions of it in the
-         plane of the waves, weighted by the disc's chords (Chebyshev's points of the second kind)
-
-    Exact: the flux between two edges is that between the places whose rays come to them, so folds need no care.
+    aside  of the sun from `tilt` [rad], which may leave its range
     """
-    border = _finite("edges", edges)
-    if border.ndim != 1 or border.size < 2 or not np.all(np.diff(border) > 0):
-        raise InputError(f"edges must be two numbers or more, each above the one before [m], got {shown(edges)}")
-    if not is_number(sun) or not 0.0 <= sun < 0.1:
-        raise InputError(f"sun must be a half-width in radians, in [0, 0.1), got {shown(sun)}")
-    angles = np.pi * np.arange(1, SUNS + 1) / (SUNS + 1)
-    offsets, weights = (np.cos(angles), np.sin(angles) ** 2) if sun else (np.zeros(1), np.ones(1))
-    found = np.zeros(border.size - 1)
-    for offset, weight in zip(offsets.tolist(), (weights / weights.sum()).tolist(), strict=True):
-        rays = _Rays(surface, border, depth, tilt, n, slope, curvature, spacing, sun * offset)
-        found += weight * np.diff(rays.flux_before(border)) / np.diff(border)
-    return found
-
-
-class _Rays:
-    """Rays that a surface sends to a floor, between the places from where they can come to these x."""
 
     def __init__(
         self,
@@ -107,9 +76,9 @@ class _Rays:
         depth: float,
         tilt: float,
         n: float,
-        slope: Surface | None,
-        curvature: Surface | None,
-        spacing: float | None,
+        slope: Surface | None = None,
+        curvature: Surface | None = None,
+        spacing: float | None = None,
         aside: float = 0.0,
     ):
         self.depth, self.tilt, self.n = checked_sun(depth, tilt, n)
@@ -139,8 +108,6 @@ class _Rays:
         self.nodes = self._with_folds(nodes, stretch)
         self.landing = self.at(self.nodes)[0]
         self._before = np.maximum.accumulate(self._across(self.nodes))
-        through = self._through(self.nodes[:-1], self.nodes[1:])
-        self._cumulated = np.concatenate([[0.0], np.cumsum(through)])
 
     def at(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return where rays of places on the surface land [m], dX/dx [-], and flux per horizontal area [-]."""
@@ -188,29 +155,10 @@ class _Rays:
                     break
         return target, place, rises
 
-    def flux_before(self, x: Floats) -> Floats:
-        """Return flux that lands below each x, but for one constant [m]."""
-        target, place, rises = self.arrivals(x)
-        signed = np.where(rises, 1.0, -1.0) * self._sent(place)
-        return np.bincount(target, signed, x.size).astype(float)
-
     def is_lit(self, x: Floats) -> NDArray[np.bool_]:
         """Return whether no crest is in the way: the place is farther across the rays than all before it."""
         cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 1)
         return self._across(x) >= self._before[cell]
-
-    def _sent(self, x: Floats) -> Floats:
-        """Return flux through the surface from the first sample to x, what crests shade taken off [m]."""
-        cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 2)
-        return self._cumulated[cell] + self._through(self.nodes[cell], x)
-
-    def _through(self, near: Floats, far: Floats) -> Floats:
-        found = np.zeros_like(near)
-        for point, weight in GAUSS:
-            here = near + point * (far - near)
-            flux = self.at(here)[2]
-            found += weight * np.where(self.is_lit(here), flux, 0.0)
-        return found * (far - near)
 
     def _across(self, x: Floats) -> Floats:
         """Return the distance across the rays [m], the same all along one."""
@@ -252,13 +200,6 @@ class _Rays:
         return z, zx, zxx
 
 
-def _finite(name: str, value: ArrayLike) -> Floats:
-    array = checked_numbers(name, value, "finite numbers [m]")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be finite numbers [m], got {array[~np.isfinite(array)].flat[0]:g}")
-    return array
-
-
 class MapError(NamedTuple):
     """Errors of a map [-]: rms; of the light where it is bright and dark, relative; energy, its mean less 1."""
 
@@ -295,32 +236,26 @@ class Photons(NamedTuple):
     flux: Floats
 
 
-def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: float, azimuth: float = 0.0) -> Photons:
+def photons(waves: Waves, x: Floats, y: Floats, depth: float, tilt: float, n: float) -> Photons:
     """Return rays through all pairs of x (columns,) and y (rows,) to the level floor at -depth [m].
 
-    azimuth  turns the sun about the vertical, from +x toward +y [rad]. Waves must not shade one another: InputError.
+    Waves must not shade one another: InputError.
     """
     deep, angle, index = checked_sun(depth, tilt, n)
     if waves.lowest <= -deep:
         raise InputError(f"depth must be below the deepest trough, {-waves.lowest:g} m, got {deep:g}")
     z, zx, zy = waves.lattice(x, y)
-    cosine, sine = np.cos(azimuth), np.sin(azimuth)
-    along, aside, flux = refracted(angle, (cosine * zx + sine * zy, cosine * zy - sine * zx), index)
+    along, aside, flux = refracted(angle, (zx, zy), index)
     if np.any(flux == 0.0):
         raise InputError(f"tilt must be one at which no wave faces away from the sun, got {angle:g} radians")
     down = deep + z
-    return Photons(
-        x + down * (cosine * along - sine * aside), y[:, None] + down * (sine * along + cosine * aside), flux
-    )
+    return Photons(x + down * along, y[:, None] + down * aside, flux)
 
 
-def caustic_photons(
-    waves: Waves, depth: float, tilt: float, n: float, pixels: int, side: int = 2048, suns: int = 1, sun: float = SUN
-) -> Floats:
+def caustic_photons(waves: Waves, depth: float, tilt: float, n: float, pixels: int, side: int = 2048) -> Floats:
     """Return the irradiance of a tile of a level floor, averaged over pixels: (pixels, pixels), row 0 at y = 0 [-].
 
-    side  photons along the tile, a multiple of pixels;  suns  directions of the sun's disc, 1 of a point sun
-    sun   half-width of the disc in air [rad]
+    side  photons along the tile, a multiple of pixels;  of a point sun
 
     Photons stand on a lattice, in the middle of its cells. Each is spread over the box that has the mean and the
     variances of its cell on the floor, so that its light comes to four pixels at most; light that leaves the tile
@@ -328,17 +263,15 @@ def caustic_photons(
     """
     columns = checked_whole("pixels", pixels, 1, 8192)
     fine = checked_whole("side", side, columns, 16384)
-    count = checked_whole("suns", suns, 1, 4096)
     if fine % columns:
         raise InputError(f"side must be a multiple of pixels = {columns}, got {fine}")
     step, rows = waves.tile / fine, max(1, 2**21 // fine)
     found = np.zeros(columns * columns)
     x = np.asarray((np.arange(-1, fine + 1) + 0.5) * step, np.float64)
-    for angle, azimuth in _disc(tilt, count, sun):
-        for first in range(0, fine, rows):
-            sent = photons(waves, x, x[first : min(first + rows, fine) + 2], depth, angle, n, azimuth)
-            found += _spread(sent, columns, columns / waves.tile)
-    return found.reshape(columns, columns) * (columns / fine) ** 2 / count
+    for first in range(0, fine, rows):
+        sent = photons(waves, x, x[first : min(first + rows, fine) + 2], depth, tilt, n)
+        found += _spread(sent, columns, columns / waves.tile)
+    return found.reshape(columns, columns) * (columns / fine) ** 2
 
 
 def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np.int64], Floats]]:
@@ -368,14 +301,3 @@ def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
     for at, share in boxes(sent, pixels, scale):
         found += np.bincount(at, flux * share, pixels * pixels)
     return found
-
-
-def _disc(tilt: float, count: int, half_width: float) -> list[tuple[float, float]]:
-    """Return tilt and azimuth of directions that fill a disc about the sun evenly: Vogel's spiral."""
-    if count == 1:
-        return [(tilt, 0.0)]
-    radius = half_width * np.sqrt((np.arange(count) + 0.5) / count)
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
-    along, across = radius * np.cos(turn), radius * np.sin(turn)
-    x, z = np.sin(tilt) + along * np.cos(tilt), np.cos(tilt) - along * np.sin(tilt)
-    return list(zip(np.arctan2(np.hypot(x, across), z).tolist(), np.arctan2(across, x).tolist(), strict=True))

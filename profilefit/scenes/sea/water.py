@@ -12,7 +12,7 @@ from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted
+from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 
 Floats = NDArray[np.float64]
 Rgb = tuple[float, float, float]
@@ -21,7 +21,7 @@ ROUNDING = 1e-6  # by which weights may miss a sum of 1
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Water, waves, floor and light; lengths in metres, z up, the sea's mean level at 0. InputError.
+    """Water, waves, floor and light; lengths in metres, z up, the sea's mean level at 0.
 
     a, b         absorption >= 0 and scattering >= 0 of red, green and blue [1/m], a + b > 0
     lobes        (weight, g) of Henyey and Greenstein's terms, weights that sum to 1
@@ -44,23 +44,12 @@ class World:
     sky: Rgb
 
     def __post_init__(self) -> None:
-        for name, most in (("a", np.inf), ("b", np.inf), ("reflectance", 1.0), ("sun", np.inf), ("sky", np.inf)):
-            accepted = f"three numbers >= 0{f' and <= {most:g}' if most < np.inf else ''}"
-            numbers = checked_numbers(name, getattr(self, name), accepted)
-            if numbers.shape != (3,) or not np.all((numbers >= 0) & (numbers <= most) & np.isfinite(numbers)):
-                raise InputError(f"{name} must be {accepted}, got {shown(getattr(self, name))}")
         if not np.all(self.c > 0):
             raise InputError(f"a + b must be > 0, got {shown(self.c.tolist())}")
-        checked_lobes(self.lobes)
         checked_sun(self.depth, self.tilt, self.n)
         if not self.n > 1:
             raise InputError(f"n must be a refractive index > 1, got {shown(self.n)}")
-        if self.floor.tile != self.sea.tile:
-            raise InputError(f"floor must have the sea's tile of {self.sea.tile:g} m, got {self.floor.tile:g}")
-        if self.floor.highest >= self.sea.lowest:
-            raise InputError(
-                f"floor must be below the sea's lowest trough, {self.sea.lowest:g} m, got {self.floor.highest:g}"
-            )
+        require_below(self.sea, self.floor)
 
     @property
     def c(self) -> Floats:

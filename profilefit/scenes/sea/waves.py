@@ -1,7 +1,13 @@
-"""Surfaces that are sums of cosines over a square tile: a sea, or an uneven floor below it."""
+"""Surfaces that are sums of cosines over a square tile, a sea or an uneven floor; and the first hit of a ray on one.
+
+Li, Wang, Li, Zhao, Wang and Liu (J. Image Graphics 16(8), 2011) find a hit by "about 3" Newton iterations from a
+distance of 1; Shah, Konttinen and Pattanaik (IEEE TVCG 13(2), 2007) by an iteration without slopes. Either holds while
+S = largest slope x tan(ray to the vertical) < 1: beyond, a ray may cross the floor more than once.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -11,15 +17,26 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
-from profilefit.recipes.toml_tables import LENGTHS
+from profilefit.recipes.declared import LENGTHS
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
-SUN = float(np.radians(0.5 * 0.533))  # half-width of the sun's disc in air [rad]
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for
 WHOLE = 1e-6  # a wave vector may be so far from the tile's lattice, in its steps
 STILL = np.zeros(0)
+Height = Callable[..., ArrayLike]  # of x and y [m], to z [m]
+Slope = Callable[..., tuple[ArrayLike, ArrayLike]]  # of x and y [m], to dz/dx and dz/dy [-]
+NEWTON = 3  # iterations after the steps, as many as the paper has
+MOST_STEPS = 1024
+UNIT = 1e-6  # a direction's length may be so far from 1: float32 is nearer
+SLACK = 1e-9  # of lengths: a bound that is met exactly is one in floating point, too
+SHORT = 1e-6  # a secant that stands for a slope, in the range of heights
+DENSE, BISECTIONS = 4096, 50  # of the reference
+# Rays whose hits are counted: a hit farther than OFF depths from the true one is wrong.
+OFF, TILT, DEPTH, SEA_SLOPE, INDEX = 0.01, float(np.radians(63.0)), 5.0, 0.15, 1.34
+PLAIN = ("newton", "newton_1m", "shah")  # from the mean plane, from 1 m (as published), and Shah's from the mean plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +62,7 @@ class Waves:
             raise InputError(f"mean must be a level [m], got {shown(self.mean)}")
         for name in ("amplitudes", "vectors", "phases"):
             array = checked_numbers(name, getattr(self, name), "finite numbers")
-            if not np.all(np.isfinite(array)):
-                raise InputError(f"{name} must be finite numbers, got {array[~np.isfinite(array)].flat[0]:g}")
+            require(name, array, np.isfinite(array), "finite numbers")
             object.__setattr__(self, name, array)
         count = self.amplitudes.size
         for name, accepted in (("amplitudes", (count,)), ("vectors", (count, 2)), ("phases", (count,))):
@@ -96,12 +112,6 @@ class Waves:
         """Return dz/dx and dz/dy [-]."""
         sines = -self.amplitudes * np.sin(self._angle(x, y))
         return sines @ self.vectors[:, 0], sines @ self.vectors[:, 1]
-
-    def curvature(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Return d2z/dx2, d2z/dxdy and d2z/dy2 [1/m]."""
-        kx, ky = self.vectors.T
-        cosines = -self.amplitudes * np.cos(self._angle(x, y))
-        return cosines @ (kx * kx), cosines @ (kx * ky), cosines @ (ky * ky)
 
     def lattice(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """Return z, dz/dx and dz/dy at all pairs of x (columns,) and y (rows,): three of (rows, columns)."""
@@ -212,6 +222,14 @@ def checked_sun(depth: object, tilt: object, n: object) -> tuple[float, float, f
     return float(depth), float(tilt), float(n)
 
 
+def require_below(sea: Waves, floor: Waves) -> None:
+    """Raise InputError where a floor has not the sea's tile, or is not below its lowest trough."""
+    if floor.tile != sea.tile:
+        raise InputError(f"floor must have the sea's tile of {sea.tile:g} m, got {floor.tile:g}")
+    if floor.highest >= sea.lowest:
+        raise InputError(f"floor must be below the sea's lowest trough, {sea.lowest:g} m, got {floor.highest:g}")
+
+
 def _lattice(tile: float, harmonics: int) -> Floats:
     """Return the wave vectors of up to so many waves a tile, one of each pair of opposite ones (n, 2) [1/m]."""
     whole = np.arange(-harmonics, harmonics + 1)
@@ -237,3 +255,242 @@ def _length(name: str, value: object) -> float:
     if not is_number(value) or not least <= value <= most:
         raise InputError(f"{name} must be a length in {least:g} ... {most:g} m, got {shown(value)}")
     return float(value)
+
+
+def first_hit(
+    height: Height,
+    origin: ArrayLike,
+    direction: ArrayLike,
+    lowest: float,
+    highest: float,
+    steps: int = 16,
+    slope: Slope | None = None,
+    newton: int = NEWTON,
+    precision: type[np.floating] = np.float64,
+) -> Floats | float:
+    """Return the distance along a ray to its first hit on z = height(x, y) from above [m]; nan where there is none.
+
+    origin, direction  (..., 3), z up; of unit length [m, -]
+    lowest, highest    between which the height stays [m]
+    steps              equal ones between the two planes; of them the first with a change of sign holds the hit
+    slope              by which Newton's iteration goes; without it, by short secants along the ray
+    newton             iterations; one that would leave the bracket halves it instead
+    precision          of the arithmetic; np.float32 is that of a shader
+
+    Of two crossings within one step the first is found if the rates at its ends show the dip between. A level ray
+    counts as one that never hits. InputError, too, for an origin below the floor.
+    """
+    where, along = (one.astype(precision) for one in _rays(origin, direction))
+    low, high = _bounds(lowest, highest)
+    number = checked_whole("steps", steps, 1, MOST_STEPS)
+    last = checked_whole("newton", newton, 0, MOST_STEPS)
+    below = -_gap(height, where, along, np.zeros_like(where[..., 2]))
+    if np.any(below > _slack(where) * (1.0 + np.abs(where[..., 2]))):
+        raise InputError(f"origin must not be below the floor, got one that is {np.nanmax(below):g} m below it")
+
+    def rate(k: Floats) -> Floats:
+        if slope is not None:
+            return _rate(slope, where, along, k)
+        return (_gap(height, where, along, k + short) - _gap(height, where, along, k)) / short
+
+    short = SHORT * ((high - low) or 1.0)
+    near, far = _bracket(height, where, along, low, high, number, rate)
+    found = _safeguarded(height, rate, where, along, near, far, last)
+    return float(found) if found.ndim == 0 else found
+
+
+def dense_hit(
+    height: Height, origin: ArrayLike, direction: ArrayLike, lowest: float, highest: float, steps: int = DENSE
+) -> Floats:
+    """Return the reference of `first_hit`: thousands of steps, and bisection to the last digit."""
+    where, along = _rays(origin, direction)
+    near, far = _bracket(height, where, along, *_bounds(lowest, highest), checked_whole("steps", steps, 1))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (near + far)
+        above = _gap(height, where, along, middle) >= 0
+        near, far = np.where(above, middle, near), np.where(above, far, middle)
+    return np.asarray(0.5 * (near + far))
+
+
+def to_plane(origin: ArrayLike, direction: ArrayLike, level: float) -> Floats:
+    """Return the distance along a ray to the plane z = level [m]; nan where the ray is level or goes away from it."""
+    where, along = _rays(origin, direction)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = (level - where[..., 2]) / along[..., 2]
+    return np.where((found >= 0) & np.isfinite(found), found, np.nan)
+
+
+def newton_hit(
+    height: Height, slope: Slope | None, origin: ArrayLike, direction: ArrayLike, start: ArrayLike, count: int = NEWTON
+) -> Floats:
+    """Return plain Newton iterations from a distance [m]: k - f / f', f' = r_z - grad H . r_xy; diverges if S >= 1.
+
+    Without a slope it is the iteration of Shah et al., as if the floor were level, which may diverge, too.
+    """
+    where, along = _rays(origin, direction)
+    k = np.asarray(start, float) + np.zeros(where.shape[:-1])
+    for _ in range(checked_whole("count", count, 0)):
+        k = k - _gap(height, where, along, k) / (along[..., 2] if slope is None else _rate(slope, where, along, k))
+    return k
+
+
+def wrong_shares(ways: Sequence[int | str], steepnesses: Sequence[float], rays: int = 3000) -> Floats:
+    """Return shares of rays whose hit is off by more than 1 % of the depth, of each way at each S: (ways, steepnesses).
+
+    ways         a number of steps before the safeguarded iterations, or one of `PLAIN`
+    steepnesses  S by the steepest place of the floor and the ray that a calm sea refracts [-]
+    """
+    for way in ways:
+        if isinstance(way, str) and way not in PLAIN:
+            raise InputError(f"ways must be numbers of steps or of {', '.join(PLAIN)}, got {way!r}")
+    tile = 2.0 * DEPTH
+    sea, floor = random_sea(SEA_SLOPE, tile, 0), random_floor(1.0, tile, DEPTH, 1)
+    place = np.random.default_rng(0).uniform(0.0, tile, (rays, 2))
+    x, y, _ = refracted(TILT, sea.slope(*place.T), INDEX)
+    direction = np.column_stack([x, y, -np.ones(rays)]) / np.sqrt(1.0 + x * x + y * y)[:, None]
+    calm = float(refracted(TILT, (np.zeros(1), np.zeros(1)), INDEX)[0][0])
+    found = np.zeros((len(ways), len(steepnesses)))
+    for column, steep in enumerate(steepnesses):
+        under = floor.scaled(steep / (floor.steepest * calm))
+        # Floors as steep as that can be higher than the sea: rays start above both, on the lines that they had.
+        lift = max(0.0, under.highest - sea.lowest + SLACK)
+        start = np.column_stack([place, sea.height(*place.T)]) + lift * direction / direction[:, 2:]
+        between = under.lowest, under.highest
+        true = dense_hit(under.height, start, direction, *between)
+        for row, way in enumerate(ways):
+            if isinstance(way, str):
+                first = 1.0 if way == "newton_1m" else to_plane(start, direction, under.mean)
+                hit = newton_hit(under.height, None if way == "shah" else under.slope, start, direction, first)
+            else:
+                hit = np.asarray(first_hit(under.height, start, direction, *between, way, under.slope))
+            found[row, column] = np.mean(~(np.abs(hit - true) <= OFF * DEPTH))
+    return found
+
+
+def _bracket(
+    height: Height,
+    origin: Floats,
+    direction: Floats,
+    lowest: float,
+    highest: float,
+    steps: int,
+    rate: Callable[[Floats], Floats] | None = None,
+) -> tuple[Floats, Floats]:
+    """Return distances between which a ray first comes through the surface; nan where it does not.
+
+    rate  of the gap, by its distance: where a step begins falling and ends rising, the lowest place between, that of a
+          cubic with both rates, is looked at, too. Without it such a dip is missed
+    """
+    z, down = origin[..., 2], direction[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = (np.array([lowest, highest], z.dtype).reshape(2, *[1] * z.ndim) - z) / down
+    slanting = down != 0.0
+    near = np.where(slanting, np.maximum(ends.min(axis=0), 0.0), np.nan)
+    far = np.where(slanting, ends.max(axis=0), np.nan)
+    far = np.where(far >= 0.0, far + _slack(origin) * (far + highest - lowest), np.nan)
+    width = (far - near) / steps
+    before = _gap(height, origin, direction, near)
+    if np.any(before < -_slack(origin) * (1.0 + np.abs(z) + abs(highest))):
+        raise InputError(f"highest must be no lower than the floor is, got {highest:g} m")
+    before = np.maximum(before, 0.0)
+    ends_at = None if rate is None else rate(near)
+    first, last = (np.full(z.shape, np.nan) for _ in range(2))
+    for number in range(1, steps + 1):
+        here = near + number * width
+        gap = _gap(height, origin, direction, here)
+        end, ahead = here, gap
+        if rate is not None and ends_at is not None:
+            begins_at, ends_at = ends_at, rate(here)
+            dip = here - width + width * _least(before, gap, begins_at * width, ends_at * width)
+            dip = np.where((gap >= 0.0) & (begins_at < 0.0) & (ends_at > 0.0), dip, np.nan)
+            under = _gap(height, origin, direction, dip) < 0.0
+            end, ahead = np.where(under, dip, here), np.where(under, -1.0, gap)
+        # At the lower plane every ray that descends has come through, whatever rounding makes of the gap.
+        through = (ahead < 0.0) | ((down < 0.0) & (ahead >= 0.0) & (number == steps))
+        crossed = (before >= 0.0) & through & np.isnan(first)
+        first, last = np.where(crossed, here - width, first), np.where(crossed, end, last)
+        before = gap
+        if not np.any(np.isnan(first) & ~np.isnan(near)):
+            break
+    return first, last
+
+
+def _least(start: Floats, end: Floats, begins: Floats, ends: Floats) -> Floats:
+    """Return where in [0, 1] a cubic of these values and slopes at 0 and 1 is least, if it falls and then rises."""
+    linear, cubic = 3.0 * (end - start) - 2.0 * begins - ends, begins + ends - 2.0 * (end - start)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = -begins / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * begins, 0.0)))
+    return np.asarray(np.clip(found, 0.0, 1.0))
+
+
+def _safeguarded(
+    height: Height,
+    rate: Callable[[Floats], Floats],
+    origin: Floats,
+    direction: Floats,
+    near: Floats,
+    far: Floats,
+    iterations: int,
+) -> Floats:
+    """Return Newton's iteration from the chord of a bracket: a step that would leave it is a bisection instead."""
+    above, below = (_gap(height, origin, direction, end) for end in (near, far))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(above > np.minimum(below, 0.0), above / (above - np.minimum(below, 0.0)), 0.0)
+        k = near + np.clip(share, 0.0, 1.0) * (far - near)
+        for _ in range(iterations):
+            gap = _gap(height, origin, direction, k)
+            near, far = np.where(gap >= 0.0, k, near), np.where(gap >= 0.0, far, k)
+            step = np.where(gap == 0.0, k, k - gap / rate(k))
+            k = np.where((step >= near) & (step <= far), step, 0.5 * (near + far))
+    return np.asarray(k)
+
+
+def _gap(height: Height, origin: Floats, direction: Floats, k: Floats) -> Floats:
+    """Return the height of a ray above the surface after a distance [m]."""
+    x, y, z = (origin[..., axis] + k * direction[..., axis] for axis in range(3))
+    return np.asarray(z - np.asarray(height(x, y), k.dtype))
+
+
+def _slack(lengths: Floats) -> float:
+    """Return the relative tolerance of lengths in their precision [-]."""
+    return max(SLACK, 4.0 * float(np.finfo(lengths.dtype).eps))
+
+
+def _rate(slope: Slope, origin: Floats, direction: Floats, k: Floats) -> Floats:
+    """Return the change of `_gap` with the distance [-]."""
+    zx, zy = slope(*(origin[..., axis] + k * direction[..., axis] for axis in range(2)))
+    zx, zy = np.asarray(zx, k.dtype), np.asarray(zy, k.dtype)
+    return np.asarray(direction[..., 2] - zx * direction[..., 0] - zy * direction[..., 1])
+
+
+def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
+    """Return origins and directions as float64 arrays of one shape (..., 3)."""
+    found = []
+    for name, value in (("origin", origin), ("direction", direction)):
+        array = checked_numbers(name, value, "finite numbers (..., 3)")
+        if not array.ndim or array.shape[-1] != 3:
+            raise InputError(f"{name} must have shape (..., 3), got {array.shape}")
+        require(name, array, np.isfinite(array), "finite")
+        found.append(array)
+    length = np.linalg.norm(found[1], axis=-1)
+    deviation = np.abs(length - 1.0)
+    if np.any(deviation > UNIT):
+        worst = length.flat[int(np.argmax(deviation))]
+        raise InputError(f"direction must be of unit length, got |direction| = {worst:g}")
+    try:
+        where, along = np.broadcast_arrays(*found)
+    except ValueError:
+        raise InputError(
+            f"origin and direction must broadcast to one shape, got {found[0].shape} and {found[1].shape}"
+        ) from None
+    return where, along
+
+
+def _bounds(lowest: object, highest: object) -> tuple[float, float]:
+    for name, value in (("lowest", lowest), ("highest", highest)):
+        if not is_number(value) or not np.isfinite(value):
+            raise InputError(f"{name} must be a finite level [m], got {shown(value)}")
+    low, high = float(lowest), float(highest)  # type: ignore[arg-type]
+    if low > high:
+        raise InputError(f"lowest must not be above highest, got {low:g} and {high:g} m")
+    return low, high

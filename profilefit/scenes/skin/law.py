@@ -29,7 +29,6 @@ from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
 
 Floats = NDArray[np.float64]
-CHANNELS = ("red", "green", "blue")
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,6 @@ class SkinGaussians:
         gaussians = np.exp(-(scaled[..., None, :] ** 2) / (2.0 * variance)) / (2.0 * np.pi * variance)
         return np.sum(np.array(self.weights) * gaussians, axis=-2)
 
-    @property
-    def energy(self) -> Floats:
-        """Integral of 2 pi r R over all r, of red, green, blue [-]."""
-        return np.sum(self.weights, axis=0) * np.square(self.stretches)
-
 
 # White light in, white light out: each channel's weights sum to one, and an albedo texture multiplies.
 D_EON = SkinGaussians(
@@ -68,8 +62,7 @@ D_EON = SkinGaussians(
         (0.078, 0.0, 0.0),
     ),
 )
-FALLOFF = (1.0, 0.37, 0.3)
-"""Default of the authors' code for red, green, blue."""
+FALLOFF = (1.0, 0.37, 0.3)  # default of the authors' code for red, green, blue
 
 
 def separable(falloff: tuple[float, float, float] = FALLOFF) -> SkinGaussians:
@@ -89,8 +82,6 @@ REACH, SHORT_REACH, MANY = 3.0, 2.0, 20
 # What the five Gaussians of the kernel hold of the red skin profile; the sixth and narrowest is light that comes
 # straight back.
 STRENGTH = float(np.sum(D_EON.weights, axis=0)[0] - D_EON.weights[0][0])
-PUBLISHED_STRENGTH = (0.48, 0.41, 0.28)
-"""The default of the authors' code for red, green, blue: an artist's choice, too weak for a width to be matched."""
 DARKEST = 1e-4  # an albedo below has no light to blur; its width is that of this one
 # Share of a tap that its depth takes, per depth in units of the kernel: the authors' 300 / tan(10 degrees) times a
 # width of 0.0125 scene units, the middle of their slider, of which the kernel's unit is a third.

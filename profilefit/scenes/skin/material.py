@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
-from profilefit.recipes.toml_tables import Range
+from profilefit.recipes.declared import Range
 from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.world import Rgb, rgb

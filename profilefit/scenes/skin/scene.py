@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Annotated, Self
 
 import moderngl
 import numpy as np
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.exact.single_scattering import entered
@@ -15,7 +18,18 @@ from profilefit.errors import InputError, SettingError
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
-from profilefit.recipes.toml_tables import LENGTHS, Table, Tables
+from profilefit.recipes.declared import (
+    LENGTHS,
+    Declared,
+    NumberRange,
+    OneOf,
+    Range,
+    Refused,
+    Text,
+    Tolerance,
+    at,
+    words,
+)
 from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
@@ -24,7 +38,7 @@ from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
 from profilefit.scenes.stage.judge import surface_judge
 from profilefit.scenes.stage.picture import RenderResult
-from profilefit.scenes.stage.request import ViewRequest
+from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, Technique, alone
 from profilefit.scenes.stage.world import Camera, Part, Scene
@@ -70,50 +84,114 @@ def head_scene(
     return Head(parts, camera=camera, material=what)
 
 
-TABLES = {
-    **request.TABLES,
-    "": ("title", "scene", "unit", "material", "n", "layers", *request.TABLES, "choose"),
-    "material": CHANNELS,
-    "technique": ("kind", "law", "constants", "illumination", *request.TABLES["technique"], "tolerance"),
-}
 SAMPLED, SEPARABLE, NONE = KINDS = ("samples", "separable", "none")
 OF_LAW = ("law", "constants", "illumination")
 SKIN = 1.4  # refractive index
 
 
-@dataclass(frozen=True)
+class ChannelTable(Declared):
+    """Table [material.COLOUR]: least and most of A [-], and of the transport mean free path [mm]."""
+
+    reflectance: Annotated[Range, NumberRange()]
+    mfp: Annotated[Range, NumberRange(*LENGTHS)]
+
+
+class MaterialTable(Declared):
+    """Table [material] of a painted material."""
+
+    red: ChannelTable
+    green: ChannelTable
+    blue: ChannelTable
+
+    @property
+    def painted(self) -> Painted:
+        """Ranges of the three colours."""
+        a, b, c = self.red, self.green, self.blue
+        return Painted((a.reflectance, b.reflectance, c.reflectance), (a.mfp, b.mfp, c.mfp))
+
+
+class SkinTechnique(TechniqueTable):
+    """Table [technique]: samples of a law, the separable filter, or none."""
+
+    kind: Annotated[str, OneOf(*KINDS)] = SAMPLED
+    law: Text = "hazard"
+    constants: Text = "regenerated"
+    illumination: Annotated[str, OneOf(*ILLUMINATIONS)] = "diffuse"
+    tolerance: Tolerance = 0.02
+
+    @model_validator(mode="after")
+    def _of_law(self) -> Self:
+        for key in OF_LAW:
+            if self.kind != SAMPLED and key in self.model_fields_set:
+                raise Refused(f"left out where kind is {self.kind}", getattr(self, key), key)
+        return self
+
+
 class SceneRequest(ViewRequest):
-    """Scene of skin that a file requests.
+    """Scene of skin that a file requests; `layers` and `choose` are read by `profilefit choose`."""
 
-    material  by its name, or painted;  setting  of its A and of the reference: diffuse illumination, n of the file
-    illumination  of the law
-    """
-
-    label: str
-    technique: Technique
-    material: str | Painted
-    setting: Setting
-    illumination: str
-
-
-def read(file: str, content: Table) -> SceneRequest:
-    """Return the request of a file; InputError with file, table and key, what was got and what is accepted."""
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    tables.text("", "title", content, "")
-    tables.text("", "unit", content, "mm", ("mm",))
-    setting = Setting("diffuse", n=tables.number("", "n", content, SKIN))
-    if not 1.0 <= setting.n <= REFRACTING.high:
-        raise tables.bad("", "n", f"a refractive index in [1, {REFRACTING.high:g}]", setting.n)
-    label, by, light = _technique(tables, tables.table(content, "technique", {}), setting)
-    return SceneRequest(
-        **request.view(tables, content),
-        label=label,
-        technique=by,
-        material=_material(tables, content, setting),
-        setting=setting,
-        illumination=light,
+    scene: Annotated[str, OneOf("skin")] = "skin"
+    material_table: Annotated[
+        Annotated[Annotated[str, OneOf(*BY_NAME)], Tag("[name]")] | Annotated[MaterialTable, Tag("[table]")],
+        Discriminator(lambda value: "[table]" if isinstance(value, dict) else "[name]"),
+    ] = Field("skin1", alias="material")
+    n: Annotated[float, Field(ge=1.0, le=REFRACTING.high), words(f"a refractive index in [1, {REFRACTING.high:g}]")] = (
+        SKIN
     )
+    technique: SkinTechnique = SkinTechnique()
+    layers: OfChoose = None
+    choose: OfChoose = None
+
+    @property
+    def material(self) -> str | Painted:
+        """Material by its name, or painted."""
+        table = self.material_table
+        return table.painted if isinstance(table, MaterialTable) else table
+
+    @property
+    def setting(self) -> Setting:
+        """Setting of the material's A and of the reference: diffuse illumination."""
+        return Setting("diffuse", n=self.n)
+
+    @property
+    def illumination(self) -> str:
+        """Illumination of the law."""
+        return self.technique.illumination
+
+    @property
+    def label(self) -> str:
+        """Name of the technique for a reader."""
+        named = self.technique
+        return f"{named.law}, {named.constants}" if named.kind == SAMPLED else named.kind
+
+    @cached_property
+    def method(self) -> Technique:
+        """Technique that the scene is drawn by."""
+        named = self.technique
+        if named.kind != SAMPLED:
+            return SeparableFilter(Separable(setting=self.setting)) if named.kind == SEPARABLE else Lambert()
+        try:
+            law = catalogue.load(named.law, named.constants, replace(self.setting, illumination=named.illumination))
+        except SettingError as error:
+            if self.n == 1.0:
+                raise
+            raise SettingError(f"{error}: write n = 1 at the top of the file, or name another law") from None
+        return technique(law)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        table, most = self.material_table, float(entered(self.setting))  # a colour that the surface lets out
+        for channel in CHANNELS if isinstance(table, MaterialTable) else ():
+            low, high = ends = getattr(table, channel).reflectance
+            if high > most:
+                accepted = NumberRange(most=most).words
+                raise Refused(accepted, low if low == high else list(ends), "material", channel, "reflectance")
+        with at("technique"):
+            _ = self.method
+        return self
+
+
+read = SceneRequest.of
 
 
 def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
@@ -121,41 +199,8 @@ def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
     scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
-    pair = alone(of.label, of.technique, scene.material.mfp)
+    pair = alone(of.label, of.method, scene.material.mfp)
     with Stage(context, of.size) as stage:
         stage.draw(scene)
         request.require_lit(of.file, stage.buffers())
         return request.rendered(stage, surface_judge(stage, scene, pair.mfp, of.setting), of, pair)
-
-
-def _material(tables: Tables, content: Table, setting: Setting) -> str | Painted:
-    if not isinstance(content.get("material"), dict):
-        return tables.text("", "material", content, "skin1", tuple(BY_NAME))
-    found, most = [], float(entered(setting))
-    for channel in CHANNELS:
-        where = f"material.{channel}"
-        one = tables.table(tables.table(content, "material"), channel, within="material")
-        tables.known(where, one, ("reflectance", "mfp"))
-        found.append((tables.range(where, "reflectance", one, most=most), tables.range(where, "mfp", one, *LENGTHS)))
-    (a, d), (b, e), (c, f) = found
-    return Painted((a, b, c), (d, e, f))
-
-
-def _technique(tables: Tables, named: Table, setting: Setting) -> tuple[str, Technique, str]:
-    """Return the technique's name for a reader, the technique, and the illumination of its law."""
-    kind = tables.text("technique", "kind", named, SAMPLED, KINDS)
-    if kind != SAMPLED:
-        for key in OF_LAW:
-            if key in named:
-                raise tables.bad("technique", key, f"left out where kind is {kind}", named[key])
-        return kind, SeparableFilter(Separable(setting=setting)) if kind == SEPARABLE else Lambert(), "diffuse"
-    law = tables.text("technique", "law", named, "hazard")
-    constants = tables.text("technique", "constants", named, "regenerated")
-    light = tables.text("technique", "illumination", named, "diffuse", ILLUMINATIONS)
-    try:
-        one = tables.build("technique", lambda: catalogue.load(law, constants, replace(setting, illumination=light)))
-    except SettingError as error:
-        if setting.n == 1.0:
-            raise
-        raise SettingError(f"{error}: write n = 1 at the top of the file, or name another law") from None
-    return f"{law}, {constants}", tables.build("technique", lambda: technique(one)), light

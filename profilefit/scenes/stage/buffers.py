@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from profilefit.errors import InputError
 
@@ -57,16 +57,16 @@ class Buffers:
 
     def _check_inside(self) -> None:
         mask = np.asarray(self.mask)
-        _require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
+        require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
         inside = mask > INSIDE
         for name in VECTORS + NUMBERS:
             array = getattr(self, name)
             if array is not None:
                 value = np.asarray(array)[inside]
-                _require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+                require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
         albedo = np.asarray(self.reflectance)[inside]
         good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
-        _require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
+        require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -96,31 +96,7 @@ class Buffers:
         return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
 
 
-def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], what: str) -> None:
+def require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], accepted: str) -> None:
+    """Raise InputError where values are not good, with the first of those."""
     if not np.all(good):
-        raise InputError(f"{name} must be {what}, got {values[~good][0]:g}")
-
-
-def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:
-    """Return a plane that faces an orthographic camera and fills its view.
-
-    size  columns, rows;  pixel [mm];  reflectance, irradiance  broadcast to (rows, columns, 3)
-    """
-    columns, rows = size
-    x = (np.arange(columns) + 0.5 - 0.5 * columns) * pixel
-    y = (np.arange(rows) + 0.5 - 0.5 * rows) * pixel
-    position = np.stack([*np.meshgrid(x, y), np.full((rows, columns), -100.0)], axis=-1)
-    normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), position.shape)
-    mask = np.ones((rows, columns), np.float32)
-    colours = (np.broadcast_to(np.asarray(value, float), position.shape) for value in (irradiance, reflectance))
-    light, skin, place, upright = (value.astype(np.float32) for value in (*colours, position, normal))
-    return Buffers(light, skin, place, upright, mask, np.zeros_like(mask), pixel)
-
-
-def step_edge(size: tuple[int, int], pixel: float, reflectance: ArrayLike) -> Buffers:
-    """Return `flat`, lit where x > 0 only: the edge is a border of pixels, so `size` has an even number of columns."""
-    columns, rows = size
-    if columns % 2:
-        raise InputError(f"size must have an even number of columns, so that a border is at x = 0, got {columns}")
-    lit = np.broadcast_to((np.arange(columns) >= columns // 2).astype(float)[None, :, None], (rows, columns, 3))
-    return flat(size, pixel, reflectance, lit)
+        raise InputError(f"{name} must be {accepted}, got {values[~good].flat[0]:g}")

@@ -62,8 +62,8 @@ def ear(side: int, detail: int = 1) -> Mesh:
     thick = 2.4 * np.sign(x) * np.abs(x) ** 0.6 * (1.0 + 1.2 * np.exp(-(((radius - 0.86) / 0.12) ** 2)))
     bowl = -4.0 * (1.0 - radius**2) * _rise(1.0 - radius, 0.0, 0.5)
     plate = np.stack([thick + bowl, 31.0 * y, 19.0 * width * z], axis=-1)
-    turned = plate @ _about_y(np.radians(-48.0)).T
-    points = turned + np.array([75.0, 2.0, -16.0])
+    c, s = np.cos(np.radians(-48.0)), np.sin(np.radians(-48.0))
+    points = plate @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T + np.array([75.0, 2.0, -16.0])
     points[..., 0] *= side
     mesh = sheet(points, u, v, closed=True)
     return mesh if side > 0 else Mesh(mesh.position, -mesh.normal, mesh.uv, mesh.triangles[:, ::-1])
@@ -86,7 +86,8 @@ def band(detail: int = 1, radius: float = 122.0, height: float = 11.0, thickness
     up = 0.5 * height * _squared(np.sin(around), 0.35)
     ring = radius + out
     points = np.stack([ring * np.sin(angle), up, 0.95 * ring * np.cos(angle)], axis=-1)
-    turned = points @ _about_z(np.radians(-14.0)).T + np.array([0.0, 52.0, 2.0])
+    c, s = np.cos(np.radians(-14.0)), np.sin(np.radians(-14.0))
+    turned = points @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + np.array([0.0, 52.0, 2.0])
     return sheet(turned, u, v, closed=True)
 
 
@@ -120,13 +121,3 @@ def _rise(value: Floats, low: float, high: float) -> Floats:
 def _squared(value: Floats, power: float) -> Floats:
     """Return a circle's coordinate bent towards that of a square."""
     return np.sign(value) * np.abs(value) ** power
-
-
-def _about_y(angle: float) -> Floats:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def _about_z(angle: float) -> Floats:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

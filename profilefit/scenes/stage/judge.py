@@ -12,12 +12,11 @@ from scipy.ndimage import uniform_filter
 
 from mcml_sim import Setting
 from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.exact_table import CurveTable
+from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_integral import exitance_of, own_error
+from profilefit.scenes.stage.surface import exitance_of, own_error
 from profilefit.scenes.stage.technique import TechniquePair
 from profilefit.scenes.stage.world import Scene
 
@@ -29,14 +28,10 @@ SQUARE = 7  # pixels of a side, over which a map of errors that are noisy takes 
 
 @dataclass(frozen=True)
 class Judge:
-    """Reference of a picture; row 0 at the bottom.
+    """Reference of a picture (h, w, 3), row 0 at the bottom, and the pixels (h, w) whose errors count.
 
-    Attributes:
-        reference: (h, w, 3) light.
-        mask: (h, w) pixels whose errors count.
-        truth_error: error of the reference itself.
-        exposure: factor by which pictures are shown.
-        halves: (2, h, w, 3) independent estimates, whose mean the reference is: errors are then without their noise.
+    truth_error  of the reference itself;  exposure  by which pictures are shown
+    halves       (2, h, w, 3) independent estimates, whose mean the reference is: errors are then without their noise
     """
 
     reference: Floats
@@ -47,11 +42,9 @@ class Judge:
 
     @classmethod
     def of_halves(cls, halves: Floats, white: float) -> Judge:
-        """Return the judge of all pixels of a picture that was estimated twice (2, h, w, 3).
+        """Return the judge of all pixels of a picture that was estimated twice (2, h, w, 3), each with its own error.
 
-        Args:
-            halves: estimates whose errors are independent.
-            white: share of the reference's numbers that a picture does not clip [-].
+        white  share of the reference's numbers that a picture does not clip [-]
         """
         reference = np.asarray(halves.mean(axis=0))
         share = np.sqrt(np.mean((halves[1] - halves[0]) ** 2, axis=-1)) / 2.0 / np.mean(reference)
@@ -85,16 +78,11 @@ class Judge:
         time: Callable[[int], float],
         turns: int = TURNS,
     ) -> list[ChartPoint]:
-        """Return error and cost of a technique with each number of samples.
+        """Return error and cost of a technique with each number of samples, timed in so many turns.
 
         Times are taken in turns, so that what else the machine does hits all of them.
 
-        Args:
-            label: of the technique.
-            samples: numbers of them.
-            draw: function of a number that returns the picture (h, w, 3).
-            time: function of a number that returns the milliseconds of its passes, which were compiled by `draw`.
-            turns: how often each is timed.
+        draw, time  functions of a number: the picture (h, w, 3), and the milliseconds of passes that `draw` compiled
         """
         errors = [self.rmse(draw(number)) for number in samples]
         times = np.array([[time(number) for number in samples] for _ in range(turns)])
@@ -113,16 +101,11 @@ class Judge:
         of: str = "scattered light",
         passes: Mapping[str, Any] | None = None,
     ) -> RenderResult:
-        """Return a picture beside its reference.
+        """Return a picture (h, w, 3), whose error is measured, beside its reference.
 
-        Args:
-            picture: (h, w, 3) whose error is measured.
-            chart: points of the technique, one of them of `samples`.
-            samples: of the picture.
-            frame: milliseconds of a whole frame.
-            shown: (h, w, 3) radiance to the eye, where `picture` is exitance: whatever else it has is its own in both.
-            of: light that the errors are of.
-            passes: milliseconds of parts of the frame.
+        chart  points of the technique, one of them of `samples`, those of the picture
+        frame, passes  milliseconds of a whole frame, and of parts of it;  of  light that the errors are of
+        shown  (h, w, 3) radiance to the eye, where `picture` is exitance: whatever else it has is its own in both
         """
         true = self.reference if shown is None else shown + (self.reference - picture) / np.pi
         return RenderResult(
@@ -162,12 +145,8 @@ def surface_judge(
 ) -> Judge:
     """Return the judge of a scene that a stage has drawn: the surface integral, all over its pixels.
 
-    Args:
-        stage: that has drawn the scene.
-        scene: drawn once more, with pixels of half the side, by which the error of the reference is estimated.
-        mfp: of the three channels (3,) [mm].
-        table: curves, or the setting of the exact half space.
-        has_error: whether that error is estimated.
+    scene  drawn once more, with pixels of half the side, if the error of the reference is to be estimated
+    mfp    of the three channels (3,) [mm];  table  of curves, or the setting of the exact half space
     """
     buffers, error = stage.buffers(), UNKNOWN
     if has_error:

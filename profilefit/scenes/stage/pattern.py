@@ -129,7 +129,9 @@ class _Field:
     """Crowding of each place by the chosen ones, on a torus; a place chosen or dropped changes it at once."""
 
     def __init__(self, pattern: NDArray[np.bool_]):
-        self.kernel = _crowding(len(pattern))
+        distance = np.minimum(np.arange(len(pattern)), len(pattern) - np.arange(len(pattern)))
+        line = np.exp(-(distance**2) / (2.0 * SIGMA**2))
+        self.kernel = np.outer(line, line)  # what a place at the origin adds to each place of the torus
         self.chosen = np.zeros_like(pattern)
         self.value = np.zeros(pattern.shape)
         for row, column in np.argwhere(pattern).tolist():
@@ -153,13 +155,6 @@ class _Field:
     def _place(self, index: np.intp) -> Place:
         row, column = np.unravel_index(index, self.value.shape)
         return int(row), int(column)
-
-
-def _crowding(side: int) -> Floats:
-    """Return what a place at the origin adds to the crowding of each place of the torus."""
-    distance = np.minimum(np.arange(side), side - np.arange(side))
-    line = np.exp(-(distance**2) / (2.0 * SIGMA**2))
-    return np.outer(line, line)
 
 
 def _evened(side: int, rng: np.random.Generator) -> NDArray[np.bool_]:

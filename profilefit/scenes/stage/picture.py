@@ -17,13 +17,10 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class ChartPoint:
-    """Error and cost of a technique with so many samples (of the separable filter: taps).
+    """Error and cost of a technique with so many samples of a pixel (of the separable filter: taps).
 
-    Attributes:
-        label: of the technique.
-        samples: of a pixel.
-        rmse: root mean square error of the light, over the mean of the reference [-].
-        milliseconds: of the technique's passes, each time that they were run (turns,).
+    rmse          root mean square error of the light, over the mean of the reference [-]
+    milliseconds  of the technique's passes, each time that they were run (turns,)
     """
 
     label: str
@@ -57,16 +54,12 @@ UNKNOWN = TruthError(np.nan, np.nan, np.nan)
 class RenderResult:
     """Scene, drawn beside its reference; row 0 at the top.
 
-    Attributes:
-        picture, truth: (h, w, 3) as a screen shows them.
-        error: (h, w) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none is
-            measured. Its own root mean square is `point.rmse`, or more if the reference has noise.
-        point: of the technique.
-        chart: the same with other numbers of samples, too, the least first.
-        frame: milliseconds of a whole frame, each time that it was drawn (turns,).
-        truth_error: of the reference.
-        of: light that the errors are of.
-        passes: milliseconds of parts of the frame by their names, if known.
+    picture, truth  (h, w, 3) as a screen shows them
+    error  (h, w) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none is
+           measured. Its own root mean square is `point.rmse`, or more if the reference has noise
+    chart  the point of the technique, and others with other numbers of samples, the least first
+    frame, passes  milliseconds of a whole frame, each time that it was drawn (turns,); of its parts by their names
+    of     light that the errors are of
     """
 
     picture: Bytes

@@ -40,20 +40,18 @@ Read = str | Singles | Smooth | moderngl.Texture
 class Pass:
     """Draw of one shader into maps; by default of a fragment shader over all of them.
 
-    Attributes:
-        name: of the shader, in messages and in `Renderer.compiled`.
-        reads: by sampler the name of a map, an array (rows, columns, channels), an image, or another renderer's map.
-        writes: the map that is filled, or several of one size.
-        source: GLSL of the fragments, without a version line.
-        uniforms: values by name: every uniform of both sources, and no other. Matrices are (4, 4), rows first.
-        vertex: GLSL of the vertices, without a version line; by default a triangle that covers the maps, with `where`
-            in [-1, 1]^2.
-        drawn: a mesh, whose vertices are attributes, or a number of vertices without attributes.
-        shape: `POINTS`, `LINES` or `TRIANGLES`.
-        kept: `REPLACE`, `NEAREST` or `SUM`.
-        clear: first channel of what the maps are filled with before, the others being 0; None keeps what they hold.
-        rows: the first row that is drawn, and the first one beyond; None draws all.
-        mipmaps: whether levels of detail are computed afterwards.
+    name     of the shader, in messages and in `Renderer.compiled`
+    reads    by sampler the name of a map, an array (rows, columns, channels), an image, or another renderer's map
+    writes   the map that is filled, or several of one size
+    source   GLSL of the fragments, without a version line
+    uniforms values by name: every uniform of both sources, and no other. Matrices are (4, 4), rows first
+    vertex   GLSL of the vertices, without a version line; by default a triangle that covers the maps, with `where` in
+             [-1, 1]^2
+    drawn    a mesh, whose vertices are attributes, or a number of vertices without attributes
+    shape    `POINTS`, `LINES` or `TRIANGLES`;  kept  `REPLACE`, `NEAREST` or `SUM`
+    clear    first channel of what the maps are filled with before, the others being 0; None keeps what they hold
+    rows     the first row that is drawn, and the first one beyond; None draws all
+    mipmaps  whether levels of detail are computed afterwards
     """
 
     name: str
@@ -218,11 +216,7 @@ class _Shader:
         self.bare = context.vertex_array(self.program, [])
 
     def assign(self, textures: Mapping[str, moderngl.Texture], values: Mapping[str, Any]) -> None:
-        """Set textures, in units of their own, and uniforms.
-
-        Raises:
-            ShaderError: with the shader's name, where a uniform of the sources gets no value or a value has no uniform.
-        """
+        """Set textures, in units of their own, and uniforms; ShaderError where a value or a uniform lacks the other."""
         given = {*textures, *values}
         for names, what in (
             (given - self._declared, "is set, but stands nowhere in its source"),

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.judge import TURNS, Judge, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
@@ -20,12 +19,6 @@ from profilefit.scenes.stage.technique import TechniquePair
 from profilefit.scenes.stage.world import Camera, Light, Rgb, Scene, unit
 
 Floats = NDArray[np.float64]
-# Tables of a scene's file that the stage reads; the keys of [technique] are those that every scene has.
-TABLES = {
-    "technique": ("samples", "chart"),
-    "camera": ("resolution", "distance", "direction", "height", "target"),
-    "light": ("direction", "irradiance", "ambient"),
-}
 MOST_CHART = 8  # numbers of samples
 # The reference sums over all pairs of pixels, six minutes on a core for so many.
 MOST_PIXELS = 2**16
@@ -34,44 +27,69 @@ LARGEST_VIEW = 1000.0  # [mm]
 MOST_LIGHT = 1000.0
 
 
-@dataclass(frozen=True)
-class ViewRequest:
-    """Picture that a file requests, in the scene's unit of length.
-
-    Attributes:
-        file: where it stands.
-        sampling: of a pixel.
-        chart: other numbers of samples, whose error and cost are measured.
-        camera: lens and place [length].
-        light: of the lamp.
-        ambient: irradiance from everywhere.
-        size: columns and rows [pixels].
-    """
-
-    file: str
-    sampling: Sampling
-    chart: tuple[int, ...]
-    camera: Camera
-    light: Light
-    ambient: Rgb
-    size: tuple[int, int]
-
-    @property
-    def numbers(self) -> list[int]:
-        """Numbers of samples of picture and chart, the least first."""
-        return sorted({self.sampling.samples, *self.chart})
-
-    def require_light(self) -> None:
-        """Raise InputError where neither the lamp nor anything else shines."""
-        if not any((*self.light.irradiance, *self.ambient)):
-            raise InputError(f"{self.file}: [light] irradiance and ambient must not both be 0: nothing would be seen")
+def _direction(value: Rgb) -> Rgb:
+    if not np.linalg.norm(value) > 1e-6:
+        raise Refused("a direction, not 0", list(value))
+    return value
 
 
-def _direction(tables: Tables, table: Table, default: Rgb, where: str = "light") -> Rgb:
-    direction = tables.three(where, "direction", table, default, -1e6, 1e6)
-    if not np.linalg.norm(direction) > 1e-6:
-        raise tables.bad(where, "direction", "a direction, not 0", list(direction))
-    return direction
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Direction = Annotated[tuple[Component, Component, Component], LISTED, AfterValidator(_direction)]
+Place = Annotated[float, Field(ge=-150.0, le=150.0)]
+Irradiance = Annotated[float, Field(ge=0.0, le=MOST_LIGHT)]
+Irradiances = Annotated[tuple[Irradiance, Irradiance, Irradiance], LISTED]
+Samples = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
+OfChoose = Annotated[Any, words("what `profilefit choose` reads")]
+Pixels = Annotated[int, Field(ge=1, le=1024)]
+Resolution = Annotated[tuple[Pixels, Pixels], LISTED, words("two whole numbers of pixels in 1 ... 1024")]
+
+
+class TechniqueTable(Declared):
+    """Table [technique]: samples of a pixel; chart  other numbers of samples, whose error and cost are measured."""
+
+    samples: Samples = 16
+    chart: Annotated[
+        tuple[Samples, ...],
+        LISTED,
+        Field(max_length=MOST_CHART),
+        words(f"at most {MOST_CHART} numbers of samples in 1 ... {MOST_SAMPLES}"),
+    ] = ()
+
+
+class ResolutionTable(Declared):
+    """Table [camera]: columns and rows of the picture [pixels]."""
+
+    limit: ClassVar[str] = "which the truth sums over"
+    resolution: Resolution = (160, 120)
+
+    @model_validator(mode="after")
+    def _few(self) -> Self:
+        if self.resolution[0] * self.resolution[1] > MOST_PIXELS:
+            raise Refused(f"{MOST_PIXELS} pixels at most, {self.limit}", list(self.resolution), "resolution")
+        return self
+
+
+class CameraTable(ResolutionTable):
+    """Table [camera] of a look at a point; what it does not say is the scene's `Viewpoint` [mm]."""
+
+    distance: Annotated[float, Field(ge=NEAREST, le=FARTHEST)] | None = None
+    direction: Direction | None = None
+    height: Annotated[float, Field(gt=0.0, le=LARGEST_VIEW)] | None = None
+    target: Annotated[tuple[Place, Place, Place], LISTED] | None = None
+
+
+class LightTable(Declared):
+    """Table [light]: direction toward the lamp, irradiance of a surface that faces it, and ambient irradiance."""
+
+    direction: Direction = Light().direction
+    irradiance: Irradiances = Light().irradiance
+    ambient: Irradiances = Scene(()).ambient
+
+    @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not any((*self.irradiance, *self.ambient)):
+            raise InputError("irradiance and ambient must not both be 0: nothing would be seen")
+        return self
 
 
 class Viewpoint(NamedTuple):
@@ -88,74 +106,56 @@ class Viewpoint(NamedTuple):
     direction: Rgb
     height: float
 
-    def camera(self, tables: Tables, table: Table) -> Camera:
-        """Return the camera of a table; without a height its lens stays the same at every distance."""
-        target = tables.three("camera", "target", table, self.target, -150.0, 150.0)
-        distance = tables.number("camera", "distance", table, self.distance, FARTHEST)
-        if distance < NEAREST:
-            raise tables.bad("camera", "distance", f"a length in {NEAREST:g} ... {FARTHEST:g} mm", table["distance"])
-        height = tables.number("camera", "height", table, self.height * distance / self.distance, LARGEST_VIEW)
-        direction = _direction(tables, table, self.direction, "camera")
-        x, y, z = (np.array(target) + distance * unit(direction)).tolist()
-        return Camera((x, y, z), target, height)
-
 
 HEAD = Viewpoint((4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0)
 
 
-class Defaults(NamedTuple):
-    """View of a file that says nothing, and what limits its picture.
+class ViewRequest(Declared):
+    """Picture that a file requests, in the scene's unit of length."""
 
-    Attributes:
-        samples: of a pixel.
-        size: columns and rows [pixels].
-        light: of the lamp.
-        ambient: irradiance from everywhere.
-        limit: why a picture has no more pixels, after "pixels at most".
-    """
+    title: Text = ""
+    unit: Annotated[str, OneOf("mm")] = "mm"
+    technique: TechniqueTable = TechniqueTable()
+    camera_table: CameraTable = Field(CameraTable(), alias="camera")
+    light_table: LightTable = Field(LightTable(), alias="light")
 
-    samples: int = 16
-    size: tuple[int, int] = (160, 120)
-    light: Light = Light()
-    ambient: Rgb = Scene(()).ambient
-    limit: str = "which the truth sums over"
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """Camera of a file that says nothing."""
+        return HEAD
 
+    @property
+    def camera(self) -> Camera:
+        """Lens and place; without a height the lens stays the same at every distance."""
+        table, default = self.camera_table, self.viewpoint
+        target, distance = table.target or default.target, table.distance or default.distance
+        x, y, z = (np.array(target) + distance * unit(table.direction or default.direction)).tolist()
+        return Camera((x, y, z), target, table.height or default.height * distance / default.distance)
 
-def view(
-    tables: Tables,
-    content: Table,
-    camera: Callable[[Tables, Table], Camera] = HEAD.camera,
-    defaults: Defaults = Defaults(),  # noqa: B008  (a tuple)
-    toward: Callable[[Tables, Table, Rgb], Rgb] = _direction,
-) -> dict[str, Any]:
-    """Return the fields of a `ViewRequest`.
+    @property
+    def light(self) -> Light:
+        """Lamp."""
+        return Light(self.light_table.direction, self.light_table.irradiance)
 
-    Args:
-        tables: of the file.
-        content: of the file.
-        camera: function that reads the table [camera].
-        defaults: of what the file does not say.
-        toward: function that reads the direction of [light], which has a default.
+    @property
+    def ambient(self) -> Rgb:
+        """Irradiance from everywhere."""
+        return self.light_table.ambient
 
-    Raises:
-        InputError: with file, table and key, what was got and what is accepted.
-    """
-    named, seen, lamp = (tables.table(content, name, {}) for name in TABLES)
-    direction = toward(tables, lamp, defaults.light.direction)
-    size = tables.sides("camera", "resolution", seen, defaults.size, 1024)
-    if size[0] * size[1] > MOST_PIXELS:
-        accepted = f"{MOST_PIXELS} pixels at most, {defaults.limit}"
-        raise tables.bad("camera", "resolution", accepted, list(size))
-    irradiance = tables.three("light", "irradiance", lamp, defaults.light.irradiance, 0.0, MOST_LIGHT)
-    return {
-        "file": tables.file,
-        "sampling": tables.build("technique", lambda: Sampling(named.get("samples", defaults.samples))),
-        "chart": _chart(tables, named),
-        "camera": camera(tables, seen),
-        "light": Light(direction, irradiance),
-        "ambient": tables.three("light", "ambient", lamp, defaults.ambient, 0.0, MOST_LIGHT),
-        "size": size,
-    }
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows [pixels]."""
+        return self.camera_table.resolution
+
+    @property
+    def sampling(self) -> Sampling:
+        """Samples of a pixel."""
+        return Sampling(self.technique.samples)
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of samples of picture and chart, the least first."""
+        return sorted({self.technique.samples, *self.technique.chart})
 
 
 def require_lit(file: str, buffers: Buffers) -> None:
@@ -173,12 +173,3 @@ def rendered(stage: Stage, judge: Judge, request: ViewRequest, pair: TechniquePa
     radiance = stage.render(pair.seen, pair.mfp, sampling, pair.alpha)
     frame = stage.time(pair.seen, pair.mfp, sampling, TURNS, "frame", pair.alpha)
     return judge.result(exitance, chart, sampling.samples, frame, radiance)
-
-
-def _chart(tables: Tables, named: Table) -> tuple[int, ...]:
-    numbers: Any = named.get("chart", [])
-    whole = isinstance(numbers, list) and all(type(one) is int and 1 <= one <= MOST_SAMPLES for one in numbers)
-    if not whole or len(numbers) > MOST_CHART:
-        accepted = f"at most {MOST_CHART} numbers of samples in 1 ... {MOST_SAMPLES}"
-        raise tables.bad("technique", "chart", accepted, numbers)
-    return tuple(numbers)

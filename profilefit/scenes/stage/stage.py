@@ -11,7 +11,7 @@ of the searchlight setting may be passed as well, to see the difference.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 import moderngl
 import numpy as np
@@ -19,20 +19,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import INSIDE, SURFACE, Buffers, Singles
+from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
 from profilefit.scenes.stage.gather import Law, technique
-from profilefit.scenes.stage.geometry import SHADOW, SHADOW_SIDE, surface_passes, unwrapping
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import Pass, Renderer
+from profilefit.scenes.stage.renderer import NEAREST, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Technique, combination
-from profilefit.scenes.stage.world import Part, Scene
+from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
 from profilefit.shader.context import seconds
+from profilefit.shader.emit import text_beside
 
 Floats = NDArray[np.float64]
 DEFAULT = Sampling()
 By = Law | Technique
 MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
 PASSES = ("scatter", "frame")
+SIDES = "width", "height"
+SHADOW, SHADOW_SIDE = "shadow_map", 2048  # of one channel, and of that many texels a side
+NOWHERE = 1e6  # depth along the light where nothing is [mm]
+MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
+LEAST, MOST = np.nextafter(0.0, 1.0), np.finfo(float).max  # lengths > 0, finite
 
 
 class Stage:
@@ -42,10 +47,8 @@ class Stage:
         """Take a context, the width and height of the picture [pixels] and the side of the shadow map [texels]."""
         self.context = context
         self._shadow_side = checked_whole("shadow_side", shadow_side, 1, MOST_PIXELS)
-        self.size = (
-            checked_whole("width", size[0], 1, MOST_PIXELS),
-            checked_whole("height", size[1], 1, MOST_PIXELS),
-        )
+        width, height = (checked_whole(name, side, 1, MOST_PIXELS) for name, side in zip(SIDES, size, strict=True))
+        self.size = width, height
         self.renderer = Renderer(context, self.size)
         self.renderer.declare(SHADOW, (self._shadow_side,) * 2, 1)
         self._released = False
@@ -63,17 +66,13 @@ class Stage:
     def unwrapping(self, part: Part, inset: tuple[float, float]) -> Pass:
         """Return the pass that lays a part of the scene last drawn out over its uv: positions in the world.
 
-        Args:
-            part: one of the scene's.
-            inset: share of the maps that u and v from 0 to 1 take [-].
-
-        Raises:
-            InputError: on a part of another scene.
+        inset  share of the maps that u and v from 0 to 1 take [-];  InputError on a part of another scene
         """
         self._alive()
         if self._scene is None or not any(one is part for one in self._scene.parts):
             raise InputError("part must be one of the scene last drawn, got another one")
-        return unwrapping(part, self._scene, self.renderer.map(SHADOW), inset)
+        values = {**_lit(self._scene, self._shadow_side), "view": np.eye(4), "inset": inset}
+        return _surface("atlas", part, self.renderer.map(SHADOW), values, clear=0.0)
 
     def upload(self, buffers: Buffers) -> None:
         """Take a G-buffer of numpy arrays in place of a scene; no light shines then, and `render` has no highlights."""
@@ -129,16 +128,9 @@ class Stage:
         passes: str = "scatter",
         fixed_alpha: ArrayLike | None = None,
     ) -> list[float]:
-        """Return the milliseconds of each repeat, by `seconds`; all is compiled before.
+        """Return the milliseconds of each repeat, by `seconds`; all is compiled before. Others as of `scatter`.
 
-        Args:
-            law: one with a shader source, an `ExactLaw`, which is sampled, or a technique of another kind.
-            mfp: transport mean free path of red, green and blue, or one for all [mm].
-            sampling: of each pixel.
-            repeats: how often.
-            passes: "scatter", pass 3 alone, or "frame", all four of the scene last drawn.
-            fixed_alpha: reduced single-scattering albedo of the three, or one for all [-]; by default that of A, pixel
-                by pixel.
+        passes  "scatter", pass 3 alone, or "frame", all four of the scene last drawn
         """
         if passes not in PASSES:
             raise InputError(f"passes must be one of {', '.join(PASSES)}, got {passes!r}")
@@ -167,7 +159,21 @@ class Stage:
         self.release()
 
     def _surface(self, scene: Scene) -> list[Pass]:
-        return surface_passes(scene, self.size[0] / self.size[1], self._shadow_side)
+        """Return passes 1 and 2: into the shadow map, then into the maps of a G-buffer."""
+        (centre, radius), camera, lit = _sphere(scene), scene.camera, _lit(scene, self._shadow_side)
+        depth = -(camera.view() @ np.append(centre, 1.0))[2]
+        near, far = max(depth - MARGIN * radius, 0.01 * radius), depth + MARGIN * radius
+        projection = camera.projection(self.size[0] / self.size[1], near, far)
+        values = {**lit, "view": camera.view(), "projection": projection}
+        fragment, vertex = _text("shadow.frag"), _text("shadow.vert")
+        light = {name: lit[name] for name in ("light_clip", "toward_light")}
+        return [
+            Pass("shadow", {}, SHADOW, fragment, light, vertex, part.mesh, kept=NEAREST, clear=None if i else NOWHERE)
+            for i, part in enumerate(scene.parts)
+        ] + [
+            _surface("surface", part, SHADOW, values, kept=NEAREST, clear=None if i else 0.0)
+            for i, part in enumerate(scene.parts)
+        ]
 
     def _seen(self, pixel: float, is_perspective: bool, scene: Scene | None) -> None:
         self._view, self._scene, self._mean_reflectance = (pixel, is_perspective), scene, None
@@ -191,7 +197,9 @@ class Stage:
         rows: tuple[int, int] | None = None,
     ) -> tuple[Technique, Frame]:
         by, view = technique(law), self._ready()
-        frame = Frame(self.size, *view, sampling, _lengths(mfp), _albedos(fixed_alpha), self._mean, self._scene)
+        lengths = _three("mfp", mfp, "lengths > 0 [mm]", LEAST, MOST)
+        alpha = None if fixed_alpha is None else _three("fixed_alpha", fixed_alpha, "albedos in [0, 1]", 0.0, 1.0)
+        frame = Frame(self.size, *view, sampling, lengths, alpha, self._mean, self._scene)
         by.before(self)
         self.renderer.run(*(replace(one, rows=rows if one.writes == EXITANCE else None) for one in by.passes(frame)))
         return by, frame
@@ -214,24 +222,43 @@ class Stage:
         return self._mean_reflectance
 
 
-def _lengths(mfp: ArrayLike) -> Floats:
-    lengths = _three("mfp", mfp)
-    if not np.all((lengths > 0) & (lengths < np.inf)):
-        raise InputError(f"mfp must be lengths > 0 [mm], got {mfp!r}")
-    return lengths
-
-
-def _albedos(alpha: ArrayLike | None) -> Floats | None:
-    if alpha is None:
-        return None
-    albedos = _three("fixed_alpha", alpha)
-    if not np.all((albedos >= 0) & (albedos <= 1)):
-        raise InputError(f"fixed_alpha must be albedos in [0, 1], got {alpha!r}")
-    return albedos
-
-
-def _three(name: str, value: ArrayLike) -> Floats:
+def _three(name: str, value: ArrayLike, accepted: str, low: float, high: float) -> Floats:
     try:
-        return np.broadcast_to(np.asarray(value, float), 3).copy()
+        three = np.broadcast_to(np.asarray(value, float), 3).copy()
     except (TypeError, ValueError):
         raise InputError(f"{name} must be one number or three, got {value!r}") from None
+    if not np.all((three >= low) & (three <= high)):
+        raise InputError(f"{name} must be {accepted}, got {value!r}")
+    return three
+
+
+def _surface(vertex: str, part: Part, shadow: Read, values: dict[str, Any], **more: Any) -> Pass:
+    own = {"translucent": float(part.is_translucent), "roughness": part.roughness}
+    reads: dict[str, Read] = {"skin": Smooth(part.reflectance), "shadow_map": shadow}
+    fragment, text = _text("surface.frag"), _text(f"{vertex}.vert")
+    return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, text, part.mesh, **more)
+
+
+def _sphere(scene: Scene) -> tuple[Floats, float]:
+    """Return middle and radius of a sphere around all parts [mm]."""
+    points = np.concatenate([part.mesh.position for part in scene.parts])
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return centre, float(np.linalg.norm(points - centre, axis=1).max())
+
+
+def _lit(scene: Scene, shadow_side: int) -> dict[str, Any]:
+    """Return uniforms of a scene's light and of its shadow map."""
+    centre, radius = _sphere(scene)
+    toward, half = unit(scene.light.direction), MARGIN * radius
+    clip = orthographic(half, half, 0.5 * radius, 4.0 * radius) @ looking(centre + 2.0 * radius * toward, centre)
+    return {
+        "light_clip": clip,
+        "toward_light": tuple(toward),
+        "shadow_pixel": 2.0 * half / shadow_side,
+        "light": scene.light.irradiance,
+        "ambient": scene.ambient,
+    }
+
+
+def _text(file: str) -> str:
+    return text_beside(__name__, f"glsl/{file}")

@@ -32,6 +32,7 @@ from profilefit.errors import InputError, SettingError
 from profilefit.fitting.sampling import ExactTarget, LawTarget, Target
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.scenes.stage import pattern
+from profilefit.scenes.stage.buffers import require
 
 Floats = NDArray[np.float64]
 NODES, PANEL = 12, 1.0  # Gauss nodes of a panel, and the greatest width in u of one
@@ -54,9 +55,9 @@ def step_response(
     SettingError where the setting is not the law's or has no exact solution.
     """
     places, albedos, length = np.broadcast_arrays(*(np.asarray(value, float) for value in (x, alpha, mfp)))
-    _require("x", places, np.isfinite(places), "a finite place")
-    _require("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
-    _require("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
+    require("x", places, np.isfinite(places), "a finite place")
+    require("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
+    require("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
     target = target_of(setting, law)
     scaled = np.abs(places) / length
     dark = np.empty(places.shape)
@@ -77,11 +78,6 @@ def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
     if not where.is_solved:
         raise SettingError(f"exact light is not solved for {where}: give a law of that setting")
     return ExactTarget(where)
-
-
-def _require(name: str, values: Floats, good: NDArray[np.bool_], what: str) -> None:
-    if not np.all(good):
-        raise InputError(f"{name} must be {what}, got {values[~good].flat[0]:g}")
 
 
 def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
@@ -140,19 +136,16 @@ class EdgeGather:
 
 @dataclass(frozen=True)
 class EdgeEstimate:
-    """Estimate at each place x (m,), as a share of A.
+    """Estimate at each place (m,), as a share of A.
 
     mean, standard_error of it, variance of one estimate, rmse of one estimate against `truth`, the exact response
-    law_bias  of the law's own integral against the truth; `mean` - truth tends to it with the number of samples
     """
 
-    x: Floats
     truth: Floats
     mean: Floats
     standard_error: Floats
     variance: Floats
     rmse: Floats
-    law_bias: Floats
 
     @property
     def bias(self) -> Floats:
@@ -177,42 +170,24 @@ def by_quantile(alpha: float, setting: Setting | None = None) -> EdgeGather:
     return EdgeGather(lambda xi: np.exp(curve(np.log(_depth(xi)))), np.ones_like)
 
 
-def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | None = None) -> EdgeGather:
-    """Return the gather with radii uniform up to that of 99.5 % of the light, for a law or the exact profile."""
-    target = target_of(setting, law)
-    low, high = 0.0, 1e6
-    while high - low > 1e-9 * high:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if target.cdf(np.array([middle]), alpha)[0] < UNIFORM_SHARE else (low, middle)
-    return EdgeGather(lambda xi: xi * high, lambda x: target.density(x, alpha))
-
-
 def random_points(samples: int, trials: int, seed: int) -> Floats:
     """Return independent (xi, angle / 2 pi), (trials, samples, 2)."""
     return np.random.default_rng(seed).random((trials, samples, 2))
 
 
-def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | None = None) -> Floats:
-    """Return one set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
+def shifted_points(samples: int, trials: int, seed: int) -> Floats:
+    """Return the stage's lattice with a random shift for each trial (Cranley and Patterson), (trials, samples, 2).
 
-    points  (samples, 2), shifted over the whole torus; by default the stage's lattice, shifted within one of its cells,
-            which gives the same sets. -> (trials, samples, 2)
+    It is shifted within one of its cells, which gives the same sets as over the whole torus.
     """
     shift = np.random.default_rng(seed).random((trials, 1, 2))
-    if points is None:
-        return (pattern.points(samples) + shift @ pattern.best(samples).cell) % 1.0
-    chosen = np.asarray(points, float)
-    if chosen.shape != (samples, 2):
-        raise InputError(f"points must be {samples} pairs (xi, angle / 2 pi), got an array of shape {chosen.shape}")
-    return (chosen + shift) % 1.0
+    return (pattern.points(samples) + shift @ pattern.best(samples).cell) % 1.0
 
 
-def edge_estimate(
-    gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float, setting: Setting, law: ProfileLaw | None = None
-) -> EdgeEstimate:
+def edge_estimate(gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float, setting: Setting) -> EdgeEstimate:
     """Return estimator at places x (m,) [mfp] with each trial's points (trials, samples, 2), the same at every place.
 
-    setting  of the exact response that it is judged by;  law  whose own response `law_bias` compares
+    setting  of the exact response that it is judged by
     """
     places = np.atleast_1d(np.asarray(x, float))
     if points.ndim != 3 or points.shape[2] != 2 or points.shape[0] < 2:
@@ -222,17 +197,9 @@ def edge_estimate(
     weight = gather.weight(r).reshape(points.shape[:2])
     across = r.reshape(weight.shape) * np.cos(2.0 * np.pi * points[..., 1])
     found = np.stack([_ratio(weight, place + across > 0, float(place > 0)) for place in places])
-    own = truth if law is None else np.atleast_1d(step_response(places, alpha, law=law))
     variance = found.var(axis=1, ddof=1)
-    return EdgeEstimate(
-        places,
-        truth,
-        found.mean(axis=1),
-        np.sqrt(variance / points.shape[0]),
-        variance,
-        np.sqrt(np.mean((found - truth[:, None]) ** 2, axis=1)),
-        own - truth,
-    )
+    rmse = np.sqrt(np.mean((found - truth[:, None]) ** 2, axis=1))
+    return EdgeEstimate(truth, found.mean(axis=1), np.sqrt(variance / points.shape[0]), variance, rmse)
 
 
 def _ratio(weight: Floats, lit: NDArray[np.bool_], own: float) -> Floats:

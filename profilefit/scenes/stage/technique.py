@@ -28,15 +28,11 @@ COLOUR = "surface[c]"
 class Frame:
     """Picture as far as it is known when its passes are made.
 
-    Attributes:
-        size: columns and rows [pixels].
-        pixel: side of a pixel [mm], in perspective at a depth of 1 mm.
-        is_perspective: whether rays meet in an eye.
-        sampling: of each pixel.
-        mfp: transport mean free path of red, green, blue (3,) [mm].
-        fixed_alpha: reduced single-scattering albedo (3,) [-]; None where a pixel's own A gives it.
-        mean_reflectance: function that returns the mean A (3,) where light scatters [-].
-        scene: that is seen; None where buffers were uploaded.
+    size   columns and rows [pixels];  pixel  its side [mm], in perspective at a depth of 1 mm
+    mfp    transport mean free path of red, green, blue (3,) [mm]
+    fixed_alpha  reduced single-scattering albedo (3,) [-]; None where a pixel's own A gives it
+    mean_reflectance  function that returns the mean A (3,) where light scatters [-]
+    scene  that is seen; None where buffers were uploaded
     """
 
     size: tuple[int, int]
@@ -72,16 +68,13 @@ class Frame:
 class LawText:
     """Shader source of a law with the prefix `LAW`.
 
+    text    GLSL;  tables  arrays that its samplers read, by their names
+    shape   GLSL of the LAW_Shape of a pixel's channel, an expression of `surface`, the texel of reflectance_map (vec3),
+            and of `c`, the channel (int)
+    colour  GLSL of A there [-], an expression of both and of `shape`, the LAW_Shape
+
     `shape` and `colour` may also read the uniforms `fixed_alpha` and `mfp` (vec3), and are asked only where light
     scatters inside.
-
-    Attributes:
-        name: of the law.
-        text: its GLSL.
-        tables: arrays that its samplers read, by their names.
-        shape: GLSL of the LAW_Shape of a pixel's channel, an expression of `surface`, the texel of reflectance_map
-            (vec3), and of `c`, the channel (int).
-        colour: GLSL of A there [-], an expression of both and of `shape`, the LAW_Shape.
     """
 
     name: str
@@ -136,12 +129,8 @@ class Lambert(Technique):
 class TechniquePair(NamedTuple):
     """Technique that is judged, the one that is shown, and what a stage takes with both.
 
-    Attributes:
-        label: for a reader.
-        by: technique whose scattered light is held against the reference.
-        seen: technique of the picture: `by`, or more than that.
-        mfp: of red, green, blue [mm].
-        alpha: reduced single-scattering albedos of the three [-]; None where each pixel's A gives it.
+    by     whose scattered light is held against the reference;  seen  that of the picture: `by`, or more than that
+    mfp    of red, green, blue [mm];  alpha  reduced albedos of the three [-]; None where each pixel's A gives them
     """
 
     label: str

@@ -5,24 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from pydantic import ConfigDict, Field
 
 from mcml_sim import Setting
 from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
-from profilefit.recipes.stack.file import LayerStack, stack_of
-from profilefit.recipes.toml_tables import LENGTHS, Range, Table, Tables
+from profilefit.recipes.declared import LENGTHS, LISTED, Declared, NumberRange, OneOf, Range, Table, Tolerance, words
+from profilefit.recipes.stack.file import LayerStack, read_layers
 from profilefit.scenes import SCENES
 from profilefit.scenes.layers import scene as layers
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.skin import scene as skin
 from profilefit.scenes.skin.material import Painted, translucent
-from profilefit.scenes.stage.request import ViewRequest
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import GPUS, YARDSTICK
 
 CHOOSE = "choose"
-TABLES = {CHOOSE: ("pixel", "radius", "mfp", "pixels", "ms", "gpu", "resolution", "coverage")}
 # Keys of files before one format served `choose` and `scene`, by table, and what is written today.
 OLDER = {
     "view": {key: f"[{CHOOSE}] {key}" for key in ("pixel", "radius", "resolution", "coverage")}
@@ -31,7 +32,6 @@ OLDER = {
     "tolerance": {"error": "[technique] tolerance", "mfp": f"[{CHOOSE}] mfp", "pixels": f"[{CHOOSE}] pixels"},
     "budget": {"ms": f"[{CHOOSE}] ms", "gpu": f"[{CHOOSE}] gpu"},
 }
-TOLERANCE = 0.02
 LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
 
 
@@ -70,6 +70,35 @@ class Requirements:
     layers: LayerStack | None = None
 
 
+Pixels = Annotated[int, Field(ge=1, le=16384)]
+
+
+class ChooseTable(Declared):
+    """Table [choose]: limits of a scene that `profilefit scene` does not need; lengths in mm.
+
+    pixel   its side on the surface, near and far;  radius  the smallest of curvature
+    mfp, pixels  reach of the error from a step edge;  ms, gpu  budget;  coverage  share of the screen
+    """
+
+    pixel: Annotated[Range, NumberRange(*LENGTHS)] | None = None
+    radius: Annotated[float, Field(gt=0.0, allow_inf_nan=True)] = math.inf
+    mfp: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
+    pixels: Annotated[int, Field(ge=1, le=100)] = 2
+    ms: Annotated[float, Field(gt=0.0)] | None = None
+    gpu: Annotated[str, OneOf(*GPUS)] = YARDSTICK
+    resolution: Annotated[tuple[Pixels, Pixels], LISTED, words("two whole numbers of pixels in 1 ... 16384")] | None = (
+        None
+    )
+    coverage: Tolerance = 0.5
+
+
+class ChooseFile(Declared):
+    """File of a scene, of which `profilefit choose` reads the table [choose]."""
+
+    model_config = ConfigDict(extra="ignore")
+    choose: ChooseTable = ChooseTable()
+
+
 def read(path: Path | str, content: Table | None = None) -> Requirements:
     """Read a scene of skin or layers; InputError that names file, table and key, what was got and what is accepted.
 
@@ -78,71 +107,52 @@ def read(path: Path | str, content: Table | None = None) -> Requirements:
     Requirements of layers are those of the half space nearest to each colour's stack, which takes seconds.
     """
     content = read_toml(path) if content is None else content
-    reader, kind = _Reader(str(path), TABLES), content.get("scene")
-    reader.refuse_older(content)
-    if kind == "skin":
-        return reader.skin(content)
-    if kind == "layers":
-        return reader.layers(content)
-    known = ("skin", "layers") if isinstance(kind, str) and kind in SCENES else SCENES
-    raise reader.bad("", "scene", f"one of {', '.join(known)}", kind)
-
-
-class _Reader(Tables):
-    """The tables of one file, whose name every message begins with."""
-
-    def refuse_older(self, content: Table) -> None:
-        """Raise InputError for the keys of an older format, which says what is written today."""
-        tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
-        if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
-            words = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
-            first = "" if "scene" in content else 'scene = "skin" and '
-            raise InputError(f"{self.file}: keys are of an older format: write {first}{words}")
-
-    def skin(self, content: Table) -> Requirements:
-        """Return requirements of a painted or published material."""
-        request = skin.read(self.file, content)
-        limits = self.limits(content, request)
-        setting, material = replace(request.setting, illumination=request.illumination), request.material
+    file, kind = str(path), content.get("scene")
+    _refuse_older(file, content)
+    if kind not in ("skin", "layers"):
+        known = ("skin", "layers") if isinstance(kind, str) and kind in SCENES else SCENES
+        got = "nothing" if kind is None else shown(kind)
+        raise InputError(f"{file}: scene must be one of {', '.join(known)}, got {got}")
+    request = (skin if kind == "skin" else layers).read(file, content)
+    limits = ChooseFile.of(file, content).choose
+    within = Within(limits.mfp, limits.pixels)
+    if isinstance(request, layers.LayersRequest):
+        stack: LayerStack | None = request.stack
+        setting = Setting(request.illumination, n=request.media[0].layers[0].n)
+        near = [one_half_space(medium, request.illumination, within.mfp) for medium in request.media]
+        material = Painted.even([one.reflectance for one in near], [one.mfp for one in near])
+    else:
+        stack = read_layers(file, {"layers": content["layers"]}) if "layers" in content else None
+        setting = replace(request.setting, illumination=request.illumination)
+        material = request.material
         if not isinstance(material, Painted):
             one = translucent(material, setting)
             material = Painted.even(one.reflectance, one.mfp)
-        stack = stack_of(self, content["layers"]) if "layers" in content else None
-        return self.limited(limits, setting, material, stack)
+    least = LEAST_RADIUS * max(most for _, most in material.mfp)
+    if not least <= limits.radius <= LENGTHS[1] and math.isfinite(limits.radius):
+        accepted = (
+            f"at least {LEAST_RADIUS:g} times the longest mean free path, {least:.3g}, and at most {LENGTHS[1]:g} mm"
+        )
+        raise InputError(f"{file}: [{CHOOSE}] radius must be {accepted}, got {shown(limits.radius)}")
+    return Requirements(
+        "mm",
+        setting,
+        material.reflectance,
+        material.mfp,
+        limits.pixel or (request.camera.height / request.size[1],) * 2,
+        limits.radius,
+        request.technique.tolerance,
+        within,
+        Budget(limits.ms, limits.gpu, limits.coverage),
+        limits.resolution or request.size,
+        stack,
+    )
 
-    def layers(self, content: Table) -> Requirements:
-        """Return requirements of the half space nearest to each colour's stack."""
-        request = layers.read(self.file, content)
-        limits = self.limits(content, request)
-        stack, illumination = request.stack.stack, request.stack.illumination
-        near = [one_half_space(medium, illumination, limits["within"].mfp) for medium in stack.media]
-        material = Painted.even([one.reflectance for one in near], [one.mfp for one in near])
-        return self.limited(limits, Setting(illumination, n=stack.media[0].layers[0].n), material, stack)
 
-    def limits(self, content: Table, request: ViewRequest) -> dict[str, Any]:
-        """Return the fields of `Requirements` that no material has a part in."""
-        own, named = (self.table(content, name, {}) for name in (CHOOSE, "technique"))
-        side, mfp = request.camera.height / request.size[1], self.number(CHOOSE, "mfp", own, 4.0)
-        pixels = self.whole(CHOOSE, "pixels", own, 2, 1, 100)
-        return {
-            "pixel": self.range(CHOOSE, "pixel", own, *LENGTHS) if "pixel" in own else (side, side),
-            "radius": self.number(CHOOSE, "radius", own, math.inf),
-            "tolerance": self.number("technique", "tolerance", named, TOLERANCE, most=1.0),
-            "within": self.build(CHOOSE, lambda: Within(mfp, pixels)),
-            "budget": Budget(
-                self.number(CHOOSE, "ms", own) if "ms" in own else None,
-                self.text(CHOOSE, "gpu", own, YARDSTICK, tuple(GPUS)),
-                self.number(CHOOSE, "coverage", own, 0.5, most=1.0),
-            ),
-            "resolution": self.sides(CHOOSE, "resolution", own, request.size, 16384),
-        }
-
-    def limited(
-        self, limits: dict[str, Any], setting: Setting, material: Painted, stack: LayerStack | None
-    ) -> Requirements:
-        """Return requirements of a material; InputError where the surface bends within its mean free paths."""
-        longest = max(most for _, most in material.mfp)
-        if not LEAST_RADIUS * longest <= limits["radius"] <= LENGTHS[1] and math.isfinite(limits["radius"]):
-            least = f"{LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest:.3g}"
-            raise self.bad(CHOOSE, "radius", f"at least {least}, and at most {LENGTHS[1]:g} mm", limits["radius"])
-        return Requirements("mm", setting, material.reflectance, material.mfp, layers=stack, **limits)
+def _refuse_older(file: str, content: Table) -> None:
+    """Raise InputError for the keys of an older format, which says what is written today."""
+    tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
+    if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
+        told = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
+        first = "" if "scene" in content else 'scene = "skin" and '
+        raise InputError(f"{file}: keys are of an older format: write {first}{told}")

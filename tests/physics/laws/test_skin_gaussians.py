@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from profilefit.scenes.skin.law import CHANNELS, D_EON, separable
+from profilefit.materials import CHANNELS
+from profilefit.scenes.skin.law import D_EON, separable
 
 # d'Eon and Luebke, GPU Gems 3, ch. 14: variance [mm^2], weights of red, green, blue.
 PRINTED = """
@@ -25,16 +26,21 @@ def test_the_printed_table():
     assert len(CHANNELS) == 3
 
 
+def energy(skin):
+    """Integral of 2 pi r R over all r, of red, green, blue [-]."""
+    return np.sum(skin.weights, axis=0) * np.square(skin.stretches)
+
+
 def test_weights_sum_to_one():
     """ "The Gaussian weights for each profile sum to 1.0": white light stays white."""
-    np.testing.assert_allclose(D_EON.energy, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(energy(D_EON), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("skin", [D_EON, separable()], ids=["d_eon", "separable"])
 def test_profile_integrates_to_its_energy(skin):
     r = np.geomspace(1e-5, 30, 4001)
     total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
-    np.testing.assert_allclose(total, skin.energy, rtol=1e-5)
+    np.testing.assert_allclose(total, energy(skin), rtol=1e-5)
 
 
 def test_red_by_hand():
@@ -52,4 +58,4 @@ def test_separable_is_red_without_the_narrowest():
         scaled = r / (0.001 + falloff)
         narrowest = 0.233 * math.exp(-(scaled**2) / (2 * 0.0064)) / (2 * math.pi * 0.0064)
         assert skin.profile(r)[channel] == pytest.approx(D_EON.profile(scaled)[0] - narrowest, rel=1e-12)
-    assert skin.energy[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)
+    assert energy(skin)[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)

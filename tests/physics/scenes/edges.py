@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
+from benchmarks.planes import step_edge
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.buffers import step_edge
 
 DIFFUSE = Setting("diffuse")
 SHARES = (np.arange(1000) + 0.5) / 1000  # the answer is right to 1e-4

@@ -10,8 +10,7 @@ from profilefit.scenes.skin.scene import FACE, head_scene
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import seen
-from profilefit.scenes.stage.surface_integral import gathered
+from profilefit.scenes.stage.surface import gathered, seen
 from tests.physics.scenes import edges
 from tests.unit.scenes.scenes import scene
 

@@ -1,11 +1,11 @@
-"""The step edge on the GPU: the exact profile gives the exact integral, ours its noise, and short paths are Lambert."""
+"""The step edge on the GPU: the exact profile gives the exact integral, also aslant, and ours its noise."""
 
 import numpy as np
 import pytest
 
 import profilefit
+from benchmarks.planes import step_edge
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.buffers import step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage
@@ -121,3 +121,31 @@ def test_short_paths_fade_to_lambert_without_a_seam(small, exact_law):
     truth = step_response(-0.5 / lengths, ALPHA, setting=edges.DIFFUSE)
     assert np.all((light >= 0) & (np.abs(light - truth) < 0.003))
     assert np.all((np.diff(light) > 0) & (np.diff(light) < 0.006))
+
+
+LONG = 8.0  # mean free path [mm]
+ASLANT, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))
+BOUND = 0.006  # of A: at 85 degrees a pixel is 1.4 mfp, and is lit in its middle or not; standard errors are 0.001
+
+
+def bias(context, law, degrees, depth, area=True, seeds=4):
+    """Largest mean error of the step edge over columns of 32 pixels, seeds and 256 samples, as a share of A."""
+    buffers, distance = edges.aslant(ASLANT, 1.0, A, degrees, depth)
+    truth = edges.answer(distance[MIDDLE] / LONG, ALPHA)
+    with Stage(context, ASLANT, shadow_side=16) as stage:
+        stage.upload(buffers)
+        runs = [stage.scatter(law, LONG, Sampling(256, area=area, seed=seed))[MIDDLE][..., 0] for seed in range(seeds)]
+    return np.abs(np.mean(np.array(runs) / A - truth, axis=(0, 1))).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("depth", [None, 150.0])
+@pytest.mark.parametrize("degrees", [60.0, 75.0, 80.0, 85.0])
+def test_a_plane_aslant_is_the_same_plane(context, alter, exact_law, degrees, depth):
+    """In parallel and in perspective; not where samples do not stand for their area, or not for all of it."""
+    assert bias(context, exact_law, degrees, depth) < BOUND
+    if degrees < 80.0:
+        assert bias(context, exact_law, degrees, depth, area=False, seeds=1) > 2 * BOUND
+    else:
+        alter("LEAST_COSINE = 0.05;", "LEAST_COSINE = 0.25;")
+        assert bias(context, exact_law, degrees, depth, seeds=1) > 2 * BOUND

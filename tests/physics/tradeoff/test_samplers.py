@@ -5,9 +5,9 @@ import pytest
 
 import profilefit
 from mcml_sim import Setting
-from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points
+from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
 from profilefit.studies.tradeoff import samplers
-from profilefit.studies.tradeoff.contenders import YARDSTICK, with_samplers
+from profilefit.studies.tradeoff.laws import YARDSTICK, with_samplers
 
 ALPHA, EDGE = 0.8, 1.0
 SMALL = samplers.SamplerSizes((ALPHA,), (EDGE,), 40)
@@ -38,7 +38,7 @@ def test_bias_is_what_drawing_finds(uniform):
 def test_an_exact_inverse_has_its_laws_bias_only():
     law = profilefit.load("burley", "published")
     own, by_law_density = samplers.asymptotic_bias(law.sampler, ALPHA, EDGE)
-    (of_law,) = edge_estimate(by_law(law, ALPHA), random_points(2, 2, 1), [-EDGE], ALPHA, law.setting, law).law_bias
+    of_law = step_response(-EDGE, ALPHA, law=law) - step_response(-EDGE, ALPHA)
     assert own == pytest.approx(of_law, abs=samplers.ROUNDING)
     assert by_law_density == pytest.approx(own, abs=samplers.ROUNDING)
 

@@ -4,9 +4,8 @@ from profilefit.recipes import catalogue
 from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.dense_grid import Count, Spread
-from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck
+from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
-from profilefit.shader.check.map_check import MapCheck
 from tests.unit.report.test_tables import rendered
 
 FITS = catalogue.fits_folder()

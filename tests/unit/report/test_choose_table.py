@@ -19,10 +19,9 @@ from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
-from profilefit.studies.choose.fur import FurNeed
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.requirements import Budget, Requirements
-from profilefit.studies.choose.sea import SeaNeed
+from profilefit.studies.choose.scenes import FurNeed, SeaNeed
 from tests.unit.report.test_tables import rendered
 
 ONE = ((0.5, 0.5),) * 3

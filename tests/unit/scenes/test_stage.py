@@ -1,4 +1,4 @@
-"""The four passes together: light, shadow, thickness, what is seen where, what is left behind."""
+"""The four passes together: light, shadow, thickness, what is seen where; and what a G-buffer must be."""
 
 from dataclasses import replace
 
@@ -6,11 +6,12 @@ import moderngl
 import numpy as np
 import pytest
 
+from benchmarks.planes import flat, step_edge
 from profilefit.errors import InputError
 from profilefit.scenes.skin.chart import covered, covering
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage.buffers import SURFACE, flat, step_edge
+from profilefit.scenes.stage.buffers import SURFACE
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 from profilefit.scenes.stage.stage import Stage
@@ -182,31 +183,30 @@ def test_srgb():
         to_srgb(0.5, exposure=0)
 
 
+BAD = [
+    (lambda stage, law: stage.scatter("blur", 1.0), r"law must be a profile law.* got 'blur'"),
+    (lambda stage, law: stage.scatter(law, 0), r"mfp must be lengths > 0 \[mm\], got 0"),
+    (lambda stage, law: stage.scatter(law, (1, 2)), r"mfp must be one number or three, got \(1, 2\)"),
+    (lambda stage, law: stage.scatter(law, 1.0, fixed_alpha=1.5), r"fixed_alpha must be albedos in \[0, 1\], got 1.5"),
+    (lambda stage, law: stage.upload(flat((8, 8), 1.0, 0.5)), r"buffers must be \(64, 48\) pixels.* got \(8, 8\)"),
+    (lambda stage, law: stage.time(law, 1.0, passes="all"), "passes must be one of scatter, frame, got 'all'"),
+    (lambda stage, law: stage.time(law, 1.0, passes="frame"), "scatter where no scene was drawn"),
+    (lambda stage, law: Stage(stage.context, (0, 4)), r"width must be a whole number >= 1.* got 0"),
+    (lambda stage, law: Stage(stage.context, SIZE, shadow_side=0), "shadow_side must be a whole number >= 1.* got 0"),
+    (
+        lambda stage, law: Stage(stage.context, SIZE, shadow_side=2.5),
+        "shadow_side must be a whole number >= 1.* got 2.5",
+    ),
+]
+
+
 def test_bad_input_is_named(stage, burley):
     with pytest.raises(InputError, match="draw or upload comes first"):
         stage.scatter(burley, 1.0)
     stage.upload(flat(SIZE, 1.0, 0.5))
-    with pytest.raises(InputError, match=r"law must be a profile law.* got 'blur'"):
-        stage.scatter("blur", 1.0)
-    with pytest.raises(InputError, match=r"mfp must be lengths > 0 \[mm\], got 0"):
-        stage.scatter(burley, 0)
-    with pytest.raises(InputError, match=r"mfp must be one number or three, got \(1, 2\)"):
-        stage.scatter(burley, (1, 2))
-    with pytest.raises(InputError, match=r"fixed_alpha must be albedos in \[0, 1\], got 1.5"):
-        stage.scatter(burley, 1.0, fixed_alpha=1.5)
-    with pytest.raises(InputError, match=r"buffers must be \(64, 48\) pixels.* got \(8, 8\)"):
-        stage.upload(flat((8, 8), 1.0, 0.5))
-    with pytest.raises(InputError, match="passes must be one of scatter, frame, got 'all'"):
-        stage.time(burley, 1.0, passes="all")
-    with pytest.raises(InputError, match="scatter where no scene was drawn"):
-        stage.time(burley, 1.0, passes="frame")
-    with pytest.raises(InputError, match=r"normal must have shape \(48, 64, 3\)"):
-        replace(flat(SIZE, 1.0, 0.5), normal=np.zeros((4, 4, 3), np.float32))
-    with pytest.raises(InputError, match=r"width must be a whole number >= 1.* got 0"):
-        Stage(stage.context, (0, 4))
-    for side in (0, 2.5):
-        with pytest.raises(InputError, match=f"shadow_side must be a whole number >= 1.* got {side}"):
-            Stage(stage.context, SIZE, shadow_side=side)
+    for call, message in BAD:
+        with pytest.raises(InputError, match=message):
+            call(stage, burley)
 
 
 def test_release_frees_the_gpu(context, burley):
@@ -230,3 +230,41 @@ def test_release_frees_the_gpu(context, burley):
         with pytest.raises(InputError, match="stage must not be used after it was released"):
             use()
     stage.release()  # twice is once
+
+
+def spoilt(name, value, mask=1.0):
+    """A plane with one bad pixel, and the mask there."""
+    plane = replace(flat((4, 3), 1.0, 0.5), visibility=np.ones((3, 4)), roughness=np.ones((3, 4)))
+    array, inside = np.array(getattr(plane, name)), np.array(plane.mask)
+    array[1, 2], inside[1, 2] = value, mask
+    return replace(plane, mask=inside, **({} if name == "mask" else {name: array}))
+
+
+@pytest.mark.parametrize(
+    "name", ["irradiance", "reflectance", "position", "normal", "thickness", "visibility", "roughness"]
+)
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_all_are_finite_where_light_scatters(name, value):
+    with pytest.raises(InputError, match=rf"{name} must be finite where mask > 0.5, got {value}"):
+        spoilt(name, value)
+    assert spoilt(name, value, mask=0.5).size == (4, 3)
+
+
+@pytest.mark.parametrize("value", [-0.1, 1.5])
+def test_reflectance_is_a_share(value):
+    with pytest.raises(InputError, match=rf"reflectance must be in \[0, 1\] where mask > 0.5, got {value}"):
+        spoilt("reflectance", value)
+    assert spoilt("reflectance", value, mask=0.0).size == (4, 3)
+    assert spoilt("reflectance", np.float32(1.0) + np.finfo(np.float32).eps).size == (4, 3)  # a filter's rounding
+
+
+def test_misuse():
+    plane = flat((4, 3), 1.0, 0.5)
+    with pytest.raises(InputError, match="mask must be finite, got nan"):
+        replace(plane, mask=np.full((3, 4), np.nan))
+    with pytest.raises(InputError, match=r"pixel must be a length > 0 \[mm\], got 0"):
+        replace(plane, pixel=0.0)
+    with pytest.raises(InputError, match=r"normal must have shape \(3, 4, 3\), as mask has, got \(4, 4, 3\)"):
+        replace(plane, normal=np.zeros((4, 4, 3), np.float32))
+    with pytest.raises(InputError, match=r"even number of columns.* got 5"):
+        step_edge((5, 4), 1.0, 0.5)

@@ -6,21 +6,14 @@ import numpy as np
 import pytest
 
 import profilefit
+from benchmarks.planes import flat, step_edge
 from mcml_sim import Setting
 from profilefit.errors import InputError, ShaderError
 from profilefit.scenes.skin import material
-from profilefit.scenes.stage.buffers import flat, step_edge
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, uniforms_of
-from profilefit.scenes.stage.technique import (
-    EXITANCE,
-    Lambert,
-    LawText,
-    Technique,
-    maps,
-    through_text,
-)
+from profilefit.scenes.stage.technique import EXITANCE, Lambert, LawText, Technique, maps, through_text
 from tests.unit.scenes.scenes import ball, scene
 
 SIZE = (128, 128)

@@ -1,5 +1,5 @@
 // Where a ray from `origin` along the unit vector `along` comes through the surface of `floor_at` from above.
-// As profilefit.scenes.sea.hits: equal steps, the first change of sign or dip, then Newton within the bracket.
+// As profilefit.scenes.sea.waves: equal steps, the first change of sign or dip, then Newton within the bracket.
 const int NEWTON = 3;
 
 // z, dz/dx and dz/dy of the surface at a place: the shader that includes this text has it.

@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from benchmarks.fur_exponent import best_of, fitted, misfit
 from profilefit.errors import InputError
 from profilefit.scenes import fur
 from profilefit.scenes.fur import law
-from profilefit.scenes.fur.law import (
-    best_exponent,
-    best_of,
-    fitted,
-    misfit,
-    shadow,
-    shell_shadow,
-    visibility,
-)
+from profilefit.scenes.fur.law import best_exponent, shadow, shell_shadow, visibility
 from profilefit.scenes.fur.truth import cast, random_patch, rays
 
 DEGREES = (0.0, 20.0, 45.0, 70.0)

@@ -8,9 +8,8 @@ from scipy.ndimage import binary_erosion
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.atlas import BLURRED, Atlas, atlas_size
+from profilefit.scenes.heart.atlas import BLURRED, Atlas, atlas_size, links
 from profilefit.scenes.heart.law import Kernel
-from profilefit.scenes.heart.links import links
 from profilefit.scenes.heart.meshes import CHARTS_END, ball, bumps, heart
 from profilefit.scenes.heart.truth import sphere_blur, summed
 from profilefit.scenes.stage.stage import Stage
@@ -190,10 +189,7 @@ def test_a_heart_is_blurred_as_its_sum(stage, apart):
         atlas.blur(kernel)
         found = atlas.read(BLURRED)[..., 0].astype(float)[inside]
         own, seams = atlas.elements(), (inside & ~binary_erosion(inside, np.ones((3, 3))))[inside]
-        for chosen, bound in (
-            (slice(None, None, 51 * apart), 0.008),
-            (np.flatnonzero(seams)[:: 4 * apart], 0.01),
-        ):
+        for chosen, bound in ((slice(None, None, 51 * apart), 0.008), (np.flatnonzero(seams)[:: 4 * apart], 0.01)):
             light = own.irradiance[chosen]
             expected = summed(fine.elements(), kernel.variances, kernel.weights, own.points[chosen], light)[:, 0]
             assert rms(found[chosen] - expected, own.areas[chosen]) < bound

@@ -1,14 +1,13 @@
-"""A heart of layers: what a file may say, and how wrong each way draws it."""
-
-from dataclasses import replace
+"""A heart of layers: what a file may say, how wrong each technique draws it, and its points and maps."""
 
 import numpy as np
 import pytest
 
+from benchmarks import heart
 from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.recipes.folder import shipped
-from profilefit.scenes.heart import scene
+from profilefit.scenes.heart import chart, scene
 from tests.fixtures import slow
 from tests.physics.scenes.examples import changed
 
@@ -22,13 +21,9 @@ def content(place="", value=None):
 
 KEYS = "keys must be of "
 REFUSED = [
-    ("colour", 1, f"{KEYS}title, .*, got 'colour'"),
+    ("colour", 1, f"{KEYS}unit, .*, got 'colour'"),
     ("surface.colour", 1, rf"\[surface\] {KEYS}kind, size, steepness, roughness, got 'colour'"),
-    (
-        "technique.crossover",
-        1,
-        rf"\[technique\] {KEYS}kind, .*, texel, tolerance, got 'crossover'",
-    ),
+    ("technique.crossover", 1, rf"\[technique\] {KEYS}samples, .*, texel, tolerance, got 'crossover'"),
     ("surface.kind", "cow", r"\[surface\] kind must be one of heart, ball, bumps, got 'cow'"),
     ("surface.size", 0.0, r"\[surface\] size must be a number > 0 and <= 150, got 0.0"),
     ("surface.steepness", 0.1, r"\[surface\] steepness must be left out where kind is not bumps, got 0.1"),
@@ -39,8 +34,8 @@ REFUSED = [
     ("technique.texel", 0.01, r"\[technique\] texel must be a length \[mm\] of which 2048 at most make a side of"),
     ("technique.texel", float("nan"), r"\[technique\] texel must be a number > 0"),
     ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
-    ("layers.2.g", 0.9, r"\[layers\] g must be 0, and mu_s reduced"),
-    ("unit", "cm", "unit must be mm, which the surface is in, got 'cm'"),
+    ("layers.2.g", 0.9, r"\[layers 2\] g must be 0, and mu_s reduced"),
+    ("unit", "cm", "unit must be one of mm, got 'cm'"),
 ]
 
 
@@ -57,10 +52,9 @@ def test_a_mistake_is_one_line(place, value, message):
 def test_what_is_left_out_is_as_the_example_has_it():
     found = scene.read("heart.toml", content())
     least = scene.read("heart.toml", {"scene": "heart", "layers": EXAMPLE["layers"]})
-    for one in (least, replace(least, stack=found.stack)):
-        assert one.stack.stack == found.stack.stack
-        assert one.camera == found.camera
-    assert replace(least, stack=found.stack) == found
+    assert least.stack == found.stack
+    assert least.camera == found.camera
+    assert least.changed(title=found.title) == found.changed()
     wide = scene.read("heart.toml", content("surface", {"kind": "ball", "size": 30.0}) | {"camera": {}})
     assert wide.camera.height == 90.0
 
@@ -75,7 +69,7 @@ def coarse(monkeypatch, request):
 def test_the_split_is_nearest_to_the_truth(context, coarse):
     """Of a small heart; its layers are those of a record. Next to no light is lost on it."""
     of = scene.read("heart.toml", {**content(), **SMALL})
-    light = scene.light_of(of.stack, of.gaussians)
+    light = scene.light_of(of, of.technique.gaussians)
     np.testing.assert_allclose((light.kernel.energy, light.exact.energy), 1.0, atol=1e-9)
     with scene.reference_render(context, of, light) as drawn:
         judge, stage = drawn.judge, drawn.stage
@@ -109,6 +103,48 @@ def test_a_view_of_nothing_that_is_judged_is_one_line(context):
     of = scene.read("sheet.toml", told)
     with (
         pytest.raises(InputError, match="the view must show some of the sheet that"),
-        scene.reference_render(context, of, scene.light_of(of.stack, of.gaussians)),
+        scene.reference_render(context, of, scene.light_of(of, of.technique.gaussians)),
     ):
         pass
+
+
+KEPT = 300  # pixels
+
+
+@pytest.fixture
+def request_small(monkeypatch):
+    """A quarter of the example's rows and columns, its truth of coarser elements."""
+    monkeypatch.setattr(scene, "FINE", 8 * scene.meshes.CHARTS_END)
+    return scene.read("heart.toml", EXAMPLE).changed(camera_table={"resolution": (48, 36)})
+
+
+@pytest.mark.slow
+def test_ways_and_frames(context, request_small):
+    light = scene.light_of(request_small, 6)
+    with scene.reference_render(context, request_small, light, KEPT) as found:
+        assert np.count_nonzero(found.judge.mask) == KEPT
+        ways = chart.ways(found, request_small, {"screen": (4, 64), "none": (1,)}, turns=2)
+        few, many = ways["screen"]
+        assert (few.samples, many.samples) == (4, 64)
+        assert many.rmse < few.rmse < ways["none"][0].rmse
+        assert len(many.milliseconds) == 2
+        assert many.rmse == pytest.approx(chart.error(found, "screen"))
+        frames = chart.frames(found, ("split", "texture"), turns=1)
+        assert list(frames) == ["split", "texture"]
+        assert min(frames.values()) > 0
+
+
+@pytest.mark.slow
+def test_a_finer_atlas_is_nearer(context, request_small, monkeypatch):
+    """The screen by itself has none."""
+    monkeypatch.setattr(heart, "JUDGED", KEPT)
+    found = heart.over_texel_and_view(context, request_small, (0.4, 1.6), (0.0,))
+    assert found["texture"][0, 0] < 0.7 * found["texture"][1, 0]
+    assert found["split"][0, 0] < found["split"][1, 0]
+    assert found["screen"][0, 0] == found["screen"][1, 0]
+
+
+def test_a_turned_view_sees_another_side(request_small):
+    turned = heart.turned(request_small, 90.0).camera
+    np.testing.assert_allclose(turned.eye, (650.0, 0.0, 0.0), atol=1e-9)
+    assert turned.height == request_small.camera.height

@@ -48,7 +48,6 @@ def by_paths(cosine, rays=20_000):
 def is_known(cosine, kind, value, error):
     """Whether a way of counting is by all light what is known of `BROADENED`, within 2 % and four errors."""
     ratio, slack = by_laws(cosine, kind) / value, 4.0 * error / value
-    print(f"cosine {cosine}: {kind} by all light, of errors {(error / value).max():.3f} at most\n{ratio.round(3)}")
     least, most = np.array(KNOWN[cosine]).T[..., None]
     return bool(np.all((ratio > least - 0.02 - slack) & (ratio < most + 0.02 + slack)))
 

@@ -8,12 +8,11 @@ from benchmarks.sea_photons import scattered_once, trace_view
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.scenes.sea import paths
-from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
-from profilefit.scenes.sea.hits import dense_hit, newton_hit, to_plane
+from profilefit.scenes.sea.caustics import Splat, caustic_map
 from profilefit.scenes.sea.paths import Sunlight, followed, met, traced
 from profilefit.scenes.sea.scene import lobes_of
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
+from profilefit.scenes.sea.waves import Waves, dense_hit, newton_hit, random_floor, random_sea, refracted, to_plane
 
 TILE, N, LIKE_AIR = 5.0, 1.34, 1.0 + 1e-7  # a world's water must be denser than the air
 MILD = ((1.0, 0.8),)
@@ -53,8 +52,6 @@ def test_in_a_furnace_all_is_one():
     """Under waves and over an uneven floor, whatever way a ray goes; not over a floor that takes a half."""
     value, error = in_furnace(1.0, 30_000, seed=1)
     dark, dark_error = in_furnace(0.5, 6_000, seed=2)
-    print(f"worst {np.abs((value - 1) / error).max():.2f} standard errors, of {error.max():.4f} at most")
-    print("half a floor, down to up:", dark.mean(axis=1).round(3))
     assert np.all(np.abs(value - 1.0) < 4.0 * error)
     assert error.max() < 0.035
     assert np.all(dark[:5] < 1.0 - 8.0 * dark_error[:5])
@@ -83,7 +80,6 @@ def test_other_photons_bring_the_same(tilt, cosine, level):
     """All orders, in each of three waters that one path stands for; the first order alone is far off."""
     value, other, once, error, its = other_photons(MILD, tilt, cosine, level, photons=100_000, rays=40_000)
     off, short = (value - other) / np.hypot(error, its), (once - other) / np.hypot(error, its)
-    print(f"off by {off.round(2)} standard errors of {np.hypot(error, its) / other}; order 1 by {short.round(0)}")
     assert np.all(np.abs(off) < 4.0)
     assert np.all(np.hypot(error, its) < 0.03 * other)
     assert np.all(short < -30.0)
@@ -95,7 +91,6 @@ def test_other_photons_of_the_sea(tilt, cosine, level):
     """Petzold's lobe is so sharp that photons need millions, of which each group's error is known badly."""
     value, other, once, error, its = other_photons(lobes_of("petzold"), tilt, cosine, level, 4_000_000, 200_000, 5)
     off = (value - other) / np.hypot(error, its)
-    print(f"off by {off.round(2)} standard errors, paths {error / other}, photons {its / other}")
     assert np.all(np.abs(off) < 4.0)
     assert np.all(error < 0.01 * other)
     assert np.all((once - other) / np.hypot(error, its) < -10.0)
@@ -115,7 +110,6 @@ def test_light_to_and_fro_under_a_calm_surface(tilt):
     way[:, 2] = -np.abs(way[:, 2])
     found = followed(world, coarse(world), np.tile([0.0, 0.0, -1.0], (len(way), 1)), way, rng)
     value, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
-    print(f"by its closed form {value / known}, {(value - known) / error} standard errors")
     assert np.all(np.abs(value - known) < 4.0 * error)
     assert np.all(error < 0.006 * known)
     assert np.all((share * flux / np.pi - value)[:2] < -20.0 * error[:2])  # once reflected
@@ -143,10 +137,6 @@ def test_sunlight_in_the_water_is_a_caustic_map(context, tilt, drift):
     )
     found = flux.reshape(pixels, pixels) / entered
     off, transposed, far = (np.sqrt(np.mean((one - drawn) ** 2)) for one in (found, found.T, other))
-    print(
-        f"F {focus(sea, depth, N, tilt):.2f}: rms {off:.4f}, transposed {transposed:.2f}, of another sea {far:.2f}, "
-        f"contrast {drawn.std():.2f}"
-    )
     assert off < 0.03
     assert transposed > 0.2
     assert far > 0.2
@@ -193,10 +183,6 @@ def test_where_a_ray_meets_a_surface(is_floor, slope):
     steep = surface.steepest * sine / cosine
     off, wrong = (~(np.abs(one - true) <= 0.01 * depth) for one in (met(surface, start, way), plain))
     once = steep < paths.ONCE
-    print(
-        f"wrong: {off.mean():.4f}, of S > 10 {off[steep > 10].mean():.3f}, of S < 10 {off[steep < 10].mean():.4f}; "
-        f"by Newton alone {wrong.mean():.3f}; once {once.sum()}"
-    )
     assert not np.any(off[steep < 2.5])
     assert off[steep < 10.0].mean() < 0.002
     assert off.mean() < 0.015
@@ -254,7 +240,6 @@ def test_a_pixel_is_the_mean_over_its_area():
     ]
     bare = traced(world, coarse(world), np.array([0.0, 0.0, -2.0]), corner[None], 0 * up, 0 * up, 100).radiance[0, 0]
     spread = seen(corner + u[..., None] * across + v[..., None] * up).std() / np.sqrt(10_000)
-    print(f"{found} of {known:.4f} with errors of {spread:.4f}; of its corner {bare:.4f}, {seen(corner):.4f}")
     assert np.all(np.abs(found - known) < 4.0 * spread)
     assert abs(bare - seen(corner)) < 1e-6
     assert abs(seen(corner) - known) > 40.0 * spread

@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from benchmarks.sea_photons import trace_beam, trace_view
-from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
-from profilefit.errors import InputError
+from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from profilefit.scenes.sea.paths import turn
 
 SHARP = HenyeyGreenstein(0.924)
@@ -31,13 +30,6 @@ def test_one_scattering_is_its_integral(sidak):
             assert abs(one - 1.05 * known) > 1.5 * bound * sigma
 
 
-def test_unscattered_light_is_exact():
-    found = trace_beam(SHARP, DEPTHS, RADII, 1000, 0)
-    still = found.within.at(0.0)
-    np.testing.assert_allclose(still.value, np.exp(-DEPTHS)[:, None] * np.ones(3), rtol=1e-14)
-    np.testing.assert_allclose(still.standard_error, 0.0, atol=1e-15)
-
-
 def test_energy_between_planes(sidak):
     """Of isotropic scattering far down, net flux falls as absorption takes it: both directions, all orders.
 
@@ -51,36 +43,6 @@ def test_energy_between_planes(sidak):
     error = np.hypot(down.standard_error, up.standard_error) / net
     assert abs(np.log(net[0] / net[1]) - 0.7104) < 0.08 + 4 * np.hypot(*error)
     assert np.all(up.value > 0)
-
-
-def test_orders_of_a_lower_albedo_are_those_of_a_run_of_its_own(sidak):
-    """One run answers for every albedo below its own."""
-    together, apart = (trace_beam(SHARP, DEPTHS, RADII, 200_000, seed, h) for seed, h in ((1, 0.9), (2, 0.3)))
-    one, two = together.within.at(0.3), apart.within.at(0.3)
-    z = np.abs(one.value - two.value) / np.hypot(one.standard_error, two.standard_error)
-    assert np.max(z) < 1.5 * sidak(z.size)
-    other = together.within.at(0.35)
-    assert np.max(np.abs(other.value - two.value) / np.hypot(other.standard_error, two.standard_error)) > 10
-
-
-def test_a_term_of_weight_one_is_the_term():
-    mixture = Mixture((1.0, 0.0), (SHARP, HenyeyGreenstein(0.2)))
-    one, two = (trace_beam(phase, DEPTHS, RADII, 2000, 5).within.at(0.5) for phase in (SHARP, mixture))
-    np.testing.assert_array_equal(one.value, two.value)
-
-
-def test_a_seed_is_a_run():
-    one, two, other = (trace_beam(SHARP, DEPTHS, RADII, 2000, seed).plane.at(0.5).value for seed in (5, 5, 6))
-    np.testing.assert_array_equal(one, two)
-    assert np.all(one != other)
-
-
-def test_errors_are_those_of_repeats():
-    """Thirty runs spread as each says that it would."""
-    runs = [trace_beam(SHARP, [1.0], [0.1], 1600, seed).within.at(0.8) for seed in range(30)]
-    spread = np.std([one.value for one in runs], ddof=1)
-    said = np.sqrt(np.mean([one.standard_error**2 for one in runs]))
-    assert 0.6 < spread / said < 1.6
 
 
 def test_turned_directions():
@@ -125,30 +87,3 @@ def test_backward_is_forward(sidak):
     value, error = found.value[0] * 4 * np.pi / 0.8, found.standard_error[0] * 4 * np.pi / 0.8
     assert abs(value - known) < 1.5 * sidak(1) * error + 1e-4
     assert error < 0.01 * known
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"phase": 0.9}, "phase must be"),
-        ({"depths": [0.0]}, "depths must be"),
-        ({"depths": []}, "depths must be"),
-        ({"radii": [1.0, 0.5]}, "radii must be"),
-        ({"radii": [np.nan]}, "radii must be"),
-        ({"photons": 3}, "photons must be"),
-        ({"highest": 1.0}, "highest must be"),
-        ({"highest": 0.0}, "highest must be"),
-    ],
-)
-def test_what_no_run_has(change, named):
-    with pytest.raises(InputError, match=named):
-        trace_beam(**{"phase": SHARP, "depths": [1.0], "radii": [1.0], "photons": 100, **change})
-
-
-def test_what_no_view_has():
-    with pytest.raises(InputError, match="cosine must be"):
-        trace_view(SHARP, [1.0], cosine=1.1)
-    with pytest.raises(InputError, match="sun must be"):
-        trace_view(SHARP, [1.0], sun=1.6)
-    with pytest.raises(InputError, match="omega must be"):
-        trace_beam(SHARP, [1.0], [1.0], 100).plane.at(0.9)

@@ -1,4 +1,4 @@
-"""Shafts under waves by lines, prisms and slices against quadrature; where single scattering fails."""
+"""Shafts under waves by lines, prisms and slices against quadrature."""
 
 from functools import cache
 
@@ -6,24 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from benchmarks.sea_photons import deep_radiance, fading, scaled_once, share_once, trace_view
-from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
+from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from profilefit.errors import InputError
-from profilefit.scenes.sea.shafts import (
-    Bundle,
-    ViewRay,
-    by_lines,
-    by_prisms,
-    by_quadrature,
-    by_slices,
-    determinant,
-    flux_below,
-)
+from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices, flux_below
 
 WAVES = ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))
 OVERHEAD, TILTED = Bundle(0.0, WAVES), Bundle(0.4, WAVES)
 SHARP = HenyeyGreenstein(0.924)
-THREE = Mixture((0.317, 0.68135, 0.00165), tuple(map(HenyeyGreenstein, (0.9933, 0.8957, -0.635))))
 
 
 def view(x, z, elevation, length, azimuth=0.0):
@@ -41,11 +30,11 @@ VIEWS = [
 
 @cache
 def truths(bundle, phase):
-    return np.array([by_quadrature(bundle, one, phase) for one in VIEWS])
+    return np.array([by_prisms(bundle, one, phase, FINE) for one in VIEWS])
 
 
-def rms(way, count, bundle=OVERHEAD, phase=SHARP, **more):
-    found = np.array([way(bundle, one, phase, count, **more) for one in VIEWS])
+def rms(way, count, bundle=OVERHEAD, phase=SHARP):
+    found = np.array([way(bundle, one, phase, count) for one in VIEWS])
     return float(np.sqrt(np.mean((found / truths(bundle, phase) - 1) ** 2)))
 
 
@@ -63,7 +52,7 @@ def test_the_quadrature_against_a_sum_along_the_ray():
         slant = np.sqrt(1 + q * q)
         cosine = -(at.direction[0] * q + at.direction[2]) / slant
         along[i] = float(SHARP.pdf(cosine)) * density * slant * np.exp(-0.7 * (z * slant + one))
-    assert by_quadrature(bundle, at, SHARP) == pytest.approx(at.length * along.mean(), rel=2e-6)
+    assert by_prisms(bundle, at, SHARP, FINE) == pytest.approx(at.length * along.mean(), rel=2e-6)
 
 
 def test_error_over_samples():
@@ -83,15 +72,6 @@ def test_error_over_samples():
 def test_slices(bundle):
     for phase in (Isotropic(), SHARP):
         assert rms(by_slices, 64, bundle, phase) < 0.01
-    # Negative control: the sun's own direction in place of the map's.
-    assert rms(by_slices, 64, bundle, SHARP, has_slopes=False) > 0.01
-
-
-def test_a_prism_of_constant_irradiance_makes_light():
-    """It does not get better with more of them, as those that keep their flux do."""
-    for bundle in (OVERHEAD, TILTED):
-        assert rms(by_prisms, 256, bundle, is_spread=False) > 0.03
-        assert rms(by_prisms, 256, bundle) < 1e-4
 
 
 def test_flux_is_kept():
@@ -104,62 +84,6 @@ def test_flux_is_kept():
     assert np.max(np.abs(np.diff(flux) / np.diff(x) - 1)) > 0.5  # and the map is none of an even light
 
 
-def test_area_of_a_prism():
-    """det(1 + z Q), against the corners of a small square, and quadratic in depth."""
-    gradient = np.array([[-0.5, 0.2], [0.3, -0.1]])
-    for z in (0.0, 1.0, 2.5):
-        side, up = np.array([1.0, 0.0]) + z * gradient[:, 0], np.array([0.0, 1.0]) + z * gradient[:, 1]
-        assert determinant(gradient, z) == pytest.approx(side[0] * up[1] - side[1] * up[0], rel=1e-12)
-    assert determinant(gradient, [1.0, 2.0]).shape == (2,)
-    assert determinant(-np.eye(2), 2.0) == pytest.approx(1.0)  # behind two folds it is positive again
-
-
-def test_single_scattering_toward_an_eye():
-    """A tenth is missing from omega 0.15 on near the surface, from 0.05 on at ct = 1; nine tenths at omega 0.8."""
-    found = trace_view(SHARP, [0.05, 0.1, 1.0, 2.0], photons=400_000, seed=2)
-    for omega, known in (
-        (0.05, (0.963, 0.957, 0.90, 0.85)),
-        (0.3, (0.78, 0.74, 0.50, 0.36)),
-        (0.8, (0.37, 0.33, 0.102, 0.039)),
-    ):
-        share = share_once(found, omega)
-        assert np.all(np.abs(share.value - known) < 0.01 + 4 * share.standard_error)
-    # With its forward peak as unscattered it is near at the surface, and fails deeper as well.
-    depths = np.array([0.05, 0.1, 1.0, 2.0])
-    ratio = scaled_once(0.8, depths, SHARP) / found.at(0.8).value
-    assert abs(ratio[1] - 1.11) < 0.06
-    assert abs(ratio[2] - 0.64) < 0.06
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("phase", "photons"), [(SHARP, 4_000_000), (THREE, 8_000_000)])
-def test_light_of_the_deep_fades_by_its_own_rate(phase, photons):
-    depths = np.array([2.0, 3.0, 4.0, 6.0])
-    found = trace_view(phase, depths, photons=photons, seed=12)
-    for omega in (0.1, 0.3, 0.5, 0.65, 0.8):
-        true = found.at(omega)
-        off = np.abs(deep_radiance(omega, depths, phase) / true.value - 1) - 4 * true.standard_error / true.value
-        assert np.max(off) < 0.08
-        if omega >= 0.3:  # single scattering fails the same bound
-            assert share_once(found, omega).value[0] < 0.5
-    assert fading(0.0) == 1.0
-    assert fading(0.8) == pytest.approx(0.18, abs=0.01)
-
-
-def test_what_no_bundle_or_view_has():
-    with pytest.raises(InputError, match="period must be"):
-        Bundle(0.0, WAVES, period=0.0)
-    with pytest.raises(InputError, match="tilt must be"):
-        Bundle(np.nan, WAVES)
-    with pytest.raises(InputError, match="waves must be"):
-        Bundle(0.0, ((0.1, 1.5, 0.0),))
-    with pytest.raises(InputError, match="direction must be"):
-        ViewRay(0.0, 1.0, (1.0, 1.0, 0.0), 1.0)
-    with pytest.raises(InputError, match="stay under water"):
-        ViewRay(0.0, 1.0, (0.0, 0.0, -1.0), 2.0)
+def test_what_has_no_prisms():
     with pytest.raises(InputError, match="count must be"):
         by_prisms(OVERHEAD, VIEWS[0], SHARP, 0)
-    with pytest.raises(InputError, match="gradient must"):
-        determinant(np.eye(3), 1.0)
-    with pytest.raises(InputError, match="omega must be"):
-        fading(1.2)

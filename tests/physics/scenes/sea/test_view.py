@@ -130,7 +130,6 @@ def test_a_calm_sea_that_scatters_nothing(context, few_depths, kind):
     way = directions(camera, size)
     expected, once = (optics(world, camera.eye, way, to_and_fro) for to_and_fro in (True, False))
     bright, up = expected.max(axis=(0, 1)), way[..., 2]
-    print(f"off by {(np.abs(found - expected) / bright).max():.1e} of the brightest")
     assert np.all(np.abs(found - expected) < 3e-3 * bright)
     for part, least in ((up < -0.15, 400), ((up > 0.15) & (up < EDGE), 400), (up > EDGE + 0.01, 30)):
         assert part.sum() > least
@@ -164,9 +163,6 @@ def test_the_truth_where_nothing_is_scattered():
     value, error = each.mean(axis=1), each.std(axis=1) / np.sqrt(paths)
     expected, once = (optics(world, eye, way, to_and_fro) for to_and_fro in (True, False))
     off, short = np.abs(value - expected) / error, np.sum(value - once, axis=0) / np.linalg.norm(error, axis=0)
-    print(
-        f"worst {off.max():.2f} of errors {(error / expected).max(axis=0)}; without light to and fro by {short[0]:.0f}"
-    )
     assert np.all(off < 4.0)
     assert np.all((error / expected).max(axis=0) < (0.05, 0.12, 0.15))
     assert short[0] > 8.0
@@ -207,7 +203,6 @@ def test_the_haze_of_a_view_is_that_of_its_quadrature(context, few_directions, k
             for one, n in ((kind, 24), (kind, 4), (SCALED if kind == SINGLE else SINGLE, 24))
         )
     off, coarse, far = (np.abs(one / expected - 1.0) for one in (found, few, other))
-    print(f"{kind}: off by {off.max():.4f}, by 4 pieces {coarse.max():.4f}, of another kind {far.max():.2f}")
     assert np.all(off < most)
     assert (coarse.max() > 3.0 * most) == (kind == BROADENED)
     assert np.all(far.max(axis=1) > 0.2)
@@ -305,7 +300,6 @@ def test_errors_leave_the_truths_own_noise_out():
     judged = found.rmse(picture)
     biased = np.sqrt(np.mean((picture - found.reference) ** 2))
     square = np.mean(found.relative_error(picture) ** 2)
-    print(f"rmse {judged:.4f} of 0.3, by the mean of the halves {biased:.4f}; error map {np.sqrt(square):.4f}")
     assert abs(judged - 0.3) < 0.02
     assert biased > 0.6
     assert abs(np.sqrt(square) - judged) < 0.03
@@ -323,7 +317,7 @@ def test_errors_leave_the_truths_own_noise_out():
 
 @pytest.fixture(scope="module")
 def example():
-    return replace(read("sea.toml", tomllib.loads(EXAMPLE.read_text())), size=(32, 24))
+    return read("sea.toml", tomllib.loads(EXAMPLE.read_text())).changed(camera_table={"resolution": (32, 24)})
 
 
 @pytest.mark.slow
@@ -336,8 +330,6 @@ def test_the_example(context, example):
         other = halves_of(example, drawn.request.world, 300_000, seed=1)
         swapped, upside_down = found.rmse(picture[:, ::-1]), found.rmse(picture[::-1])
         means = picture.mean(axis=(0, 1)) / found.reference.mean(axis=(0, 1))
-        print(errors, f"by 96 pieces {found.rmse(more):.4f}, mirrored {swapped:.2f}, upside down {upside_down:.2f}")
-        print(f"truth's errors {found.truth_error}; means by its {means}")
         assert errors[BROADENED] < 0.17
         assert errors[SCALED] > 3.5 * errors[BROADENED]
         assert errors[SINGLE] > max(errors[SCALED], 4.5 * errors[BROADENED])
@@ -350,7 +342,6 @@ def test_the_example(context, example):
         judged = found.rmse(other.mean(axis=0))
         biased = np.sqrt(np.mean((other.mean(axis=0) - found.reference) ** 2)) / found.mean
         square = np.sqrt(np.mean(found.relative_error(picture) ** 2))
-        print(f"another truth: {judged:.4f}, its noise {noise:.4f}, with that of both {biased:.4f}; map {square:.4f}")
         assert 0.6 < judged / noise < 1.5
         assert biased > 1.15 * noise
         assert abs(square / errors[BROADENED] - 1.0) < 0.2

@@ -1,11 +1,26 @@
-"""Sums of cosines, and what their slopes do to sunlight."""
+"""Sums of cosines and what slopes do to sunlight; a ray's first crossing, where iterations fail, in float32."""
 
+import moderngl
 import numpy as np
 import pytest
 
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
+from profilefit.scenes.sea import waves
+from profilefit.scenes.sea.waves import (
+    Waves,
+    dense_hit,
+    first_hit,
+    newton_hit,
+    random_floor,
+    random_sea,
+    refracted,
+    to_plane,
+    wrong_shares,
+)
+from profilefit.scenes.stage.renderer import float_texture
+from profilefit.shader.context import program
+from profilefit.shader.emit import text_beside
 
 TILE = 10.0
 STEP = 2.0 * np.pi / TILE
@@ -16,20 +31,15 @@ def sea():
     return random_sea(0.15, TILE, seed=3)
 
 
-def test_slope_and_curvature_are_derivatives(sea):
+def test_slopes_are_derivatives(sea):
     x, y = np.random.default_rng(0).uniform(0.0, TILE, (2, 200))
     step = 1e-4
     east, west, north, south = (
-        (sea.height(x + dx, y + dy), sea.slope(x + dx, y + dy))
-        for dx, dy in np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]) * step
+        sea.height(x + dx, y + dy) for dx, dy in np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]) * step
     )
     zx, zy = sea.slope(x, y)
-    zxx, zxy, zyy = sea.curvature(x, y)
-    np.testing.assert_allclose(zx, (east[0] - west[0]) / (2 * step), atol=1e-8)
-    np.testing.assert_allclose(zy, (north[0] - south[0]) / (2 * step), atol=1e-8)
-    np.testing.assert_allclose(zxx, (east[1][0] - west[1][0]) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(zyy, (north[1][1] - south[1][1]) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(zxy, (north[1][0] - south[1][0]) / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(zx, (east - west) / (2 * step), atol=1e-8)
+    np.testing.assert_allclose(zy, (north - south) / (2 * step), atol=1e-8)
 
 
 def test_lattice_is_height_and_slope_at_all_pairs(sea):
@@ -115,3 +125,217 @@ def test_refraction_is_snell_and_fresnel():
 def test_refusals(make, message):
     with pytest.raises(InputError, match=f"^{message}.*$"):
         make()
+
+
+DEPTH = 5.0
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def unit(*direction):
+    return np.array(direction) / np.linalg.norm(direction)
+
+
+def lit_floor(steep, count=2000, seed=0):
+    """A floor, origins above it and rays of a sun at 63 degrees below waves, of which the flattest has this S."""
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(0.0, TILE, (count, 2))
+    x, y, _ = refracted(np.radians(63.0), random_sea(0.15, TILE, seed).slope(*place.T), 1.34)
+    ray = np.column_stack([x, y, -np.ones(count)]) / np.sqrt(1.0 + x**2 + y**2)[:, None]
+    floor = random_floor(1.0, TILE, DEPTH, seed + 1)
+    floor = floor.scaled(steep / np.max(floor.steepest * np.hypot(x, y)))
+    origin = np.column_stack([place, np.full(count, max(0.0, floor.highest))])
+    return floor, origin, ray
+
+
+def test_a_plane_is_met_exactly():
+    """z = -5 + 0.3 x: one Newton step is exact, whatever the bracket. Scalars in, scalar out."""
+    ray = unit(1.0, 0.0, -2.0)
+
+    def slant(x, y):
+        return -5.0 + 0.3 * np.asarray(x)
+
+    found = first_hit(slant, [0.0, 1.0, 0.5], ray, -20.0, 5.0)
+    assert isinstance(found, float)
+    np.testing.assert_allclose(found, 5.5 / (-ray[2] + 0.3 * ray[0]), rtol=1e-12)
+    several = first_hit(slant, np.zeros((2, 3, 3)), ray, -20.0, 5.0, steps=1)
+    assert several.shape == (2, 3)
+    np.testing.assert_allclose(several, 5.0 / (-ray[2] + 0.3 * ray[0]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [1, 16, 1024])
+def test_a_level_floor_at_its_own_bounds(steps):
+    level = lambda x, y: np.full(np.shape(x), -5.0)  # noqa: E731
+    np.testing.assert_allclose(first_hit(level, np.zeros(3), DOWN, -5.0, -4.0, steps), 5.0, rtol=1e-12)
+    np.testing.assert_allclose(first_hit(level, np.zeros(3), DOWN, -6.0, -5.0, steps), 5.0, rtol=1e-12)
+
+
+def test_rays_that_never_hit_are_nan():
+    floor = random_floor(0.3, TILE, DEPTH)
+    rays = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], DOWN])
+    found = first_hit(floor.height, np.zeros(3), rays, floor.lowest, floor.highest)
+    np.testing.assert_array_equal(np.isnan(found), [True, True, False])
+    # A map that ends: rays that leave it before they are down.
+    ends = lambda x, y: np.where(np.asarray(x) < 2.0, -5.0, np.nan)  # noqa: E731
+    found = first_hit(ends, np.zeros(3), np.array([unit(1.0, 0.0, -1.0), unit(0.3, 0.0, -1.0)]), -6.0, -4.0)
+    np.testing.assert_array_equal(np.isnan(found), [True, False])
+    # Upward from a valley, through the hill beside it.
+    hills = lambda x, y: np.cos(np.asarray(x))  # noqa: E731
+    rising = first_hit(hills, [np.pi, 0.0, -0.9], unit(1.0, 0.0, 0.1), -1.0, 1.0, steps=64)
+    np.testing.assert_allclose(
+        hills(np.pi + rising * unit(1.0, 0.0, 0.1)[0], 0.0), -0.9 + rising * unit(1.0, 0.0, 0.1)[2]
+    )
+
+
+def test_the_first_of_three_crossings():
+    """A ray that grazes a wave and comes out of it: later crossings are farther on."""
+    wave = lambda x, y: 0.5 * np.cos(np.asarray(x))  # noqa: E731
+    tilt = lambda x, y: (-0.5 * np.sin(np.asarray(x)), 0.0 * np.asarray(y))  # noqa: E731
+    ray, origin = unit(1.0, 0.0, -0.05), np.array([np.pi, 0.0, 0.55])
+    found = first_hit(wave, origin, ray, -0.5, 0.56, slope=tilt)
+    k = np.linspace(0.0, 30.0, 3_000_001)
+    gap = origin[2] + k * ray[2] - wave(origin[0] + k * ray[0], 0.0)
+    changes = k[np.flatnonzero(np.diff(np.sign(gap)))]
+    assert len(changes) > 2
+    np.testing.assert_allclose(found, changes[0], atol=2e-5)
+    np.testing.assert_allclose(dense_hit(wave, origin, ray, -0.5, 0.56), changes[0], atol=2e-5)
+
+
+@pytest.mark.slow
+def test_where_iterations_fail():
+    """S = 0.66, 2.5, 5: shares off by more than 1 % of the depth. Iterations alone fail where S > 1, steps do not."""
+    ways = ["newton_1m", "newton", "shah", 1, 8, 16]
+    shares = wrong_shares(ways, [0.66, 2.5, 5.0], rays=1500)
+    published, newton, shah, one, eight, sixteen = shares
+    assert np.all(shares[1:, 0] == 0.0)
+    assert published[1] > 0.3 and shah[1] > 0.2 and newton[1] > 0.05  # noqa: PT018
+    assert newton[2] > one[2] > 0.05
+    assert np.all(eight <= 0.01)
+    assert np.all(sixteen <= 0.002)  # 0.0005 at most over four floors of 2000 rays
+
+
+def test_newton_is_exact_while_the_ray_hits_once():
+    """From the mean plane, S < 1: 3 iterations within 4e-6 of the depth, 4 within 2e-11. From 1 m they may diverge."""
+    for steep, three in ((0.33, 1e-12), (0.66, 1e-8), (0.999, 1e-5)):
+        floor, origin, ray = lit_floor(steep)
+        true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest)
+        start = to_plane(origin, ray, floor.mean)
+        off = [
+            np.abs(newton_hit(floor.height, floor.slope, origin, ray, start, count) - true) / DEPTH for count in (3, 4)
+        ]
+        assert np.median(off[0]) < 1e-14
+        assert off[0].max() < three
+        assert off[1].max() < 1e-9
+        safe = first_hit(floor.height, origin, ray, floor.lowest, floor.highest, 16, floor.slope)
+        without = first_hit(floor.height, origin, ray, floor.lowest, floor.highest, 16)
+        assert np.abs(safe - true).max() < 1e-13 * DEPTH
+        assert np.abs(without - true).max() < 1e-13 * DEPTH
+    assert np.abs(newton_hit(floor.height, floor.slope, origin, ray, 1.0) - true).max() > DEPTH
+    assert np.abs(newton_hit(floor.height, None, origin, ray, start) - true).max() > 0.001 * DEPTH
+
+
+FEEDBACK = """
+in vec3 origin;
+in vec3 along;
+uniform sampler2D floor_waves;
+uniform vec3 bed;
+uniform float tile;
+out vec2 distance;
+
+vec3 floor_at(vec2 place) {
+    vec3 ground = waves_at(floor_waves, tile, place);
+    return vec3(bed.x + ground.x, ground.yz);
+}
+
+void main() {
+    distance = vec2(newton_hit(origin, along, bed.x, 4), first_hit(origin, along, bed.y, bed.z, 16));
+    gl_Position = vec4(0.0);
+}
+"""
+
+
+def by_vertices(context, floor, origin, ray):
+    """Newton's distance and the first hit, (n, 2), as a vertex shader finds them."""
+    texts = (text_beside(waves.__name__, f"glsl/{name}.glsl") for name in ("waves", "hits"))
+    vertex = "\n".join(["#version 330", *texts, FEEDBACK])
+    compiled = program(context, "hits", "#version 330\nvoid main() {}", vertex, varyings=["distance"])
+    table = float_texture(context, (floor.texels.shape[1], 1), 4, floor.texels)
+    table.use(0)
+    compiled["floor_waves"], compiled["tile"] = 0, floor.tile
+    compiled["bed"] = floor.mean, floor.lowest, floor.highest
+    buffer = context.buffer(np.hstack([origin, ray]).astype("f4").tobytes())
+    found = context.buffer(reserve=8 * len(origin))
+    array = context.vertex_array(compiled, [(buffer, "3f 3f", "origin", "along")])
+    target = context.simple_framebuffer((1, 1))  # nothing is drawn, but OpenGL wants one
+    with context.scope(target):
+        array.transform(found, moderngl.POINTS, vertices=len(origin))
+    distances = np.frombuffer(found.read(), np.float32).reshape(-1, 2).astype(float)
+    for one in (array, found, buffer, table, compiled, target):
+        one.release()
+    return distances
+
+
+def test_single_precision_in_a_vertex_shader(context):
+    """The text that ships against float64, over the same float32 rays, in the depth."""
+    floor, origin, ray = lit_floor(0.7)
+    origin, ray = (one.astype(np.float32).astype(float) for one in (origin, ray))
+    true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest)
+    off = np.abs(by_vertices(context, floor, origin, ray) - true[:, None]) / DEPTH
+    assert np.all(off.max(axis=0) < 1e-6)
+    floor, origin, ray = lit_floor(5.0)
+    origin, ray = (one.astype(np.float32).astype(float) for one in (origin, ray))
+    true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest)
+    off = np.abs(by_vertices(context, floor, origin, ray) - true[:, None]) / DEPTH
+    wrong = np.mean(off > 0.01, axis=0)
+    assert wrong[1] < 0.002
+    assert wrong[0] > 0.1
+
+
+def test_level_floors_in_a_vertex_shader(context):
+    """2,100 views of level and nearly level floors, .1 to 1000 m deep, from .01 m on: each ray hits, to 1e-6 depths."""
+    rng = np.random.default_rng(1)
+    for depth in (0.1, 1.0, 4.0, 5.0, 10.0, 100.0, 1000.0):
+        for slope in (0.0, 1e-8, 1e-4):
+            floor = random_floor(slope, 2.0 * depth, depth) if slope else Waves(2.0 * depth, mean=-depth)
+            eye = np.geomspace(0.01, max(0.02, 0.5 * depth), 100)
+            origin = np.column_stack([rng.uniform(0.0, depth, (100, 2)), floor.highest + eye])
+            turn, down = rng.uniform(0.0, 2.0 * np.pi, 100), rng.uniform(0.01, 1.0, 100)
+            level = np.sqrt(1.0 - down**2)
+            ray = np.column_stack([level * np.cos(turn), level * np.sin(turn), -down])
+            origin, ray = (one.astype(np.float32).astype(float) for one in (origin, ray))
+            true = dense_hit(floor.height, origin, ray, floor.lowest, floor.highest, 64)
+            off = np.abs(by_vertices(context, floor, origin, ray)[:, 1] - true) * -ray[:, 2]
+            assert off.max() < 1e-6 * depth, (depth, slope)
+
+
+def plane(x, y):
+    return np.full(np.shape(x), -5.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"direction": [0.0, 0.0, -2.0]}, "direction must be of unit length, got \\|direction\\| = 2$"),
+        ({"direction": [0.0, 0.0, 0.0]}, "direction must be of unit length, got \\|direction\\| = 0$"),
+        ({"direction": [0.0, -1.0]}, "direction must have shape \\(\\.\\.\\., 3\\), got \\(2,\\)$"),
+        ({"direction": [0.0, 0.0, np.nan]}, "direction must be finite, got nan$"),
+        ({"origin": [0.0, np.inf, 0.0]}, "origin must be finite, got inf$"),
+        ({"origin": "here"}, "origin must be finite numbers \\(\\.\\.\\., 3\\), got 'here'$"),
+        (
+            {"origin": np.zeros((2, 3)), "direction": np.tile(DOWN, (4, 1))},
+            "origin and direction must broadcast to one shape",
+        ),
+        ({"origin": [0.0, 0.0, -5.5]}, "origin must not be below the floor, got one that is 0.5 m below it$"),
+        ({"lowest": -3.0}, "lowest must not be above highest, got -3 and -4 m$"),
+        ({"lowest": np.nan}, "lowest must be a finite level \\[m\\], got nan$"),
+        ({"highest": -5.2}, "highest must be no lower than the floor is, got -5.2 m$"),
+        ({"steps": 0}, "steps must be a whole number >= 1 and <= 1024, got 0$"),
+        ({"steps": 2.5}, "steps must be a whole number >= 1 and <= 1024, got 2.5$"),
+        ({"steps": 1025}, "steps must be a whole number >= 1 and <= 1024, got 1025$"),
+    ],
+)
+def test_what_has_no_hit(given, message):
+    good = {"origin": np.zeros(3), "direction": DOWN, "lowest": -6.0, "highest": -4.0}
+    with pytest.raises(InputError, match=f"^{message}"):
+        first_hit(plane, **{**good, **given})
+    with pytest.raises(InputError, match="ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"):
+        wrong_shares(["bisect"], [1.0])

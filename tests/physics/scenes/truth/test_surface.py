@@ -1,47 +1,50 @@
-"""Footprints against rays through the corners of pixels, and what a G-buffer must be."""
+"""A surface that is seen, and the gather over it: footprints, exact curves, a double loop, conservation, gaps."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from profilefit.errors import InputError
-from profilefit.scenes.stage import buffers
-from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, seen
+from benchmarks import planes
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError, SettingError
+from profilefit.scenes.skin.law import Separable
+from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw, exact_table
+from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, own_share, refined, seen
 
-RIGHT, UP, FORWARD = np.diag([1.0, 1.0, -1.0])
+FORWARD = np.array([0.0, 0.0, -1.0])
 NORMAL = np.array([0.5, -0.3, np.sqrt(1.0 - 0.34)])
 THROUGH = np.array([0.2, 0.1, -40.0])
 
 
 def hit(view, column, row):
     """Where the ray at so many pixels from the middle meets the plane through THROUGH."""
-    across, along = column * view.pixel * view.right, row * view.pixel * view.up
-    origin, ray = (across + along, view.forward) if view.eye is None else (view.eye, view.forward + across + along)
+    aside = np.array([column * view.pixel, row * view.pixel, 0.0])
+    origin, ray = (np.zeros(3), FORWARD + aside) if view.is_perspective else (aside, FORWARD)
     return origin + ray * ((THROUGH - origin) @ NORMAL / (ray @ NORMAL))
 
 
-@pytest.mark.parametrize("eye", [None, np.array([3.0, -2.0, 5.0])], ids=["orthographic", "perspective"])
-def test_footprint_joins_the_corners_of_a_pixel(eye):
-    view = View(RIGHT, UP, FORWARD, 0.5 if eye is None else 0.002, eye)
+@pytest.mark.parametrize("view", [View(0.5), View(0.002, True)])
+def test_footprint_joins_the_corners_of_a_pixel(view):
     across, along = view.footprint(hit(view, 7, 4), NORMAL)
     half = 1e-3  # of a pixel: in perspective a footprint is a parallelogram to first order only
     np.testing.assert_allclose(across, (hit(view, 7 + half, 4) - hit(view, 7 - half, 4)) / (2 * half), rtol=1e-5)
     np.testing.assert_allclose(along, (hit(view, 7, 4 + half) - hit(view, 7, 4 - half)) / (2 * half), rtol=1e-5)
     np.testing.assert_allclose([across @ NORMAL, along @ NORMAL], 0.0, atol=1e-12)
-    if eye is None:
+    if not view.is_perspective:
         assert np.linalg.norm(np.cross(across, along)) == pytest.approx(0.25 / NORMAL[2])
 
 
 def test_an_outline_has_a_bounded_footprint():
-    across, along = View(RIGHT, UP, FORWARD, 2.0).footprint(np.zeros(3), RIGHT)
+    across, along = View(2.0).footprint(np.zeros(3), np.array([1.0, 0.0, 0.0]))
     assert np.linalg.norm(np.cross(across, along)) <= 1.01 * 4.0 / LEAST_COSINE
 
 
 def test_background_at_the_eye_has_no_footprint():
     """A render's positions and normals are 0 there; a 0 / 0 would warn, which is an error here."""
     position, normal = np.stack([THROUGH, np.zeros(3)]), np.stack([NORMAL, np.zeros(3)])
-    view = View(RIGHT, UP, FORWARD, 0.002, np.zeros(3))
+    view = View(0.002, True)
     across, along = view.footprint(position, normal)
     np.testing.assert_array_equal(np.stack([across[1], along[1]]), 0.0)
     np.testing.assert_array_equal(across[0], view.footprint(THROUGH, NORMAL)[0])
@@ -60,38 +63,259 @@ def test_coarsened_is_the_mean_of_blocks():
     coarse = _plane(4, 4, irradiance=light, mask=mask).coarsened(2)
     np.testing.assert_array_equal(coarse.mask, [[False, True], [True, True]])
     np.testing.assert_allclose(coarse.irradiance[1, 1], light[2:, 2:].mean(axis=(0, 1)))
-    assert View(RIGHT, UP, FORWARD, 0.5).coarsened(2).pixel == 1.0
+    assert View(0.5).coarsened(2).pixel == 1.0
 
 
 def test_seen_is_the_render_in_view_space():
-    surface, view = seen(buffers.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
+    surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
     np.testing.assert_allclose(along[1, 2], surface.position[2, 2] - surface.position[1, 2])
     assert surface.mask.all()
-    assert view.eye is None
+    assert not view.is_perspective
 
 
 def test_seen_is_what_the_shaders_take_for_inside():
-    plane = buffers.flat((4, 1), 0.5, 0.5)
+    plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
 
 
 def test_misuse():
-    with pytest.raises(InputError, match="right, up, forward must be three orthonormal axes"):
-        View(RIGHT, RIGHT, FORWARD, 1.0)
-    with pytest.raises(InputError, match="pixel must be a length > 0, got 0"):
-        View(RIGHT, UP, FORWARD, 0.0)
-    with pytest.raises(InputError, match=r"position must be \(2, 3, 3\) as the mask, got \(2, 3\)"):
-        _plane(2, 3, position=np.zeros((2, 3)))
-    with pytest.raises(InputError, match=r"mask must be .* with a visible pixel"):
-        _plane(2, 3, mask=np.zeros((2, 3), bool))
-    with pytest.raises(InputError, match="irradiance must be finite"):
-        _plane(2, 3, irradiance=np.full((2, 3, 3), np.nan))
-    with pytest.raises(InputError, match=r"reflectance must be in \[0, 1\], got 2"):
-        _plane(2, 3, reflectance=np.full((2, 3, 3), 2.0))
-    with pytest.raises(InputError, match="normal must have length 1, got one of 0"):
-        _plane(2, 3, normal=np.zeros((2, 3, 3)))
     with pytest.raises(InputError, match="factor must divide 2 and 3, got 2"):
         _plane(2, 3).coarsened(2)
+
+
+VIEW = View(0.5)
+MFP = np.array([1.5, 0.8, 2.2])
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+
+def flat(h, w, reflectance, irradiance=1.0, pixel=0.5):
+    return seen(planes.flat((w, h), pixel, reflectance, irradiance))[0]
+
+
+def hill(h, w, seed=3):
+    """A rough, coloured surface with a hole."""
+    x, y = np.meshgrid(VIEW.pixel * np.arange(w), VIEW.pixel * np.arange(h))
+    position = np.stack([x, y, 0.4 * np.sin(x) + 0.2 * np.cos(1.3 * y)], axis=-1)
+    normal = np.stack([-0.4 * np.cos(x), 0.26 * np.sin(1.3 * y), np.ones_like(x)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    random = np.random.default_rng(seed)
+    mask = np.ones((h, w), bool)
+    mask[1, 2] = False
+    return Surface(position, normal, random.random((h, w, 3)), 0.1 + 0.8 * random.random((h, w, 3)), mask)
+
+
+def patch(side, other, offset, density):
+    """Integral of a density of the distance over a parallelogram whose middle is at `offset`."""
+    a, b = (0.5 * g.ravel()[:, None] for g in np.meshgrid(NODES, NODES))
+    weights = 0.25 * np.outer(WEIGHTS, WEIGHTS).ravel()
+    r = np.linalg.norm(offset + a * side + b * other, axis=1)
+    return np.linalg.norm(np.cross(side, other)) * weights @ density(r)
+
+
+def own_patch(side, other, density):
+    """The same around the source: four triangles s ((1 - t) p + t q), whose area element s takes the 1/r away."""
+    corners = [0.5 * (a * side + b * other) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    s, t = (0.5 * (g.ravel() + 1.0) for g in np.meshgrid(NODES, NODES))
+    weights = 0.25 * np.outer(WEIGHTS, WEIGHTS).ravel()
+    total = 0.0
+    for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        r = s * np.linalg.norm((1 - t)[:, None] * p + t[:, None] * q, axis=1)
+        total += np.linalg.norm(np.cross(p, q)) * weights @ (s * density(r))
+    return total
+
+
+def double_loop(surface, view, mfp, setting, pixels):
+    """Every pair by itself, with profiles from `exact`."""
+    across, along = view.footprint(surface.position, surface.normal)
+    alpha = exact_table(setting).curves(surface.reflectance.ravel()).alpha.reshape(surface.reflectance.shape)
+    light = np.zeros((len(pixels), 3))
+    share = np.zeros((len(pixels), 3))
+    for k, o in enumerate(map(tuple, pixels)):
+        for c in range(3):
+
+            def density(r, a=alpha[o][c], length=mfp[c], total=surface.reflectance[o][c]):
+                return exact.profile(r, a, length, setting=setting) / total
+
+            for i in map(tuple, np.argwhere(surface.mask)):
+                offset = surface.position[i] - surface.position[o]
+                sides = across[i], along[i]
+                weight = own_patch(*sides, density) if i == o else patch(*sides, offset, density)
+                light[k, c] += weight * surface.irradiance[i][c]
+                share[k, c] += weight
+    return surface.reflectance[tuple(np.transpose(pixels))] * light / share, share
+
+
+@pytest.mark.slow
+def test_is_the_double_loop():
+    """Neighbours by 4 x 4 and 2 x 2 Gauss points, others by one: 2e-4 at pixels of 0.23 to 0.6 mfp."""
+    surface, pixels = hill(3, 16), np.array([[0, 1], [2, 15]])
+    light, share = double_loop(surface, VIEW, MFP, DIFFUSE, pixels)
+    found = gathered(surface, VIEW, MFP, DIFFUSE, pixels)
+    np.testing.assert_allclose(found.light, light, rtol=2e-4)
+    np.testing.assert_allclose(found.share, share, rtol=2e-4)
+    other = gathered(surface, VIEW, 1.01 * MFP, DIFFUSE, pixels)
+    assert np.max(np.abs(other.share / share - 1.0)) > 2e-3
+
+
+@pytest.mark.parametrize("reflectance", [0.0, 0.5, 1.0])
+def test_even_light_on_even_skin_is_conserved(reflectance):
+    surface = flat(12, 24, reflectance, 0.75)
+    found = gathered(surface, VIEW, MFP)
+    np.testing.assert_allclose(found.light, 0.75 * reflectance, rtol=1e-14, atol=0.0)
+    assert np.all((found.share > 0.1) & (found.share < 1.0))
+
+
+@pytest.mark.slow
+def test_step_edge_is_the_integral():
+    """Of a plane that ends 16 mfp away, with pixels of half a mfp."""
+    surface, view = seen(planes.step_edge((64, 64), 0.5, [0.1, 0.3, 0.5]))
+    pixels = np.stack([np.full(17, 32), np.arange(24, 41)], axis=1)
+    x = surface.position[32, 24:41, 0]
+    found = gathered(surface, view, np.ones(3), DIFFUSE, pixels)
+    alpha = exact_table(DIFFUSE).curves([0.1, 0.3, 0.5]).alpha
+    share = found.light / [0.1, 0.3, 0.5]
+    assert np.max(np.abs(share - step_response(x[:, None], alpha, setting=DIFFUSE))) < 1e-4
+    assert np.all(np.abs(found.share - 1.0) < 1e-3)
+    for wrong in (step_response(x[:, None] + 0.01, alpha, setting=DIFFUSE), step_response(x[:, None], alpha)):
+        assert np.max(np.abs(share - wrong)) > 1e-3
+
+
+@pytest.mark.slow
+def test_short_mean_free_path_is_lambert():
+    surface = hill(4, 6)
+    found = gathered(surface, VIEW, np.full(3, 1e-3))
+    np.testing.assert_allclose(
+        found.light[surface.mask], (surface.reflectance * surface.irradiance)[surface.mask], rtol=1e-3
+    )
+    assert not found.light[1, 2].any()
+
+
+@pytest.mark.slow
+def test_no_light_crosses_a_gap_in_depth():
+    surface = flat(8, 24, 0.8)
+    near = np.broadcast_to(np.arange(24) < 12, (8, 24))
+    position = surface.position - np.where(near, 0.0, 60.0)[..., None] * [0.0, 0.0, 1.0]
+    lit = np.where(near, 0.0, 1.0)[..., None] * np.ones(3)
+    both = Surface(position, surface.normal, lit, surface.reflectance, surface.mask)
+    assert np.max(gathered(both, VIEW, np.ones(3)).light[near]) < 1e-4
+    level = Surface(surface.position, surface.normal, lit, surface.reflectance, surface.mask)
+    assert np.max(gathered(level, VIEW, np.ones(3)).light[near]) > 0.1
+
+
+def test_own_pixel_holds_its_disc():
+    """A square as large as a disc, and a long strip, which holds the light within its width."""
+    curves = exact_table(DIFFUSE).curves([0.6])
+    square = own_share(curves, np.array([[0.0, 0.3, 0.0]]), np.array([[0.3, 0.0, 0.0]]))
+    assert square == pytest.approx(curves.share(np.array([[0.3 / np.pi**0.5]]))[0], rel=0.01)
+    wide = own_share(curves, np.array([[1.0, 0.0, 0.0]]), np.array([[30.0, 200.0, 0.0]]))
+    strip = 1.0 - 2.0 * step_response(-0.5 * 200.0 / np.hypot(30.0, 200.0), curves.alpha[0], setting=DIFFUSE)
+    assert wide == pytest.approx(strip, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_refined_says_what_coarse_pixels_cost():
+    fine, view = seen(planes.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
+    pixels = np.array([[12, 11], [12, 12], [12, 15]])
+    light, change = refined(fine, view, np.ones(3), DIFFUSE, pixels)
+    coarse = gathered(fine.coarsened(2), view.coarsened(2), np.ones(3), DIFFUSE, pixels)
+    np.testing.assert_allclose(coarse.light - light, change, atol=1e-15)
+    assert 1e-4 < np.max(np.abs(change)) < 0.02
+
+
+def test_a_table_of_ones_own():
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
+
+    class Stretched:
+        def curves(self, values):
+            assert values.size % 3 == 0
+            return exact_table(DIFFUSE).curves(0.1 + 0.8 * values)
+
+    surface = hill(4, 6)
+    values = surface._replace(reflectance=(surface.reflectance - 0.1) / 0.8)
+    itself = surface._replace(reflectance=0.1 + 0.8 * values.reflectance)
+    found, truth = gathered(values, VIEW, MFP, Stretched()), gathered(itself, VIEW, MFP)
+    np.testing.assert_array_equal(found.light, truth.light)
+    np.testing.assert_array_equal(found.share, truth.share)
+    assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
+
+
+def test_a_table_of_ones_own_in_a_picture():
+    """Where nothing scatters inside, the map is A all the same."""
+
+    class Half:
+        def curves(self, values):
+            return exact_table(DIFFUSE).curves(0.5 * values)
+
+    mask = np.ones((4, 6), np.float32)
+    mask[:, 0] = 0.0
+    picture = replace(planes.flat((6, 4), 1.0, 0.8), mask=mask)
+    light = exitance_of(picture, np.ones(3), Half())
+    np.testing.assert_allclose(light[:, 1:], 0.4, rtol=1e-6)  # float32 of 0.8
+    np.testing.assert_allclose(light[:, 0], 0.8, rtol=1e-6)
+
+
+def test_what_cannot_be_gathered():
+    surface = flat(4, 6, 0.5)
+    with pytest.raises(InputError, match="table must be a Setting, or have a method curves, got 'diffuse'"):
+        gathered(surface, VIEW, MFP, "diffuse")
+    with pytest.raises(InputError, match="mfp must be three lengths > 0"):
+        gathered(surface, VIEW, [1.0, 0.0, 1.0])
+    with pytest.raises(InputError, match=r"pixels must be visible ones, got \(4, 0\)"):
+        gathered(surface, VIEW, MFP, pixels=[[4, 0]])
+    with pytest.raises(InputError, match="pixels must be pairs"):
+        gathered(surface, VIEW, MFP, pixels=[[1.0, 2.0]])
+
+
+REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
+SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])
+RADII = np.geomspace(1.1e-5, 2.9e3, 41)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=str)
+def test_is_the_exact_half_space(setting):
+    curves = exact_table(setting).curves(REFLECTANCES)
+    np.testing.assert_allclose(exact.reflectance(curves.alpha, setting), REFLECTANCES, rtol=1e-8)
+    x, alpha = np.broadcast_to(RADII, (REFLECTANCES.size, RADII.size)), curves.alpha[:, None]
+    truth = exact.profile(RADII, alpha, setting=setting) / REFLECTANCES[:, None]
+    bright = RADII**2 * truth > 1e-10
+    assert np.max(np.abs(curves.density(x) - truth)[bright] / truth[bright]) < 1e-5
+    assert np.all(curves.density(x)[~bright] * np.broadcast_to(RADII**2, bright.shape)[~bright] < 1.01e-10)
+    np.testing.assert_allclose(curves.share(x), exact.cdf(RADII, alpha, setting=setting), rtol=1e-6)
+    shifted = exact_table(setting).curves(REFLECTANCES * 0.9999)  # the comparison can fail
+    assert np.max(np.abs(shifted.density(x) - truth)[bright] / truth[bright]) > 1e-5
+
+
+@pytest.mark.slow
+def test_is_the_exact_half_space_under_a_surface_that_refracts():
+    curves = exact_table(SKIN).curves(REFRACTED)
+    np.testing.assert_allclose(exact.reflectance(curves.alpha, SKIN), REFRACTED, rtol=1e-7)
+    x, alpha = np.broadcast_to(RADII, (REFRACTED.size, RADII.size)), curves.alpha[:, None]
+    truth = exact.profile(RADII, alpha, setting=SKIN) / REFRACTED[:, None]
+    bright = RADII**2 * truth > 1e-8
+    assert np.max(np.abs(curves.density(x) - truth)[bright] / truth[bright]) < 1e-3
+    assert np.all(np.isfinite(curves.density(x)))
+    np.testing.assert_allclose(curves.share(x), exact.cdf(RADII, alpha, setting=SKIN), atol=1e-7)
+
+
+@pytest.mark.slow
+def test_ends():
+    curves = exact_table(Setting("diffuse")).curves([0.0, 1.0])
+    np.testing.assert_array_equal(curves.alpha, [0.0, 1.0])
+    assert np.all(np.isfinite(curves.density(np.array([[0.0, 1e9], [0.0, 1e9]]))))
+    np.testing.assert_allclose(curves.share(np.array([[0.0, 1e9], [0.0, 1e9]])), [[0.0, 1.0], [0.0, 1.0]], atol=2e-4)
+
+
+@pytest.mark.slow
+def test_what_has_no_curves():
+    with pytest.raises(InputError, match=r"reflectance must be a list of numbers in \[0, 1\]"):
+        exact_table(Setting("diffuse")).curves([1.2])
+
+
+@pytest.mark.parametrize("made", [lambda own: ExactLaw((0.5,), own), exact_table, lambda own: Separable(setting=own)])
+def test_scattering_with_a_direction_is_refused(made):
+    with pytest.raises(SettingError, match=r"setting must have g = 0, got diffuse, n = 1\.4, g = 0\.8"):
+        made(replace(SKIN, g=0.8))

@@ -19,8 +19,7 @@ from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import available
-from profilefit.recipes.stack.file import LARGEST_FILE, LAYER_KEYS, LONGEST_LINE, LayerStack, read_layers, stack_of
-from profilefit.recipes.toml_tables import Tables
+from profilefit.recipes.stack.file import LARGEST_FILE, LayerStack, LayerTable, read_layers
 
 STACK = """\
 [[layers]]
@@ -40,7 +39,7 @@ g = 0
 """
 IMAGE = 'thickness = { image = "thickness.png", range = [0.05, 0.4] }'
 KIND = r"8- or 16-bit grey, or a TIFF of float32, got thickness.png of another kind \(Pillow's "
-SIZE = r"thickness.image must be a grey PNG or TIFF of at most 4096 x 4096 pixels, got "
+SIZE = r"image must be a grey PNG or TIFF of at most 4096 x 4096 pixels, got "
 
 
 @pytest.fixture
@@ -222,7 +221,7 @@ def test_too_large_is_refused_undecoded(of_image, monkeypatch, image, size):
 
     monkeypatch.setattr("PIL.ImageFile.ImageFile.load", decoded)
     monkeypatch.setattr("PIL.TiffImagePlugin.TiffImageFile.load", decoded)
-    refused(lambda: of_image(image), rf"\[layers 1\] {SIZE}thickness.png of {size}$")
+    refused(lambda: of_image(image), rf"\[layers 1.thickness\] {SIZE}thickness.png of {size}$")
 
 
 def test_largest_image(of_image):
@@ -341,29 +340,30 @@ def test_image_lies_beside_the_file(of_image, tmp_path, monkeypatch):
     assert of_image(GREY, "beside.png").map.mean == pytest.approx(0.05 + 0.35 * 100 / 255)
 
 
+KEYS = ", ".join(LayerTable.model_fields)
 WRONG = [
     ("thickness = 0.25", "thickness = -0.1", r"\[layers 1\] thickness must be a number > 0, got -0.1$"),
     ("thickness = 0.25", "thickness = true", r"\[layers 1\] thickness must be a number > 0, got True"),
     ("thickness = 0.25", "thickness = nan", r"\[layers 1\] thickness must be a number > 0, got nan"),
     ("thickness = 0.25", "thickness = [1, 2]", r"\[layers 1\] thickness must be a number > 0, got \[1, 2\]"),
     ("thickness = 0.25", "", r"\[layers\] thickness may be infinite in the last layer only, got it in layer 1"),
-    ("thickness = 0.25", "depth = 1", rf"\[layers 1\] keys must be of {', '.join(LAYER_KEYS)}, got 'depth'"),
-    ("thickness = 0.25", "thickness = {}", r"\[layers 1\] thickness.range must be two numbers >= 0, .* got nothing"),
-    ("thickness = 0.25", "thickness = { range = [0, 1] }", r"\[layers 1\] thickness.image must be .*, got nothing"),
-    ("thickness = 0.25", IMAGE.replace("range", "ranges"), r"\[layers 1.thickness\] keys must be of image, range, got"),
-    ("thickness = 0.25", IMAGE.replace("0.05", "0.5"), r"\[layers 1\] thickness.range must be .* got \[0.5, 0.4\]"),
-    ("thickness = 0.25", IMAGE.replace("0.05", "-1"), r"\[layers 1\] thickness.range must be .* got \[-1, 0.4\]"),
-    ("thickness = 0.25", IMAGE.replace("0.05", "true"), r"\[layers 1\] thickness.range must be .* got \[True, 0.4\]"),
-    ("thickness = 0.25", IMAGE.replace("0.4", "inf"), r"\[layers 1\] thickness.range must be .* got \[0.05, inf\]"),
-    ("thickness = 0.25", IMAGE.replace("0.4", "nan"), r"\[layers 1\] thickness.range must be .* got \[0.05, nan\]"),
-    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "0.4"), r"\[layers 1\] thickness.range must be .* got 0.4"),
-    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "[]"), r"\[layers 1\] thickness.range must be .* got \[\]"),
-    ("thickness = 0.25", IMAGE.replace('"thickness.png"', "3"), r"\[layers 1\] thickness.image must be .* got 3"),
-    ("thickness = 0.25", IMAGE.replace(".png", "\\u0000"), r"thickness.image must be a text .* got 'thickness\\x00'"),
-    ("thickness = 0.25", IMAGE.replace("thickness.png", "x" * 400), r"must be a text of 300 characters .* got 'xx*"),
+    ("thickness = 0.25", "depth = 1", rf"\[layers 1\] keys must be of {KEYS}, got 'depth'"),
+    ("thickness = 0.25", "thickness = {}", r"\[layers 1.thickness\] range must be two numbers >= 0, .* got nothing"),
+    ("thickness = 0.25", "thickness = { range = [0, 1] }", r"\[layers 1.thickness\] image must be .*, got nothing"),
+    ("thickness = 0.25", IMAGE.replace("range", "ranges"), r"\[layers 1.thickness\] keys must be of range, image, got"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "0.5"), r"\[layers 1.thickness\] range must be .* got \[0.5, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "-1"), r"\[layers 1.thickness\] range must be .* got \[-1.0, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "true"), r"\[layers 1.thickness\] range must be .* got \[True, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.4", "inf"), r"\[layers 1.thickness\] range must be .* got \[0.05, inf\]"),
+    ("thickness = 0.25", IMAGE.replace("0.4", "nan"), r"\[layers 1.thickness\] range must be .* got \[0.05, nan\]"),
+    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "0.4"), r"\[layers 1.thickness\] range must be .* got 0.4"),
+    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "[]"), r"\[layers 1.thickness\] range must be .* got \[\]"),
+    ("thickness = 0.25", IMAGE.replace('"thickness.png"', "3"), r"\[layers 1.thickness\] image must be .* got 3"),
+    ("thickness = 0.25", IMAGE.replace(".png", "\\u0000"), r"\[layers 1.thickness\] image must be .*'thickness\\x00'"),
+    ("thickness = 0.25", IMAGE.replace("thickness.png", "x" * 400), r"image must be a grey PNG .* got 'xx*"),
     ("g = 0\n", f"g = 0\n{IMAGE}\n", r"\[layers 2\] thickness must be a number > 0 below the first layer, got {"),
     ("mu_s = 9", "mu_s = 9\nmaterial = 'marble'", r"\[layers 1\] material must be left out where mu_a, mu_s, g are"),
-    ("mu_a = [0.1, 0.2, 0.3]", "", r"\[layers 1\] mu_a must be a number, got nothing"),
+    ("mu_a = [0.1, 0.2, 0.3]", "", r"\[layers 1\] mu_a must be a coefficient >= 0, or three .*, got nothing"),
     ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [0.1, 0.2]", r"\[layers 1\] mu_a must be .* got \[0.1, 0.2\]"),
     ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [0.1, 0.2, -3]", r"\[layers 1\] mu_a must be a coefficient >= 0, or three of"),
     ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [[1, 2, 3]]", r"\[layers 1\] mu_a must be .* got \[\[1, 2, 3\]\]"),
@@ -371,19 +371,19 @@ WRONG = [
     ("mu_a = [0.1, 0.2, 0.3]", "mu_a = inf", r"\[layers 1\] mu_a must be .* got inf"),
     ("mu_a = [0.1, 0.2, 0.3]", "mu_a = {red = 1}", r"\[layers 1\] mu_a must be .* got {'red': 1}"),
     ("mu_a = [0.1, 0.2, 0.3]", f"mu_a = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'mu_a'"),
-    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = 1e308\n[x]", r"\[layers 1\] mu_s must be a number, got nothing"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = 1e308\n[x]", r"\[layers 1\] mu_s must be a coefficient .*, got nothing"),
     ("mu_s = 9", f"mu_s = [1, {10**308 * 9}, 1]", r"a whole number of 309 digits, of 300 at most, of 'mu_s'"),
-    ("n = 1.4", "", r"\[layers 1\] n must be a number, got nothing"),
+    ("n = 1.4", "", r"\[layers 1\] n must be a finite number, got nothing"),
     ("n = 1.4", "n = -1", r"\[layers 1\] n must be a refractive index > 0, got -1"),
-    ("n = 1.4", "n = [1.4, 1.4, 1.4]", r"\[layers 1\] n must be a number, got \[1.4"),
-    ("n = 1.4", "n = inf", r"\[layers 1\] n must be a refractive index > 0, got inf"),
-    ("g = 0.5", "", r"\[layers 1\] g must be a number, got nothing"),
+    ("n = 1.4", "n = [1.4, 1.4, 1.4]", r"\[layers 1\] n must be a finite number, got \[1.4"),
+    ("n = 1.4", "n = inf", r"\[layers 1\] n must be a finite number, got inf"),
+    ("g = 0.5", "", r"\[layers 1\] g must be a finite number, got nothing"),
     ("g = 0.5", "g = 1", r"\[layers 1\] g must be a mean cosine in \(-1, 1\), got 1"),
     ('"veil"', '"a\\nb"', r"\[layers 1\] name must be a text of 60 characters at most, got 'a\\nb'"),
     ('"veil"', "['veil']", r"\[layers 1\] name must be a text of 60 characters at most, got \['veil'\]"),
     ('"measured"', '"\\u001b[31m"', r"\[layers 1\] source must be a text of 300 characters at most, got '\\x1b"),
     ('"measured"', "1979-05-27", r"\[layers 1\] source must be a text of 300 characters at most, got datetime"),
-    ('"measured"', f'"{"x" * (LONGEST_LINE + 1)}"', r"\[layers 1\] source must be a text of 300 characters at most"),
+    ('"measured"', f'"{"x" * 301}"', r"\[layers 1\] source must be a text of 300 characters at most"),
     ("", "n = 1", r"table \[\[layers\]\] is missing"),
     ("", "layers = 3", r"layers must be tables \[\[layers\]\], got 3"),
     ("", "layers = []", r"layers must be tables \[\[layers\]\], got \[\]"),
@@ -393,7 +393,7 @@ WRONG = [
     ("", "[[layers]]\nn = 1\nmu_a = 0\nmu_s = 0\ng = 0", r"\[layers\] an infinitely thick layer must scatter"),
     ("", "[[layers]]\nn = 1\nmu_a = 1e308\nmu_s = 1e308\ng = 0", r"\[layers 1\] mu_a \+ mu_s must be finite"),
     ("", f"[[layers]]\nn = 1\nmu_a = {10**308}\nmu_s = 1\ng = 0", r"a whole number of 309 digits, of 300 at most"),
-    ("", "[[layers]]\nmaterial = 'marble'", r"\[layers 1\] n must be a number, got nothing"),
+    ("", "[[layers]]\nmaterial = 'marble'", r"\[layers 1\] n must be a finite number, got nothing"),
     ("", "[[layers]]\nn = 1\nmaterial = 'wood'", r"\[layers 1\] material must be one of apple, .*, got 'wood'"),
     ("", "[[layers]]\nn = 1\nmaterial = ['marble']", r"\[layers 1\] material must be one of .*, got \['marble'\]"),
     ("", "unit = 'cm'\n[[layers]]\nn = 1\nmaterial = 'marble'", 'material must be left out unless unit = "mm", .* got'),
@@ -411,7 +411,8 @@ def test_mistakes_are_one_line(read, old, new, message):
 def test_layers_are_counted_before_they_are_looked_at():
     """A million of nothing in particular."""
     refused(
-        lambda: stack_of(Tables("skin.toml", {}), [None] * 10**6), "^skin.toml: layers must be at most 20, got 1000000$"
+        lambda: read_layers("skin.toml", {"layers": [None] * 10**6}),
+        "^skin.toml: layers must be at most 20, got 1000000$",
     )
 
 

@@ -1,26 +1,22 @@
 """TOY.toml: how fast light fades; and its picture."""
 
-from dataclasses import dataclass
+from typing import Annotated
 
-from profilefit.recipes.toml_tables import Tables
+from pydantic import Field
+
 from profilefit.scenes.stage import request
 from profilefit.scenes.stage.renderer import Renderer
 from tests.unit.scenes.toy.chart import over_samples
 from tests.unit.scenes.toy.passes import faded
 from tests.unit.scenes.toy.truth import judged
 
-TABLES = {**request.TABLES, "": ("scene", "k", *request.TABLES)}
 
-
-@dataclass(frozen=True)
 class ToyRequest(request.ViewRequest):
-    k: float
+    scene: str = "toy"
+    k: Annotated[float, Field(gt=0.0)] = 2.0
 
 
-def read(file, content):
-    tables = Tables(file, TABLES)
-    tables.known("", content)
-    return ToyRequest(**request.view(tables, content), k=tables.number("", "k", content, 2.0))
+read = ToyRequest.of
 
 
 def draw(context, of):

@@ -1,0 +1,32 @@
+"""profilefit schema: what a file may say, for editors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+FILES = ("scene", "stack", "recipe", "photo")
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of the file: {', '.join(FILES)}.")],
+) -> None:
+    """Print the JSON Schema of a file.
+
+    Editors complete and check keys by it. Limits that join several keys are checked by the commands alone.
+
+    \b
+    Examples:
+      profilefit schema scene
+      profilefit schema stack
+    """
+    from mcml_sim.files.text_file import as_json
+    from profilefit.errors import InputError
+
+    if kind not in FILES:
+        raise InputError(f"KIND must be one of {', '.join(FILES)}, got {kind!r}")
+
+    from profilefit.report.tables.keys_table import models, schema_of
+
+    typer.echo(as_json(schema_of(models()[kind])), nl=False)
