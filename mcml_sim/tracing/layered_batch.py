@@ -91,10 +91,10 @@ def trace_batch(
     first = 1 if diffuse or medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):
         # Of a single sheet of clear glass what is not reflected at once goes through.
-        sums: dict[str, Floats] = {name: np.zeros(size) for name, size in deposits.shapes(grid, 1).items()}
+        ballistic: dict[str, Floats] = {name: np.zeros(size) for name, size in deposits.shapes(grid, 1).items()}
         for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
-            sums[name] = np.asarray(float(photons))
-        return Deposits.from_arrays(sums, deposits.shapes(grid, 1))
+            ballistic[name] = np.asarray(float(photons))
+        return Deposits.from_arrays(ballistic, deposits.shapes(grid, 1))
     # Lengths are in the shortest free path, or in the whole thickness where all is clear.
     mu_t = max(layer.mu_t for layer in medium.layers)
     unit = 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
