@@ -154,7 +154,7 @@ class Beliefs:
     def over(self, sides: tuple[int, int], pixel: float, reach: float) -> Beliefs:
         """Return beliefs for a picture of so many columns and rows, of `pixel` each, with rings out to `reach` [unit].
 
-        A halo wider than the rings falls as a narrower one there; rings do not tell one from a core wider than it.
+        Over the rings a wider halo falls like one as wide as they are, and one narrower than the core is like the core.
         """
         near = NARROWEST if self.beam is None else max(NARROWEST, 0.5 * self.beam.value)
         far = max(WIDEST, reach, 2.0 * near)
