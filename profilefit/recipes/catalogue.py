@@ -290,8 +290,10 @@ def _entries(classes: Mapping[str, Any]) -> list[Entry]:
 
 def _named(entry: Entry, which: str, setting: Setting | None, records: Records) -> LoadedLaw:
     law: Any = (albedo_law if entry.is_map else load)(entry.name, which, setting, records)
-    files = (Path(which),) if which.endswith(".json") else ()
-    files = _files(entry, law.setting, records) if which == REGENERATED else files
+    if which == REGENERATED:
+        files = _files(entry, law.setting, records)
+    else:
+        files = (Path(which),) if which.endswith(".json") else ()
     constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
     return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files, records.folder)
 

@@ -20,11 +20,11 @@ from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.fit import Tracing
 from profilefit.shader.law_file import export_subject
-from tests.unit.cli.conftest import command
+from tests.unit.cli.conftest import command, program
 from tests.unit.recipes.stack.test_record import RUN, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
 
-__all__ = ["command"]
+__all__ = ["command", "program"]
 ROOT = Path(__file__).resolve().parents[3]
 BY_KEY = {kind.key: kind for kind in KINDS}
 TOY = '''\
