@@ -71,11 +71,11 @@ class LawWithErrors:
     @classmethod
     def of_record(cls, law: Any, content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> LawWithErrors:
         """`law` with the constants of a record, and what that record says; old ones say nothing of the model."""
-        covariance = content["covariance"]
-        statistical = covariance["statistical"]
+        covariance = content.get("covariance", {})
+        statistical = covariance.get("statistical")
         noise = None if statistical is None else np.asarray(statistical, float)
         objective = content["protocol"]["weighting"]["objective"]
-        return cls(law, tuple(covariance["names"]), objective, noise, discrepancy.read(content, arrays))
+        return cls(law, tuple(covariance.get("names", ())), objective, noise, discrepancy.read(content, arrays))
 
     @property
     def reduced(self) -> Any:

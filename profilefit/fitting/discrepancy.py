@@ -114,12 +114,12 @@ KEPT = ("u", "s", "influence")
 
 def read(content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Discrepancy | None:
     """Return a record's discrepancy; None where it has none, as old records, or where its fit failed."""
-    facts = content.get("discrepancy")
-    if not facts or facts["amplitude"] is None or "discrepancy_u" not in arrays:
+    facts, model = content.get("discrepancy"), content.get("covariance", {}).get("model")
+    if not facts or facts["amplitude"] is None or model is None or "discrepancy_u" not in arrays:
         return None
     values: dict[str, Any] = {name: np.nan if facts[name] is None else facts[name] for name in FACTS}
     values |= {name: np.asarray(arrays[f"discrepancy_{name}"], float) for name in KEPT}
-    return Discrepancy(**values, covariance=np.asarray(content["covariance"]["model"], float))
+    return Discrepancy(**values, covariance=np.asarray(model, float))
 
 
 @dataclass(frozen=True)

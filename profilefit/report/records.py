@@ -130,11 +130,11 @@ class Fitted:
 
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
         """
-        samples = self.arrays.get(f"samples_{kind}")
-        if samples is None or not self.converged:
+        samples, names = self.arrays.get(f"samples_{kind}"), self.content.get("covariance", {}).get("names")
+        if samples is None or names is None or not self.converged:
             return None
         some = samples[np.linspace(0, len(samples) - 1, min(DRAWS, len(samples))).astype(int)].astype(float)
-        curves = evaluate(self.law.with_vector(tuple(self.content["covariance"]["names"]), some.T[:, :, None]))
+        curves = evaluate(self.law.with_vector(tuple(names), some.T[:, :, None]))
         low, high = np.nanquantile(np.asarray(curves), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
         return low, high
 

@@ -115,7 +115,8 @@ def record_plans(source: Source, name: str) -> tuple[Plan, ...]:
     if "constants" not in content:
         return ()
     failed = "" if converged(content) else f"the fit failed: {content['fit']['result']}"
-    chainless = "" if "misfit" in content["posterior"] else f"no posterior: {content['fit']['result']}"
+    chained = "misfit" in content["posterior"] and "covariance" in content
+    chainless = "" if chained else f"no posterior: {content['fit']['result']}"
     residuals = Plan(f"residuals-{name}", (name,), (), partial(residual_figure, name), failed)
     quality = Plan(f"quality-{name}", (name,), (), partial(record_quality_figure, name), failed)
     corner = Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), chainless)

@@ -60,7 +60,7 @@ def test_radii_have_the_density_that_is_said():
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
 def test_a_fitted_half_space_is_light_that_it_was_not_fitted_to(light):
     setting = Setting(light, n=1.4)
-    law = photons.half_space(TISSUE, setting, seed=1, photons=2**20)
+    law = photons.half_space(TISSUE, setting, photons.Tracing(photons=2**20))
     fresh = photons.traced(Medium((TISSUE,)), light, photons.ring_edges(TISSUE, (TISSUE,)), 2**20, seed=2)
     counts = (fresh.weight > 0) & (fresh.edges[:-1] > 0.1 * law.mfp)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import OutputError, RecordError
+from profilefit.fitting.derived import LawWithErrors
 from profilefit.recipes import catalogue
 from profilefit.report import draw_all
 from profilefit.report.figures import residual_figure as residual_module
@@ -223,3 +224,15 @@ def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
     assert here.fitted("liang-whole") is None
     with pytest.raises(RecordError, match="has no record 'liang-whole'"):
         here.needed("liang-whole")
+
+
+def test_a_record_without_covariance_is_drawn_without_what_rests_on_it(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole")
+    change(folder, "burley-whole", lambda content: content.pop("covariance"))
+    source = Source(folder)
+    fitted = source.needed("burley-whole")
+    assert fitted.band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
+    assert LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays).discrepancy is None
+    reasons = {plan.name: plan.missing for plan in plans(source)}
+    assert "no posterior" in reasons["corner-burley-whole"]
+    assert reasons["quality-burley-whole"] == ""
