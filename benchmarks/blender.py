@@ -43,8 +43,8 @@ from mcml_sim import Setting
 from mcml_sim.files.text_file import as_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit import convert
-from profilefit.convert.blender import skin_alpha
-from profilefit.convert.maps import wrenninge_alpha
+from profilefit.convert.colour import wrenninge_alpha
+from profilefit.convert.engine import skin_alpha
 from profilefit.scenes.stage.step_edge import step_response
 
 Floats = NDArray[np.float64]

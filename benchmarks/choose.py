@@ -19,7 +19,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import moderngl
@@ -181,6 +181,12 @@ def as_json(found: Sequence[Verified]) -> list[dict]:
     ]
 
 
+def ratios_json(ratios: cost.Ratios) -> str:
+    """Return ratios as the JSON that `cost.shipped` reads."""
+    content = {key: value for key, value in asdict(ratios).items() if key != "spread"}
+    return json.dumps(content, indent=1) + "\n"
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command; status 1 if a prediction or a choice is wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -196,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"on {renderer(context)}")
             if options.ratios:
                 ratios = cost.measured(context, {**laws(SETTING), **laws(REFRACTING)})
-                options.ratios.write_text(cost.as_json(ratios), encoding="utf-8")
+                options.ratios.write_text(ratios_json(ratios), encoding="utf-8")
                 return
             for name, scene in scenes(QUICK if options.quick else options.scenes, options.seed):
                 found.append(verified(context, name, scene))

@@ -23,8 +23,7 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import gathered, seen
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
-from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import reference_light
+from profilefit.studies.choose.error import ReferenceLight, passes
 
 Floats = NDArray[np.float64]
 # How far the picture goes beyond the places that count, and above and below them [longest mean free path]: the first
@@ -72,7 +71,7 @@ def _lost(case: Case, setting: Setting, reach: float) -> float:
     """Return the largest share of a channel's light from that many longest mean free paths beyond an edge."""
     pairs = zip(case.reflectance, case.mfp, strict=True)
     far = reach * max(case.mfp)
-    return max(float(reference_light(setting).beyond(a)(np.array(far / length))) for a, length in pairs)
+    return max(float(ReferenceLight(setting).beyond(a)(np.array(far / length))) for a, length in pairs)
 
 
 class Measured:
@@ -109,7 +108,7 @@ class Measured:
             drawn = Sampling(option.number, seed=seed)
             return self._stage.scatter(option.law, self.case.mfp, drawn, rows=rows).astype(float)
         total = np.zeros((ROWS, self.size[0], 3))
-        for share, kernel, _ in passes(option, self.case, reference_light(self.setting)):
+        for share, kernel, _ in passes(option, self.case, ReferenceLight(self.setting)):
             drawn = Sampling(option.number)
             total += share * self._stage.scatter(
                 SeparableFilter(kernel), self.case.mfp, drawn, self._kernel_alpha, rows

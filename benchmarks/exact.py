@@ -21,8 +21,7 @@ from matplotlib import pyplot
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, exact, simulate_orders
-from mcml_sim.exact.by_albedo import by_alpha, forget
-from mcml_sim.exact.hankel import profile
+from mcml_sim.exact.by_albedo import by_alpha, forget, profile
 from mcml_sim.exact.transform import STANDARD, Rule
 
 Floats = NDArray[np.float64]

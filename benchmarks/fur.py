@@ -24,7 +24,7 @@ from profilefit.scenes.fur import law
 from profilefit.scenes.fur.truth import Patch, random_patch
 from profilefit.shader import opened
 from profilefit.shader.context import renderer
-from profilefit.studies.tradeoff import fur as tradeoff
+from profilefit.studies.tradeoff import scenes as tradeoff
 
 DEGREES, DENSITIES, HEIGHTS = (0.0, 30.0, 60.0, 75.0, 85.0), (4.0, 16.0, 64.0), (0.0, 0.3, 0.6, 0.9)
 LEANS = ((0.0, 0.0), (0.4, -0.3))

@@ -21,7 +21,7 @@ from mcml_sim.files.text_file import as_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import WAYS, FurTrial, LayerTechnique, error_of, trial
-from profilefit.studies.choose.fur import RandomFur, cheapest
+from profilefit.studies.choose.scenes import RandomFur, cheapest
 
 FURS, SEED = 50, 2024
 COVER, SLENDER, DEGREES, TOLERANCES = (0.02, 0.25), (8.0, 40.0), (0.0, 80.0), (0.02, 0.1)  # r0^2 n; L / r0

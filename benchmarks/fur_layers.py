@@ -17,7 +17,7 @@ from profilefit.scenes.fur.ways import LINEAR as SHELLS
 from profilefit.scenes.fur.ways import MOST, SWEPT, SWEPT_TWO, WAYS, FurTrial, error_of, least_layers, trial
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
-from profilefit.studies.tradeoff.fur import DEGREES, DENSITY, RADIUS
+from profilefit.studies.tradeoff.scenes import DEGREES, DENSITY, RADIUS
 
 Floats = NDArray[np.float64]
 Rows = list[tuple[str | float, ...]]

@@ -19,7 +19,7 @@ from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_T
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
-from profilefit.studies.tradeoff import fur as tradeoff
+from profilefit.studies.tradeoff import scenes as tradeoff
 from profilefit.studies.tradeoff.points import Panel
 
 Rows = list[tuple[str | float, ...]]
@@ -62,7 +62,7 @@ def gamma() -> Rows:
     with opened() as context:
         for fine in FINER:
             with scene.reference_render(
-                context, tradeoff.request().changed(technique={"supersampling": fine})
+                context, tradeoff.fur_request().changed(technique={"supersampling": fine})
             ) as drawn:
                 white, judge = drawn.judge.exposure, drawn.judge
                 encoded = scene.averaged(srgb_codes(white * drawn.fine), fine)
@@ -81,7 +81,7 @@ def lobes() -> Rows:
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
     """Draw the example's truth and the five ways, three beside three, and error over time toward six angles."""
-    with scene.reference_render(context, tradeoff.request()) as drawn:
+    with scene.reference_render(context, tradeoff.fur_request()) as drawn:
         judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in WAYS)]
         larger = [np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
     rows = [np.concatenate(row, axis=1) for row in (larger[:3], larger[3:])]

@@ -21,16 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from benchmarks import high_orders
 from mcml_sim import Setting, exact
-from mcml_sim.exact import single_scattering
-from mcml_sim.exact.anisotropic import forward_table, high_orders
-from mcml_sim.exact.anisotropic.forward_table import COSINES, INDICES, KNOTS, S, SplinedLight
+from mcml_sim.exact import forwards, single_scattering
+from mcml_sim.exact.forwards import COSINES, INDICES, KNOTS, S, SplinedLight
 from mcml_sim.exact.light import LEAST, coefficients, log_once, nodes, unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.setting import ILLUMINATIONS
 from mcml_sim.tracing import half_space_event, orders_batch, rng
-from mcml_sim.tracing.bins import rounded_up
+from mcml_sim.tracing.deposits import rounded_up
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness |
     """Join one n and g under both lights: the photons' orders, which are known at any albedo, and the rest."""
     n, g = settings[0].n, settings[0].g
     orders, rule = beyond(g), rule or high_orders.fine(g)
-    alpha, kappa = unreduced(1.0 - S**2, g), high_orders.decay_rates(1.0 - S**2, g)
+    alpha, kappa = unreduced(1.0 - S**2, g), forwards.decay_rates(1.0 - S**2, g)
     solved_at = unreduced(1.0 - SOLVED**2, g)
     whole = high_orders.totals(n, g, orders, solved_at, rule) / solved_at ** (orders + 1)
     at_origin = np.exp(np.log(whole) @ _locally()[0].T)  # over alpha^(orders + 1)
@@ -105,7 +105,7 @@ def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness |
         total = alpha[:, None] ** np.arange(1, orders + 1) @ by_order
         total += scales[-1] * alpha ** (orders + 1) * at_origin[light]
         found.append(total / (1.0 - S**2))
-    x = np.append(MIDDLES, np.exp(np.arange(np.log(EDGES[-1]) + 0.03, np.log(forward_table.LAST / (1.0 - g)), 0.06)))
+    x = np.append(MIDDLES, np.exp(np.arange(np.log(EDGES[-1]) + 0.03, np.log(forwards.LAST / (1.0 - g)), 0.06)))
     high, doubt = _high(n, g, orders, x, rule)
     high *= np.array(scales)[:, None, None]
     rest = [
@@ -126,7 +126,7 @@ def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness
     """
     reduced = 1.0 - SOLVED**2
     alpha = unreduced(reduced, g)
-    kappa = high_orders.decay_rates(reduced, g) * (1.0 - alpha * g)
+    kappa = forwards.decay_rates(reduced, g) * (1.0 - alpha * g)
     logs = np.full((2, SOLVED.size, x.size), np.nan)
     for line, members in high_orders.lines(alpha, g):
         values = high_orders.transforms(n, g, orders, line.k, line.alpha, rule)
@@ -142,7 +142,7 @@ def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness
     way, next_ones = _locally()
     between = way @ logs
     doubt = np.where((next_ones @ unknown) > 0, CONTINUED, ROUNDING)
-    fine = high_orders.decay_rates(1.0 - S**2, g) * (1.0 - unreduced(1.0 - S**2, g) * g)
+    fine = forwards.decay_rates(1.0 - S**2, g) * (1.0 - unreduced(1.0 - S**2, g) * g)
     return np.asarray(np.exp(between) * _decay(fine[:, None] * x)), doubt
 
 
@@ -181,7 +181,7 @@ def _rest(
     once_more[0] = 0.0
     length = 1.0 / (1.0 - alpha * g)
     albedo, at = alpha * (1.0 - g) * length, x / length
-    inside = (at > forward_table.FIRST) & (at < forward_table.LAST)
+    inside = (at > forwards.FIRST) & (at < forwards.LAST)
     share = entered / low.started * (low.exits[1:-1] @ once_more)
     # One photon more of the last order: a far ring that none has reached yet is not known to be dark.
     spread = entered / low.started * np.sqrt(low.exits[1:-1] @ once_more**2 + once_more[-1] ** 2)
@@ -223,7 +223,7 @@ def _decay(x: Floats) -> Floats:
 
 def isotropic(setting: Setting) -> SplinedLight:
     """Return the splines where g = 0, from the exact solution."""
-    alpha, log = 1.0 - S**2, np.arange(np.log(forward_table.FIRST), np.log(forward_table.LAST), 0.06)
+    alpha, log = 1.0 - S**2, np.arange(np.log(forwards.FIRST), np.log(forwards.LAST), 0.06)
     kappa, rest = np.asarray(exact.decay_rate(alpha)), []
     for a, rate in zip(alpha, kappa, strict=True):
         x = np.exp(log[rate * np.exp(log) < (28.0 if rate > 0.06 else 12.0)])
@@ -265,7 +265,7 @@ def name_of(setting: Setting) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--photons", type=float, help="trace so many of each half space again")
-    parser.add_argument("--out", type=Path, default=forward_table.FILE, help="the table")
+    parser.add_argument("--out", type=Path, default=forwards.FILE, help="the table")
     given = parser.parse_args()
     if given.photons:
         found = {}
@@ -288,7 +288,7 @@ def main() -> None:
         for name in SplinedLight._fields
     )
     kept = SplinedLight(np.moveaxis(rest, 2, 0).astype(np.float32).astype(float), np.moveaxis(share, 2, 0))
-    arrays = {"rest": kept.rest.astype(np.float32), "share": kept.share, "sha256": forward_table.digest(kept)}
+    arrays = {"rest": kept.rest.astype(np.float32), "share": kept.share, "sha256": forwards.digest(kept)}
     write_whole(given.out, content(arrays))
 
 

@@ -18,13 +18,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import half_space_table
+from benchmarks import half_space_table, high_orders
 from mcml_sim import Grid, Orders, Setting, exact, simulate_orders
-from mcml_sim.exact.anisotropic import forward_table, high_orders
+from mcml_sim.exact import forwards
 from mcml_sim.exact.light import unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.order_bins import Counts
 
 Floats = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ def finer(n: float, g: float) -> float:
     coarse, fine = (
         half_space_table.joined(settings, low, one) for one in (rule, rule._replace(degree=rule.degree + 4))
     )
-    inside = (forward_table.KNOTS[3:-1] > np.log(MIDDLE)) & (forward_table.KNOTS[3:-1] < np.log(FARTHEST))
+    inside = (forwards.KNOTS[3:-1] > np.log(MIDDLE)) & (forwards.KNOTS[3:-1] < np.log(FARTHEST))
     changes = [np.abs(one.rest - two.rest)[:, inside].max() for one, two in zip(coarse, fine, strict=True)]
     return float(max(changes))
 
@@ -131,7 +131,7 @@ def main() -> None:
                 f" {worst:9.1e} ({error:.0e}, {x:5.2g}) {total:+9.1e} ({z:+.1f})"
             )
     if given.finer:
-        for g in (forward_table.COSINES[3], forward_table.COSINES[4], forward_table.COSINES[6]):
+        for g in (forwards.COSINES[3], forwards.COSINES[4], forwards.COSINES[6]):
             print(f"n 1.39, g {g:.3f}: four more harmonics change light by {finer(1.39, float(g)):.1e}")
 
 

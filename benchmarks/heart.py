@@ -36,7 +36,7 @@ from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.world import unit
 from profilefit.shader import opened, renderer
-from profilefit.studies.choose.atlas import AtlasNeed
+from profilefit.studies.choose.scenes import AtlasNeed
 
 FILE = "heart.toml"
 STACKS, COUNT = ("heart", "skin"), 6

@@ -21,14 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
-from benchmarks.refits import LEVELS, Coverage, coverage, refits
+from benchmarks.refits import LEVELS, Coverage, coverage, drawn_noise, refits
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import write_whole
 from profilefit.fitting.discrepancy import predicted
-from profilefit.fitting.estimate import Fit, ResidualFunction, fit
-from profilefit.fitting.objectives import EVERYWHERE, Rings
+from profilefit.fitting.estimate import EVERYWHERE, Fit, ResidualFunction, Rings, fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.recipe import Recipe
@@ -75,7 +74,7 @@ def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
         closed = profiles.covariance
         if closed is None:
             raise InputError(f"names must be of records of fits to profiles, got {name!r}")
-        noise = _matched(closed.draws(replicates, SEED + 1), run)
+        noise = _matched(drawn_noise(closed, replicates, SEED + 1), run)
         one = fitted(chosen, law, profiles)
         again = refits(one, np.column_stack([profiles.energy, profiles.beyond]), noise)
         off = again.found - again.truth

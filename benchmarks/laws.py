@@ -19,9 +19,18 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 
 from benchmarks.table import show
 from profilefit.studies.tradeoff import stopwatch
-from profilefit.studies.tradeoff.contenders import YARDSTICK, contenders
-from profilefit.studies.tradeoff.counting import FunctionCounts, described
-from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, ContenderResult, measured
+from profilefit.studies.tradeoff.laws import (
+    FULL,
+    MANY,
+    PARTS,
+    QUICK,
+    YARDSTICK,
+    ContenderResult,
+    FunctionCounts,
+    contenders,
+    described,
+    measured,
+)
 
 
 def as_cells(row: ContenderResult) -> tuple[str, ...]:

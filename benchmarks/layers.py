@@ -26,7 +26,7 @@ from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.text_file import read_toml
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
-from profilefit.recipes.stack.gaussians import medium_gaussians
+from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
@@ -70,7 +70,7 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     plates = [plate_of(medium, light) for medium in media]
     others = {TABLE: alone(TABLE, of_table(table, plates), request.mfp)}
     for count in (4, 6):
-        sums = [medium_gaussians(medium, light, count) for medium in media]
+        sums = [shared_gaussians((medium,), light, count)[0] for medium in media]
         others[f"gaussians:{count}"] = alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:

@@ -41,7 +41,7 @@ from profilefit.measured.noise import WAVE
 from profilefit.measured.photo import medium, simulated, workflow
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, of_sensor
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
-from profilefit.measured.photo.pixel_scale import PixelScale
+from profilefit.measured.photo.rings import PixelScale
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
 

@@ -30,6 +30,27 @@ from profilefit.fitting.solver import solve_batch
 
 Floats = NDArray[np.float64]
 CHUNK = 100  # fits at once: a thousand Jacobians of a dozen constants do not fit into a cache
+# Directions of a ring below this share of its largest are rounding where few photons arrived: E has no part in them.
+FAINTEST = 1e-3
+
+
+def drawn_noise(of: Covariance, number: int, seed: int) -> Floats:
+    """Noise of ring energies (number, alphas, rings + 1) as another run's photons would have it, taken for normal.
+
+    Photons are shared out: what one ring gets, another lacks. So noise that is independent between rings, as of
+    Poisson counts, is drawn first, and then freed of the fluctuation t of its total [standard deviations]. Within
+    the directions L that each ring keeps, E = sqrt(photons - 1) L y: v of covariance 1 + y y^T, less t y.
+    """
+    generator = np.random.default_rng(seed)
+    root = of.energy.T[:, :, None] / np.sqrt(max(of.photons - 1, 1))
+    unit = np.linalg.norm(of.factor, axis=2, keepdims=True)
+    unit = np.where(unit > 0, unit, 1.0)
+    y = np.einsum("ika,iao->ik", np.linalg.pinv(of.factor / unit, rcond=FAINTEST), root / unit)
+    size = 1.0 + np.sum(y**2, axis=1)
+    rest = np.sqrt(max(1.0 - float(np.sum(1.0 - 1.0 / size)), 0.0))  # photons that no ring saw
+    v = generator.standard_normal((number, *y.shape)) + generator.standard_normal((number, len(y), 1)) * y
+    total = np.einsum("rik,ik->r", v, y / size[:, None]) + rest * generator.standard_normal(number)
+    return np.einsum("iak,rik->rai", of.factor, v - total[:, None, None] * y, optimize=True)
 
 
 def refitted(fit: Fit, energy: Floats, start: Floats | None = None) -> tuple[Floats, NDArray[np.bool_]]:

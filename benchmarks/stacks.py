@@ -29,8 +29,8 @@ from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.laws.gaussians import MOST
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes.kinds.stack import NEAR_TRACED, of_rings
-from profilefit.recipes.stack import gaussians, photons
-from profilefit.recipes.stack.fit import stack_law
+from profilefit.recipes.stack import gaussians
+from profilefit.recipes.stack.fit import ring_edges, stack_law, traced
 
 LIGHTS = ("searchlight", "diffuse")
 THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]
@@ -116,15 +116,15 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
     begin = time.perf_counter()
     law, own = stack_law(forward(medium, g), light), forward(medium, g)
     seconds = time.perf_counter() - begin
-    rings = photons.traced(own, light, photons.ring_edges(own.layers[0], own.layers), count, TRACED_SEED)
-    found = of_rings(law, medium.layers[0].thickness, rings)
+    rings = traced(own, light, ring_edges(own.layers[0], own.layers), count, TRACED_SEED)
+    rel, noise, ks, off = of_rings(law, medium.layers[0].thickness, rings)
     counts, exactly = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.top.mfp), exact.solve(medium, light)
     apart = np.diff(np.asarray(exactly.cdf(rings.edges)) * exactly.reflectance)[counts] / rings.energy[counts] - 1
     similar = float(np.mean(np.abs(apart)))
-    figures = (found.rel, found.noise, similar, found.ks, abs(found.delta_A))
+    figures = (rel, noise, similar, ks, abs(off))
     cells = (f"{name}, {light}", f"{seconds:.0f}", *_short(*figures))
     print(*cells, flush=True)
-    return cells, Error(found.rel, similar, found.ks, found.delta_A)
+    return cells, Error(rel, similar, ks, off)
 
 
 def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], list[float]]:

@@ -18,7 +18,7 @@ from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
 from profilefit.errors import InputError
-from profilefit.laws.dipole import diffuse_fresnel
+from profilefit.laws.diffusion import diffuse_fresnel
 
 Floats = NDArray[np.float64]
 MOST_SAMPLES = 4096

@@ -48,7 +48,7 @@ nitpick_ignore = [
     ("py:class", name)
     for name in (
         "mcml_sim.tracing.deposits.Deposits",
-        "mcml_sim.tracing.counts.Counts",
-        "profilefit.fitting.objectives.Rings",
+        "mcml_sim.tracing.order_bins.Counts",
+        "profilefit.fitting.estimate.Rings",
     )
 ]

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from mcml_sim.results.mci import read_mci
     from mcml_sim.results.mco import read_mco, write_mco
     from mcml_sim.results.orders import Orders
-    from mcml_sim.results.tally import Precision, Tally
-    from mcml_sim.results.tally_file import read_results, write_results
+    from mcml_sim.results.tally import Precision, Tally, read_results, write_results
     from mcml_sim.runs.simulation import simulate, simulate_orders, trace_share
     from mcml_sim.runs.store import DamagedBatch
 else:
@@ -30,8 +29,7 @@ else:
             **dict.fromkeys(("read_mco", "write_mco"), "results.mco"),
             **dict.fromkeys(("Layer", "Medium", "half_space"), "media.medium"),
             "Orders": "results.orders",
-            **dict.fromkeys(("Precision", "Tally"), "results.tally"),
-            **dict.fromkeys(("read_results", "write_results"), "results.tally_file"),
+            **dict.fromkeys(("Precision", "Tally", "read_results", "write_results"), "results.tally"),
             "Setting": "media.setting",
             **dict.fromkeys(("simulate", "simulate_orders", "trace_share"), "runs.simulation"),
             "DamagedBatch": "runs.store",

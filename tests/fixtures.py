@@ -1,6 +1,7 @@
 """Runs, laws, photons and OpenGL that several files of tests look at, and the thresholds they share."""
 
 import signal
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -18,10 +19,14 @@ from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
+from profilefit.recipes.run import silent, written
+from profilefit.recipes.workers import Workers
 from profilefit.scenes.stage import gather
 from profilefit.scenes.stage.stage import Stage
 from profilefit.shader.context import open_context
 
+# The files that ship as examples, by their names.
+EXAMPLES = {path.name: str(path) for path in sorted((Path(__file__).parents[1] / "examples").iterdir())}
 # A law's tests must not move with the records: this map is within 3e-6 of the exact A, its digits are frozen here.
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 
@@ -29,6 +34,12 @@ NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 def slow(*values):
     """Values of a parameter that only `make test-all` takes, beside others of every run; a tuple is of several."""
     return [pytest.param(*(one if type(one) is tuple else (one,)), marks=pytest.mark.slow) for one in values]
+
+
+def recorded(work, out, say=silent):
+    """The path of a record that is made and written in this process."""
+    with Workers(1) as workers:
+        return next(written([work], out, workers, say)).path
 
 
 @pytest.fixture(scope="session")

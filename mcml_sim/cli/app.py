@@ -1,24 +1,29 @@
-"""Command mcml-sim: its first screen, its one subcommand, and its errors in words of the shell."""
+"""Command mcml-sim: its first screen, its subcommand, what that prints of a run, and errors in words of the shell."""
 
 from __future__ import annotations
 
+import contextlib
+import math
 import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.program import FirstScreen, Program, accepted, add, add_version
-from mcml_sim.cli.run import run
-from mcml_sim.cli.terminal import two_interrupts
-from mcml_sim.errors import ELSEWHERE, NAMED, RESUMES, ClusterError, InputError, OutputError, StoreError
+from mcml_sim.cli.program import ACCEPTED, FirstScreen, Program, add, add_version, two_interrupts, without_logs
+from mcml_sim.errors import ELSEWHERE, NAMED, RESUMES, ClusterError, InputError, Notice, OutputError, StoreError
+
+if TYPE_CHECKING:
+    from mcml_sim.results.estimate import Estimate
+    from mcml_sim.results.tally import Precision, Results
+    from mcml_sim.runs.input_runs import Done, Job, RunOptions
 
 __all__ = ["app", "main"]
 
 # The library's remedies for errors, in the command line's words.
-REMEDIES = {
-    ELSEWHERE: "use --out elsewhere",
-    NAMED: "--out FOLDER",
-    RESUMES: "the same command resumes",
-}
+REMEDIES = {ELSEWHERE: "use --out elsewhere", NAMED: "--out FOLDER", RESUMES: "the same command resumes"}
 HELP = """\
 Trace light through layered media as MCML does, with error bars.
 
@@ -27,6 +32,237 @@ Trace light through layered media as MCML does, with error bars.
 
 Writes NAME.mco, as MCML does, and NAME.npz with the standard error of each bin.
 After Ctrl-C the same command resumes."""
+# Numbers and names of what takes a second to import; a test holds them against it.
+FIRST_LOOKS = ("2.1 million", "8.4 million")
+QUANTITY = "diffuse_reflectance"
+QUANTITIES = (
+    *("specular_reflectance", QUANTITY, "absorbed", "transmittance", "diffuse_transmittance"),
+    *("ballistic_transmittance", "energy", "absorbed_per_layer", "reflectance_r", "transmittance_r"),
+    *("reflectance_r_overflow", "transmittance_r_overflow", "absorbed_z", "absorbed_rz", "absorbed_z_overflow"),
+    *("reflectance_a", "reflectance_ra", "transmittance_a", "transmittance_ra"),
+)
+PRECISION = (
+    "Stop a run early at this relative standard error, for example 1e-3. It is looked at after 8, 16, 32, ... batches, "
+    f"first at {FIRST_LOOKS[0]} photons ({FIRST_LOOKS[1]} in a matched isotropic half space), and no run goes beyond "
+    "the photons requested."
+)
+REPEATS = (
+    "More photons or more repeats? Errors fall as 1/sqrt(photons) either way: k runs of N photons with k seeds are "
+    "worth one run of k N."
+)
+# What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.
+TOTALS = {
+    "specular_reflectance": "specular reflectance",
+    "diffuse_reflectance": "diffuse reflectance",
+    "absorbed": "absorbed fraction",
+    "transmittance": "transmittance",
+    "ballistic_transmittance": "  of it ballistic",
+}
+MOST_DIGITS = 12  # of a printed value after the point
+SMALLEST = 1e-4  # value that is printed without an exponent
+SLOW = 1e4  # photons/s; faster is printed in millions
+SHORT = 0.05  # compiling that is not worth a word [s]
+
+
+def _quantities(incomplete: str) -> Iterator[str]:
+    return (name for name in QUANTITIES if name.startswith(incomplete))
+
+
+def run(
+    file: Annotated[Path, typer.Argument(help="Input file of MCML 1 or 2 (.mci).")],
+    photons: Annotated[
+        str | None, typer.Option(metavar="NUMBER", help="Photons of each run, such as 1e7.", show_default="the file's")
+    ] = None,
+    seed: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Seed of the photons, >= 0.", show_default="the file's, of MCML 2, else 0"),
+    ] = None,
+    precision: Annotated[float | None, typer.Option(help=PRECISION)] = None,
+    quantity: Annotated[
+        str | None,
+        typer.Option(
+            help=f"What --precision looks at: {', '.join(QUANTITIES)}.",
+            show_default=QUANTITY,
+            autocompletion=_quantities,
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Changes nothing: a command resumes without.")] = False,
+    workers: Annotated[int | None, typer.Option(help="Threads.", show_default="one a core")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler whose workers trace, like tcp://host:8786.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for what is written.", show_default="the current folder, as MCML")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the totals of every run, with standard errors, as JSON instead.")
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but errors, and what --json does.")
+    ] = False,
+) -> None:
+    """Do every run of an MCML input file.
+
+    Each writes NAME.mco, as MCML does, and NAME.npz, with the standard error of every bin. While it runs, NAME.photons
+    keeps the finished batches: the same command goes on where it was interrupted, and leaves a run that is finished as
+    it is. Results of another run are replaced, other files are not. An absolute NAME, or one with .., needs --out, and
+    its last part is written there.
+
+    \b
+    Examples, on a file of profilefit examples:
+      mcml-sim run examples/slab.mci --photons 1e5 --out runs
+      mcml-sim run examples/slab.mci --photons 1e8 --precision 1e-3 --out runs
+    """
+    from rich.console import Console
+
+    from mcml_sim.cli.screen import print_json
+    from mcml_sim.media.checks import MAX_PHOTONS, checked_workers
+    from mcml_sim.results.mci import read_mci
+    from mcml_sim.results.tally import Precision
+    from mcml_sim.runs import input_runs
+
+    del resume  # changes nothing: a command resumes by itself
+    runs = read_mci(file)
+    number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
+    if quantity is not None and precision is None:
+        raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
+    options = input_runs.RunOptions(
+        seed=None if seed is None else _whole("seed", seed, lowest=0),
+        goal=None if precision is None else Precision(precision, quantity or QUANTITY),
+        workers=checked_workers(workers, scheduler),
+        scheduler=scheduler,
+        progress=False if quiet else None,
+    )
+    jobs = input_runs.jobs(file, runs, number, out, options)
+    if not quiet and any(planned.limit for planned in runs):
+        warnings.warn(f"{file}: time limits end no run: each traces all its photons", Notice, stacklevel=2)
+    console = Console(highlight=False, soft_wrap=True, quiet=quiet or as_json)
+    summaries = []
+    with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines
+        for at, job in enumerate(jobs, start=1):
+            console.print(f"run {at} of {len(jobs)}: {job.mco}", markup=False)
+            done = input_runs.done(job, options)
+            summaries.append(summary(job, done.results, options.goal))
+            for line in lines(job, done, options):
+                console.print(f"  {line}", markup=False)
+    if options.goal is not None:
+        console.print(REPEATS, markup=False)
+    if as_json:
+        print_json({"runs": summaries})
+
+
+def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
+    """Return a whole number as people write them, 1e6 included."""
+    from mcml_sim.media.checks import checked_whole
+
+    number: object = text
+    for read in (int, float):
+        with contextlib.suppress(ValueError):  # the check says what is wrong with it
+            number = read(text)
+            break
+    return checked_whole(name, number, lowest, highest)
+
+
+def totals(kept: Results) -> Iterator[str]:
+    """Yield a line for each share of the light, and one for their sum."""
+    for name, title in TOTALS.items():
+        yield f"{title:<22} {with_error(kept.estimates[name])}"
+    if kept.cut > 0:
+        yield f"{'at scattering limit':<22} {kept.cut:.2g}"
+    yield f"{'all of these':<22} {with_error(kept.estimates['energy'])}"
+
+
+def with_error(estimate: Estimate) -> str:
+    """Return a value and its standard error with two digits, such as 0.23783 ± 0.00042."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not math.isfinite(error):
+        return f"{value:.6g} ± unknown"
+    if error <= 0:
+        return "0 (no photon seen)" if not estimate.effective_samples else f"{value:.6g}"
+    place = math.floor(math.log10(error))
+    if 0 < value < SMALLEST:
+        digits = max(math.floor(math.log10(value)) - place + 1, 0)
+        return f"{value:.{digits}e} ± {error:.1e}"
+    digits = min(max(1 - place, 0), MOST_DIGITS)
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
+def speed(photons: int, seconds: float, compiling: float) -> str:
+    """Return the seconds of a run, and photons per second of the time that was not spent in compiling [s]."""
+    tracing = max(seconds - compiling, 1e-3)
+    rate = photons / tracing
+    return f"{times(seconds, compiling)}, " + (
+        f"{rate / 1e6:.3g} M photons/s" if rate >= SLOW else f"{rate:.0f} photons/s"
+    )
+
+
+def times(seconds: float, compiling: float) -> str:
+    """Return the seconds of a run, those of compiling apart."""
+    if compiling < SHORT:
+        return f"{seconds:.1f} s"
+    return f"{max(seconds - compiling, 0):.1f} s and {compiling:.1f} s to compile"
+
+
+def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
+    """Return whether the precision was reached, and if not, what would reach it."""
+    import numpy as np
+
+    if goal.is_reached(estimate):
+        return f"{goal.quantity}: relative standard error {goal.relative_error:g} reached"
+    value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
+    if not (np.all(value > 0) and np.all(np.isfinite(error))):
+        return (
+            f"{goal.quantity}: {goal.relative_error:g} not reached; some bins hold too few photons to predict how many "
+            "would reach it"
+        )
+    reached = float(np.max(error / value))
+    needed = photons * (reached / goal.relative_error) ** 2
+    return (
+        f"{goal.quantity}: relative standard error {reached:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
+        "photons in all would reach it, and these are kept: request more --photons"
+    )
+
+
+def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
+    """Yield the report of a run that is done."""
+    kept = done.results
+    yield f"{kept.photons} photons, seed {job.seed}, {pace(done, options.scheduler is not None)}"
+    yield from totals(kept)
+    if options.goal is not None:
+        yield precision_reached(kept.estimates[options.goal.quantity], options.goal, kept.photons)
+    if job.is_part_of_more:
+        yield f"{job.store} is kept, since it holds more photons than these: more --photons use them"
+
+
+def pace(done: Done, on_workers: bool) -> str:
+    """Return how fast a run went."""
+    if done.seconds is None:
+        return "finished before"
+    if done.resumed:  # the batches that were there cost nothing: a rate would be too good
+        return f"{times(done.seconds, done.compiling)}, resumed"
+    there = ", compiling on the workers included" if on_workers else ""
+    return speed(done.results.photons, done.seconds, done.compiling) + there
+
+
+def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
+    """Return a run that is done for JSON: files, and each share of the light with its standard error."""
+    shares = {name: kept.estimates[name] for name in (*TOTALS, "energy")}
+    summary = {
+        "mco": job.mco,
+        "npz": job.npz,
+        "photons": kept.photons,
+        "seed": kept.seed,
+        "version": kept.version,
+        "cut": kept.cut,
+        "estimates": {
+            name: {"value": share.value, "standard_error": share.standard_error} for name, share in shares.items()
+        },
+    }
+    if goal is not None:
+        reached = goal.is_reached(kept.estimates[goal.quantity])
+        summary["precision"] = {"quantity": goal.quantity, "goal": goal.relative_error, "reached": reached}
+    return summary
+
 
 app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_exceptions_enable=False)
 add_version(app, "mcml_sim")
@@ -43,7 +279,7 @@ def _remedied(text: str) -> str:
 def _hint() -> str:
     """Return advice for a command that was not understood."""
     first = next(iter(sys.argv[1:]), "")
-    return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else accepted()
+    return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else ACCEPTED
 
 
 PROGRAM = Program(

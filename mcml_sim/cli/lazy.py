@@ -1,4 +1,4 @@
-"""Imports on first use: names of a package (PEP 562), a command, and what a subcommand needs.
+"""Imports on first use: names of a package (PEP 562), and a command.
 
 JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
 """
@@ -12,7 +12,8 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
+    from types import FrameType
     from typing import Any
 
 INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
@@ -34,41 +35,27 @@ def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 def command(module: str) -> None:
-    """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last."""
-    with interruptible(module):
-        main = import_module(module).main
+    """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last.
+
+    Among imports it ends the process at once: an exception that falls into them may be dropped, or turned into another.
+    """
+
+    def interrupt(_: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if frame.f_code.co_filename.startswith("<frozen importlib"):
+                _quit(module)
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
     try:
-        main()
+        import_module(module).main()
     except KeyboardInterrupt:  # between what `main` guards
         _quit(module)
     finally:
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            _on_interrupt(lambda *_: _quit(module))  # for as long as Python takes to end
-
-
-@contextlib.contextmanager
-def interruptible(module: str) -> Iterator[None]:
-    """Have Ctrl-C end the process at once, in one line and with its status, during imports of a command in `module`.
-
-    An exception that falls into imports may be dropped, or turned into another.
-    """
-    before = signal.getsignal(signal.SIGINT)
-    if before in (signal.SIG_IGN, None) or not _on_interrupt(lambda *_: _quit(module)):
-        yield
-        return
-    try:
-        yield
-    finally:
-        _on_interrupt(before)
-
-
-def _on_interrupt(handler: Any) -> bool:
-    """Set the handler of Ctrl-C; return whether this thread may."""
-    try:
-        signal.signal(signal.SIGINT, handler)
-    except ValueError:  # only the main thread may
-        return False
-    return True
+        if signal.getsignal(signal.SIGINT) is interrupt:
+            signal.signal(signal.SIGINT, lambda *_: _quit(module))  # for as long as Python takes to end
 
 
 def _quit(module: str) -> None:

@@ -1,31 +1,54 @@
 """Frame of any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status.
 
 The first screen says what a command is for, how it is used, its subcommands by group, all in 24 lines of 80.
+Around it are shell and user: streams that are closed, letters that a terminal lacks, Ctrl-C.
 """
 
 from __future__ import annotations
 
+import codecs
+import contextlib
 import inspect
+import io
+import logging
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from types import FrameType
 
 import typer
 from rich.console import Console
 from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
-from mcml_sim.cli.lazy import INTERRUPTED, interruptible
-from mcml_sim.cli.terminal import mend_streams
+from mcml_sim.cli.lazy import INTERRUPTED
 from mcml_sim.errors import Notice
 
 GAP = 2  # characters between columns
 NOT_SHOWN = ("--show-completion",)  # --install-completion does what most want
+ANSWERS = (0, 1)
+BAD_INPUT = 2
+FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
+LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
+NOBODY_READS = 141  # exit status, as a shell reports any program that SIGPIPE ended: 128 + 13
+ACCEPTED = "--help shows what is accepted"
+ENCODED = "spelled"  # name of the way to handle an encoding's errors
+STANDS_FOR = {
+    **dict(zip("▁▂▃▄▅▆▇█", "_.,-~=*#", strict=True)),
+    **dict(zip("─│╭╮╰╯━┃", "-|++++-|", strict=True)),
+    **dict(zip("αβγδκλμξπρστχω", "abgdklmxprstco", strict=True)),
+    **dict(zip("±×−–—→…·²³√∂∞≤≥≈µ’", "+x--->..23Vdi<>~u'", strict=True)),
+}
+UNKNOWN = "?"
+STOPPING = "mcml-sim: stopping after the batches in flight; Ctrl-C again stops at once\n"
+SHOW_CURSOR = "\x1b[?25h"  # which a progress bar hides
 
 
 class FirstScreen(TyperGroup):
@@ -36,7 +59,11 @@ class FirstScreen(TyperGroup):
         console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 80)
         console.print(Text.assemble("Usage: ", (f"{ctx.command_path} COMMAND [OPTIONS] ...", "bold")))
         console.print(Text(f"{(self.help or '').strip()}\n"))
-        rows = self._commands(ctx)
+        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
+        rows = [
+            (getattr(command, "rich_help_panel", None) or "Commands", name, command.get_short_help_str(200))
+            for name, command in commands.items()
+        ]
         titles, names = (max(len(row[at]) for row in rows) + GAP for at in (0, 1))
         for title, group in groupby(rows, key=lambda row: row[0]):
             for at, (_, name, help_text) in enumerate(group):
@@ -46,20 +73,9 @@ class FirstScreen(TyperGroup):
         console.print(Text.assemble((f"{'Options':{titles}}", "dim"), ", ".join(options)))
         console.print(Text(f"More, with examples: {ctx.command_path} COMMAND --help", style="dim"))
 
-    def _commands(self, ctx: typer.Context) -> list[tuple[str, str, str]]:
-        """Return group, name and short help of each subcommand."""
-        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
-        return [
-            (getattr(command, "rich_help_panel", None) or "Commands", name, command.get_short_help_str(200))
-            for name, command in commands.items()
-        ]
-
 
 def add(
-    app: typer.Typer,
-    command: Callable[..., None],
-    panel: str | None = None,
-    kind: type[TyperCommand] | None = None,
+    app: typer.Typer, command: Callable[..., None], panel: str | None = None, kind: type[TyperCommand] | None = None
 ) -> None:
     """Add a subcommand; the examples at the end of its docstring come last in its --help, below the options."""
     help_text, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
@@ -74,8 +90,7 @@ def add_version(app: typer.Typer, package: str) -> None:
 
     def show(is_asked: bool) -> None:
         if is_asked:
-            with interruptible(package):
-                from mcml_sim.files.version import __version__
+            from mcml_sim.files.version import __version__
 
             typer.echo(f"{package.replace('_', '-')} {__version__}")
             raise typer.Exit
@@ -85,23 +100,6 @@ def add_version(app: typer.Typer, package: str) -> None:
         version: bool = typer.Option(False, "--version", callback=show, is_eager=True, help="Print the version."),
     ) -> None:
         pass
-
-
-ANSWERS = (0, 1)
-BAD_INPUT = 2
-FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
-LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
-NOBODY_READS = 141  # exit status, as a shell reports any program that SIGPIPE ended: 128 + 13
-
-
-def accepted() -> str:
-    """Return advice for a command that was not understood."""
-    return "--help shows what is accepted"
-
-
-def unchanged(text: str) -> str:
-    """Return the text of a library error as it is."""
-    return text
 
 
 def one_line(text: str) -> str:
@@ -127,8 +125,8 @@ class Program:
     app: typer.Typer
     mendable: tuple[type[Exception], ...]
     stopped: Callable[[], str]
-    hint: Callable[[], str] = accepted
-    remedied: Callable[[str], str] = unchanged
+    hint: Callable[[], str] = lambda: ACCEPTED
+    remedied: Callable[[str], str] = str
 
     def main(self) -> None:
         """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
@@ -193,3 +191,74 @@ class Program:
 def _let_go_of_stdout() -> None:
     """Have Python not flush once more as it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _spelled(error: UnicodeError) -> tuple[str, int]:
+    """Return the characters that could not be encoded, each as another, and where to go on."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lost = error.object[error.start : error.end]
+    return "".join(STANDS_FOR.get(letter, UNKNOWN) for letter in lost), error.end
+
+
+codecs.register_error(ENCODED, _spelled)
+
+
+def mend_streams() -> None:
+    """Have a stdout and a stderr to print to where the shell has closed them; what they cannot encode is spelled."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # For as long as the process lives, so nobody closes it.
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        if isinstance(stream := getattr(sys, name), io.TextIOWrapper):
+            stream.reconfigure(errors=ENCODED)
+
+
+@contextlib.contextmanager
+def two_interrupts() -> Iterator[None]:
+    """Let the first Ctrl-C print what it waits for and raise KeyboardInterrupt, and the second end the process.
+
+    Compiling cannot be interrupted and takes seconds, and batches may take long: someone who insists need not wait.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):  # ignored, or not Python's
+        yield
+        return
+    interrupts = 0
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal interrupts
+        interrupts += 1
+        if interrupts > 1:
+            if sys.stderr.isatty():
+                _tell(SHOW_CURSOR)
+            os._exit(INTERRUPTED)
+        try:
+            before(number, frame)  # ends the process among imports
+        except KeyboardInterrupt:
+            _tell(STOPPING)
+            raise
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        if not interrupts:  # else the process ends, and waits once more for what is compiled
+            signal.signal(signal.SIGINT, before)
+
+
+def _tell(text: str) -> None:
+    """Write to stderr past its buffer, which the code that was interrupted may be about to change."""
+    with contextlib.suppress(OSError, ValueError):  # closed or full: nobody is listening
+        os.write(sys.stderr.fileno(), text.encode())
+
+
+@contextlib.contextmanager
+def without_logs() -> Iterator[None]:
+    """Keep libraries from logging what an exception will say in one line."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)

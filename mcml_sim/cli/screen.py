@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.measure import Measurement
 
-from mcml_sim.files.text_file import as_json
+from mcml_sim.files.text_file import as_json as json_text
+from mcml_sim.files.whole_file import write_whole
 
 WIDEST = 1000  # columns that any table fits
 WIDTH = 100  # columns of what goes into a file or a pipe, which have no width of their own; COLUMNS sets another
@@ -27,7 +29,7 @@ def notes(quiet: bool) -> Console:
     return Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
 
 
-def show(parts: list[RenderableType], console: Console) -> None:
+def show(parts: Iterable[RenderableType], console: Console) -> None:
     """Print each with a blank line after it."""
     for part in parts:
         put(part, console)
@@ -44,9 +46,35 @@ def put(part: RenderableType, console: Console) -> None:
 
 def print_json(value: Any) -> None:
     """Print JSON, and nothing else, with NaN and infinities as null: the only writer of --json."""
-    text = as_json(value)
+    text = json_text(value)
     encoding = (sys.stdout.encoding or "").lower().replace("-", "")
-    sys.stdout.write(text if encoding == "utf8" else as_json(value, ascii_only=True))
+    sys.stdout.write(text if encoding == "utf8" else json_text(value, ascii_only=True))
+
+
+def answer(
+    body: Any,
+    parts: Iterable[RenderableType],
+    lines: Iterable[RenderableType] = (),
+    as_json: bool = False,
+    out: Path | None = None,
+    name: str = "",
+    note: str = "",
+    quiet: bool = False,
+) -> None:
+    """Print what a command found, as JSON or as tables and the lines below them.
+
+    Before that the JSON is kept as `name` in the folder `out`, if there is one; `note` says so, unless `quiet`.
+    """
+    if out is not None:
+        write_whole(out / name, json_text(body))
+        notes(quiet).print(note or f"wrote {name} into {out}", markup=False)
+    if as_json:
+        print_json(body)
+        return
+    console = screen()
+    show(parts, console)
+    for line in lines:
+        console.print(line, markup=False, emoji=False)
 
 
 def typed() -> str:

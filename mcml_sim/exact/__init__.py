@@ -12,8 +12,8 @@
     light = exact.solve(Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0))))   # a stack of layers
     light.reflectance, light.profile([0.01, 0.1])
 
-`transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `hankel` its inverse,
-`anisotropic` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
+`transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `by_albedo` its inverse,
+`forwards` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
 medium itself, not reduced by 1 - g.
 
 Every function of the half space takes lengths in any one unit with `mfp` in that unit, and broadcasts `r` (or `xi`)
@@ -39,7 +39,6 @@ light, which is A to within 8e-4, and 3.2e-3 in white media (alpha' > .999).
 """
 
 from mcml_sim.exact.half_space import (
-    ARGUMENTS,
     FINER,
     SEARCHLIGHT,
     cdf,
@@ -49,11 +48,10 @@ from mcml_sim.exact.half_space import (
     quantile,
     reflectance,
 )
-from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.stack.solution import Solution, solve
 
 __all__ = [
-    "ARGUMENTS",
     "FINER",
     "SEARCHLIGHT",
     "Nodes",

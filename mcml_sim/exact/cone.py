@@ -37,8 +37,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.dispersion import dispersion
-from mcml_sim.exact.special_functions import logarithm, square_root
+from mcml_sim.exact.special_functions import dispersion, logarithm, square_root
 
 SLOPES = np.linspace(-0.8, 0.8, 7)  # Im tau of the paths at hand
 FIRST_TAU, LAST_TAU = -7.0, 10.0  # beyond, the integrand is its own leading power to 1e-12
@@ -49,12 +48,9 @@ BISECTIONS = 50
 class System(NamedTuple):
     """Equations of the half space at one wave number, on nodes x."""
 
-    matrix: jax.Array
-    """Matrix M, complex128 (x, x)."""
-    leaving: jax.Array
-    """Vector sqrt(w) q, complex128 (x,)."""
-    source: jax.Array
-    """Vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)."""
+    matrix: jax.Array  # matrix M, complex128 (x, x)
+    leaving: jax.Array  # vector sqrt(w) q, complex128 (x,)
+    source: jax.Array  # vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)
 
 
 class _Cone(NamedTuple):

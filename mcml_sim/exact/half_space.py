@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError, SettingError
-from mcml_sim.exact import dispersion, hankel
-from mcml_sim.exact.anisotropic import functions as forwards
-from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, surface, total
+from mcml_sim.exact import by_albedo, forwards
+from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, radius_within, surface, total
+from mcml_sim.exact.special_functions import squared_decay_rate
 from mcml_sim.exact.transform import STANDARD, Transform
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
+from mcml_sim.media.arrays import Floats, scalar_or_array
+from mcml_sim.media.checks import checked_range, require_one_shape, require_own_process
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting, is_traced
 
 Numbers = ArrayLike | jax.Array
@@ -47,8 +47,8 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
     require_solved(setting)
     (albedo,) = _all_checked(alpha=alpha)
     if not setting.is_isotropic:
-        return _scalar_or_array(forwards.reflectance(albedo, setting))
-    return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo, surface(setting)))
+        return scalar_or_array(forwards.reflectance(albedo, setting))
+    return scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo, surface(setting)))
 
 
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -59,10 +59,10 @@ def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = S
     require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     if setting.is_isotropic:
-        values = by_alpha(hankel.profile, radius / length, albedo, setting)
+        values = by_alpha(by_albedo.profile, radius / length, albedo, setting)
     else:
         values = forwards.profile(radius / length, albedo, setting)
-    return _scalar_or_array(values / length**2)
+    return scalar_or_array(values / length**2)
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -70,8 +70,8 @@ def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARC
     require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     if not setting.is_isotropic:
-        return _scalar_or_array(forwards.cdf(radius / length, albedo, setting))
-    return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting))
+        return scalar_or_array(forwards.cdf(radius / length, albedo, setting))
+    return scalar_or_array(by_alpha(by_albedo.cdf, radius / length, albedo, setting))
 
 
 def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -88,13 +88,13 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
         n, known = (setting.n, None) if is_traced(setting.n) else (None, setting.n)
         values = _radius_within(share, albedo, n, known, setting.illumination)
     else:
-        values = by_alpha(_radius, share, albedo, setting)
-    return _scalar_or_array(values * length)
+        values = by_alpha(radius_within, share, albedo, setting)
+    return scalar_or_array(values * length)
 
 
 def decay_rate(alpha: Numbers) -> float | Floats:
     """Return kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls as e^{-kappa r / mfp} r^-2 [-]."""
-    return _scalar_or_array(elementwise(_decay_rate, *_all_checked(alpha=alpha)))
+    return scalar_or_array(elementwise(_decay_rate, *_all_checked(alpha=alpha)))
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -110,31 +110,23 @@ def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Sett
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     x = radius / length
     if setting.is_isotropic:
-        coarse, fine = (by_alpha(hankel.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
+        coarse, fine = (by_alpha(by_albedo.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
     else:
         coarse, fine = (forwards.profile(x, albedo, setting, coarse) for coarse in (True, False))
     xp = jnp if isinstance(fine, jax.Array) else np
     same = coarse == fine
-    return _scalar_or_array(xp.abs(xp.where(same, 1.0, coarse) / xp.where(same, 1.0, fine) - 1.0))
+    return scalar_or_array(xp.abs(xp.where(same, 1.0, coarse) / xp.where(same, 1.0, fine) - 1.0))
 
 
 _reflectance = {name: partial(total, illumination=name) for name in ILLUMINATIONS}
 
 
 def _decay_rate(alpha: jax.Array, of: Surface) -> jax.Array:
-    return dispersion.decay_rate(alpha)
-
-
-def _cdf(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
-    return hankel.cdf(transform, x)
+    return jnp.sqrt(squared_decay_rate(alpha))
 
 
 def _ring_density(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
-    return hankel.ring_density(transform, x) / transform.reflectance
-
-
-def _radius(transform: Transform, alpha: jax.Array, xi: jax.Array) -> jax.Array:
-    return hankel.radius_within(transform, xi)
+    return by_albedo.ring_density(transform, x) / transform.reflectance
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(3, 4))
@@ -142,7 +134,7 @@ def _radius_within(
     xi: jax.Array, alpha: jax.Array, n: jax.Array | None, known: float | None, illumination: str
 ) -> jax.Array:
     """Return the radius under an index `n` by which it can be differentiated, or a `known` one."""
-    return by_alpha(_radius, xi, alpha, _setting(illumination, n, known))
+    return by_alpha(radius_within, xi, alpha, _setting(illumination, n, known))
 
 
 @_radius_within.defjvp
@@ -154,7 +146,7 @@ def _radius_within_jvp(
     radius = _radius_within(xi, *where, known, illumination)
     x = jnp.where(xi == 1.0, 1.0, radius)
     _, d_cdf = jax.jvp(
-        lambda a, n: by_alpha(_cdf, x, a, _setting(illumination, n, known)), tuple(where), tuple(d_where)
+        lambda a, n: by_alpha(by_albedo.cdf, x, a, _setting(illumination, n, known)), tuple(where), tuple(d_where)
     )
     alpha, n = where
     density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, _setting(illumination, n, known)))
@@ -190,15 +182,4 @@ def _checked(name: str, value: Any) -> Any:
             got = f"{value.dtype}" + ("" if on else " outside of it")
             raise InputError(f"{name} must be a float64 array within jax.enable_x64(True), got {got}")
         return jnp.where((value >= low) & (value <= high), value, jnp.nan)
-    numbers = checked_numbers(name, value, what)
-    outside = ~((numbers >= low) & (numbers <= high))
-    if np.any(outside):
-        raise InputError(f"{name} must be {what}, got {float(numbers[outside].flat[0])}")
-    return numbers
-
-
-def _scalar_or_array(values: Any) -> Any:
-    """Return a result as jax gave it, or else a float for scalars."""
-    if isinstance(values, jax.Array):
-        return values
-    return float(values) if np.ndim(values) == 0 else np.asarray(values)
+    return checked_range(name, value, what, low, high)

@@ -39,10 +39,8 @@ SEARCHLIGHT = Setting()
 class Reduced(NamedTuple):
     """Scale that a medium shares with one whose scattering has no direction."""
 
-    alpha: Any
-    """Reduced albedo mu_s (1 - g) l* [-]."""
-    length: Any
-    """Length l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
+    alpha: Any  # reduced albedo mu_s (1 - g) l* [-]
+    length: Any  # length l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths
 
 
 def reduced(alpha: Any, g: Any) -> Reduced:
@@ -61,22 +59,14 @@ class ExactLight(eqx.Module):
 
     setting: Setting = eqx.field(static=True)
     g: Array
-    critical: Array
-    """Rate k_c of light scattered once [1/mfp]."""
-    nearest: Array
-    """Radius x of f's first knot; nearer, light scattered more than once is taken for x (1 - ln x) of itself."""
-    farthest: Array
-    """Radius x of the last knot; farther, light goes on as its decay over x^2."""
-    step: Array
-    """Step of ln x, from knot to knot."""
-    rest: Array
-    """Spline of f in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling."""
-    once: Array
-    """Spline of ln D_1 + k_c x, x in mean free paths, (intervals, 4)."""
-    kappa: Array
-    """Decay rate kappa in the same polynomials as f, (degrees,)."""
-    share: Array
-    """Ratio A / alpha in Chebyshev polynomials of s, (degrees,)."""
+    critical: Array  # rate k_c of light scattered once [1/mfp]
+    nearest: Array  # radius x of f's first knot; nearer, light scattered again is x (1 - ln x) of itself
+    farthest: Array  # radius x of the last knot; farther, light goes on as its decay over x^2
+    step: Array  # step of ln x, from knot to knot
+    rest: Array  # spline of f in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling
+    once: Array  # spline of ln D_1 + k_c x, x in mean free paths, (intervals, 4)
+    kappa: Array  # decay rate kappa in the same polynomials as f, (degrees,)
+    share: Array  # ratio A / alpha in Chebyshev polynomials of s, (degrees,)
 
     @property
     def unlabelled(self) -> ExactLight:

@@ -26,11 +26,10 @@ from threadpoolctl import threadpool_limits
 
 from mcml_sim.exact import cone
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.special_functions import panels, square_root
+from mcml_sim.exact.special_functions import dispersion, panels, square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
-from mcml_sim.files.kept import kept
+from mcml_sim.files.npz import kept
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 
@@ -57,10 +56,8 @@ VERSION = 2  # of what `new_table` puts into a table; a file of another version,
 class Table(NamedTuple):
     """Arrays that albedos share under one surface."""
 
-    lines: Complexes
-    """Chebyshev coefficients of R^(k) / alpha on the groups' lines, and at k = 0: (2 lights, groups, k, degree)."""
-    ray: Complexes
-    """Transform of each order of scattering, on the ray: (2 lights, k, orders)."""
+    lines: Complexes  # Chebyshev coefficients of R^(k) / alpha on the lines, and at 0: (2 lights, groups, k, degree)
+    ray: Complexes  # transform of each order of scattering, on the ray: (2 lights, k, orders)
 
 
 class _Contour(NamedTuple):
@@ -77,7 +74,9 @@ def transform(table: Table, alpha: jax.Array, light: int, rule: Rule) -> Transfo
         for name in _Contour._fields
     )
     own = jnp.asarray(table.lines)[light, group]
-    values = _sum(own[:-1], _variable(alpha, group, k[: own.shape[0] - 1]))
+    near = k[: own.shape[0] - 1]
+    first, last = (_root(jnp.asarray(ALPHAS)[group + end], near) for end in (0, 1))
+    values = _sum(own[:-1], (2.0 * _root(alpha, near) - first - last) / (first - last))  # -1 to 1 in w, in the group
     beyond = jnp.asarray(table.ray)[light] @ (alpha ** np.arange(ORDERS))
     pole = jnp.where(group == KAPPAS.size - 2, 0.5, 0.0)  # the last line starts at the origin, H1's pole
     farthest = jnp.where(alpha == 1.0, FARTHEST, NO_LIGHT)
@@ -92,12 +91,6 @@ def total(table: Table, alpha: jax.Array, light: int) -> jax.Array:
 
 def _group(alpha: jax.Array) -> jax.Array:
     return jnp.searchsorted(ALPHAS[1:-1], jax.lax.stop_gradient(alpha))
-
-
-def _variable(alpha: jax.Array, group: jax.Array | int, k: jax.Array) -> jax.Array:
-    """Return z, from w, between 1 and -1 at the ends of the group."""
-    first, last = (_root(jnp.asarray(ALPHAS)[group + end], k) for end in (0, 1))
-    return (2.0 * _root(alpha, k) - first - last) / (first - last)
 
 
 def _root(alpha: jax.Array, k: Any) -> jax.Array:

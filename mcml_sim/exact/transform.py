@@ -11,7 +11,7 @@ Multiple Scattering, 2016):
 
 Lengths are in mean free paths. What makes few nodes enough:
 
-- k runs along 0.9 i kappa + rho e^{i pi/4}, kappa the decay rate of the profile, L(i kappa) = 0; see `hankel`.
+- k runs along 0.9 i kappa + rho e^{i pi/4}, kappa the decay rate of the profile, L(i kappa) = 0; see `by_albedo`.
 - The zeros of L, at distance kappa from the origin, are divided out: with (K^2 + kappa^2) / (K^2 + 1) for L it is
   H_k(1/s) = (s + sqrt(k^2 + 1)) / (s + sqrt(k^2 + kappa^2)), and what is left has no scale but 1.
 - x runs along a ray halfway between the singularities on either side, as |sqrt(k^2 + 1)| sinh(u); trapezoids in u,
@@ -31,8 +31,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact.dispersion import dispersion, squared_decay_rate
-from mcml_sim.exact.special_functions import inverse_sinh, logarithm, sinh_and_cosh, square_root
+from mcml_sim.exact.special_functions import (
+    dispersion,
+    inverse_sinh,
+    logarithm,
+    sinh_and_cosh,
+    square_root,
+    squared_decay_rate,
+)
 from mcml_sim.media.arrays import Floats
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].
@@ -58,13 +64,10 @@ class Rule:
     k: int
     m: int
     x: int
-    line: int = 12
-    """Number of wave numbers of a panel."""
-    depth: int = 96
-    """Number of nodes x of `cone`."""
+    line: int = 12  # number of wave numbers of a panel
+    depth: int = 96  # number of nodes x of `cone`
     angles: int = 72
-    degree: int = 18
-    """Number of polynomials in w."""
+    degree: int = 18  # number of polynomials in w
 
     def scaled(self, factor: float) -> Rule:
         """Return the rule with that many times as many nodes."""
@@ -79,18 +82,12 @@ STANDARD = Rule(k=224, m=24, x=40)
 class Transform(NamedTuple):
     """Transform of one albedo on its contour, over alpha, so that it has a limit where alpha is 0."""
 
-    k: jax.Array
-    """Wave numbers, complex128 (nodes,) [1/mfp]."""
-    weight: jax.Array
-    """Steps dk, complex128 (nodes,) [1/mfp]."""
-    value: jax.Array
-    """Values R^(k) / alpha, complex128 (nodes,) [-]."""
-    reflectance: jax.Array
-    """Ratio A / alpha, float64 () [-]."""
-    pole: jax.Array
-    """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where it starts at 0."""
-    farthest: jax.Array
-    """Radius from which on R_d is taken for its power, r^-3, float64 () [mfp]: below NO_LIGHT where alpha = 1."""
+    k: jax.Array  # wave numbers, complex128 (nodes,) [1/mfp]
+    weight: jax.Array  # steps dk, complex128 (nodes,) [1/mfp]
+    value: jax.Array  # values R^(k) / alpha, complex128 (nodes,) [-]
+    reflectance: jax.Array  # ratio A / alpha, float64 () [-]
+    pole: jax.Array  # part of A that the contour leaves out beyond a radius [-]: 1/2 where it starts at 0
+    farthest: jax.Array  # radius from which on R_d is its power, r^-3 [mfp]: below NO_LIGHT where alpha = 1
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
@@ -98,7 +95,7 @@ def solve(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> Transfo
     """Return the transform of one albedo, a float64 scalar in [0, 1]."""
     k, weight = _contour(alpha, rule)
     value = over_alpha(alpha, jnp.append(k, ORIGIN), illumination, rule)
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha))
+    return _of_values(alpha, k, weight, value)
 
 
 @solve.defjvp
@@ -110,7 +107,7 @@ def _solve_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tuple) -
     of_value, of_total = slope[:-1] * d_alpha, slope[-1].real * d_alpha
     held = jnp.zeros_like(k), jnp.zeros_like(k)
     tangent = Transform(*held, of_value, of_total, jnp.zeros_like(alpha), jnp.zeros_like(alpha))
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha)), tangent
+    return _of_values(alpha, k, weight, value), tangent
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
@@ -136,13 +133,11 @@ def _total(alpha: jax.Array, value: jax.Array) -> jax.Array:
     return jnp.where(alpha == 1.0, 1.0, value[-1].real)
 
 
-def _pole(alpha: jax.Array) -> jax.Array:
-    """Return the part of H1's pole: a contour that starts at the origin itself passes half of it there."""
-    return jnp.where(alpha == 1.0, 0.5, 0.0)
-
-
-def _farthest(alpha: jax.Array) -> jax.Array:
-    return jnp.where(alpha == 1.0, FARTHEST_RADIUS, NO_LIGHT)
+def _of_values(alpha: jax.Array, k: jax.Array, weight: jax.Array, value: jax.Array) -> Transform:
+    """Return the transform of values at k and, last, at the origin: where alpha is 1 the contour starts there."""
+    is_white = alpha == 1.0
+    ends = jnp.where(is_white, 0.5, 0.0), jnp.where(is_white, FARTHEST_RADIUS, NO_LIGHT)
+    return Transform(k, weight, value[:-1], _total(alpha, value), *ends)
 
 
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:

@@ -1,24 +1,32 @@
-"""Arrays out of .npz files that others made: what a file claims is checked before any of it is unpacked.
+"""Arrays in .npz files: of others, and those that take seconds to make and are kept in the user's cache folder.
 
-An .npz file is a zip file of .npy files, which pack well: 13 MB can hold 3 GB of zeros. So the zip file's directory and
-the header of each array are held against bounds first, and only arrays that are wanted are unpacked, no further than
-they said. Nothing is unpickled.
+An .npz file is a zip file of .npy files, which pack well: 13 MB can hold 3 GB of zeros. So what a file claims, in the
+zip file's directory and the header of each array, is held against bounds before any of it is unpacked; only arrays that
+are wanted are unpacked, no further than they said. Nothing is unpickled.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import io
 import math
 import re
 import struct
+import warnings
 import zipfile
 import zlib
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
+import platformdirs
 from numpy.typing import NDArray
 
+from mcml_sim.errors import Notice, OutputError
+from mcml_sim.files.whole_file import read_whole, write_whole
+
 Shapes = Mapping[str, tuple[int, ...] | None]
+Arrays = dict[str, NDArray[np.float64]]
 MOST_MEMBERS = 1000  # of a zip file; a run's results have some fifty
 MOST_AXES = 8
 ENTRY = b"PK\x01\x02"  # begins each line of a zip file's directory
@@ -37,6 +45,7 @@ LONGEST_NAME = 60  # characters of one in a message
 LAST_LETTER = 0x10FFFF
 LONGEST_REASON = 200  # characters; zipfile quotes names of 65535
 WIDEST = 8  # bytes of a number
+MOST_KEPT = 1 << 26  # bytes of a file of the cache
 # What numpy and zip raise at a file that is not what was written.
 DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, OverflowError, struct.error,
            zipfile.BadZipFile, zlib.error)  # fmt: skip
@@ -72,7 +81,6 @@ def read_npz(content: bytes, most: int, shapes: Shapes | None = None, text: Coll
 
 
 def _members(archive: zipfile.ZipFile, shapes: Shapes | None) -> dict[str, zipfile.ZipInfo]:
-    """Return the wanted members by the name of their array."""
     members: dict[str, zipfile.ZipInfo] = {}
     for member in archive.infolist():
         name = member.filename.removesuffix(SUFFIX)
@@ -123,3 +131,37 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray:
 
 def _quoted(name: str) -> str:
     return repr(name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}...")
+
+
+def kept(name: str, arrays: Collection[str], make: Callable[[], Arrays]) -> Arrays:
+    """Return the arrays of that name from the cache, else from `make`. The name says all that they depend on.
+
+    A file that is damaged is named in a warning and made anew; where none can be written, there is none.
+    """
+    path = platformdirs.user_cache_path("mcml_sim") / f"{name}.npz"
+    if path.is_file():
+        try:
+            return _kept(read_whole(path, MOST_KEPT), arrays)
+        except ValueError as error:
+            warnings.warn(f"{path} is damaged ({error}) and made anew", Notice, stacklevel=2)
+    new = make()
+    with contextlib.suppress(OutputError, OSError):  # no folder to write into
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = io.BytesIO()
+        np.savez(file, allow_pickle=False, sha256=_digest(new), **new)
+        write_whole(path, file.getvalue())
+    return new
+
+
+def _kept(content: bytes, names: Collection[str]) -> Arrays:
+    arrays = read_npz(content, MOST_KEPT, text=("sha256",))
+    if not {"sha256", *names} <= arrays.keys():
+        raise ValueError("an array is missing")
+    chosen = {name: arrays[name] for name in names}
+    if str(arrays["sha256"]) != _digest(chosen):
+        raise ValueError("its numbers are not those that were written")
+    return chosen
+
+
+def _digest(arrays: Arrays) -> str:
+    return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in arrays.values())).hexdigest()

@@ -33,6 +33,7 @@ LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MOST_LEVELS  # noqa: UP031
 )
 LONGEST_SHOWN = 40  # characters of a number or key in a message
+TOO_DEEP = f"tables or lists nested more than {MOST_LEVELS} deep"
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
@@ -79,7 +80,7 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
             object_pairs_hook=_object,
         )
     except RecursionError:
-        raise ValueError(_too_deep()) from None
+        raise ValueError(TOO_DEEP) from None
     return _checked(value)
 
 
@@ -87,12 +88,12 @@ def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
     """Parse TOML text; ValueError in one line if it is none, or not to be trusted (see above)."""
     text = _text(content, most)
     if LONG_KEY.search(text):
-        raise ValueError(_too_deep())
+        raise ValueError(TOO_DEEP)
     long = LONG_NUMBER.search(text)
     try:
         value = tomllib.loads(text, parse_float=lambda literal: _number(text, literal))
     except RecursionError:
-        raise ValueError(_too_deep()) from None
+        raise ValueError(TOO_DEEP) from None
     except ValueError as error:
         if long is None or not str(error).startswith("Exceeds the limit"):
             raise
@@ -151,7 +152,7 @@ def _checked(value: Any) -> Any:
         level = [inner for outer in level for inner in _inside(outer)]
         if not level:
             return value
-    raise ValueError(_too_deep())
+    raise ValueError(TOO_DEEP)
 
 
 def _inside(value: Any) -> Iterable[Any]:
@@ -160,10 +161,6 @@ def _inside(value: Any) -> Iterable[Any]:
     if isinstance(value, dict):
         return [*value, *value.values()]
     return value if isinstance(value, list) else ()
-
-
-def _too_deep() -> str:
-    return f"tables or lists nested more than {MOST_LEVELS} deep"
 
 
 def _short(text: str) -> str:

@@ -38,6 +38,12 @@ def is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (float, np.integer, np.floating)) and not math.isnan(value)
 
 
+def require(holds: object, name: str, accepted: str, value: object) -> None:
+    """Raise InputError unless that holds of an argument: `NAME must be ACCEPTED, got VALUE`."""
+    if not holds:
+        raise InputError(f"{name} must be {accepted}, got {shown(value)}")
+
+
 def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     """Return real numbers as float64, of any shape; `accepted` says what they are.
 
@@ -52,6 +58,14 @@ def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     except (TypeError, ValueError):
         pass
     raise InputError(f"{name} must be {accepted}, got {shown(value)}")
+
+
+def checked_range(name: str, value: object, accepted: str, low: float, high: float = math.inf) -> Floats:
+    """Return numbers as `checked_numbers` does; InputError on the first that is not within bounds, both included."""
+    numbers = checked_numbers(name, value, accepted)
+    if np.any(outside := ~((numbers >= low) & (numbers <= high))):
+        raise InputError(f"{name} must be {accepted}, got {float(numbers[outside].flat[0])}")
+    return numbers
 
 
 def require_one_shape(**arrays: Any) -> None:
@@ -104,6 +118,5 @@ def checked_workers(workers: int | None, scheduler: str | None = None) -> int | 
 
 def checked_folder(store: str | os.PathLike[str] | None) -> Path | None:
     """Return the folder of a store, or None."""
-    if store is not None and not isinstance(store, (str, os.PathLike)):
-        raise InputError(f"store must be the path of a folder, got {shown(store)}")
+    require(store is None or isinstance(store, (str, os.PathLike)), "store", "the path of a folder", store)
     return None if store is None else Path(store)

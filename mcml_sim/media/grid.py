@@ -109,12 +109,7 @@ class Grid:
         a = "" if self.a_edges is None else f", {self.angles} angles"
         return f"Grid({self.rings} annuli to r = {self.r_edges[-1]:g}{z}{a}, {self.digest[:8]})"
 
-    def _set_edges(
-        self,
-        r_edges: Floats,
-        z_edges: Floats | None,
-        a_edges: Floats | None,
-    ) -> None:
+    def _set_edges(self, r_edges: Floats, z_edges: Floats | None, a_edges: Floats | None) -> None:
         for name, edges in (("r_edges", r_edges), ("z_edges", z_edges), ("a_edges", a_edges)):
             if edges is not None:
                 edges.setflags(write=False)
@@ -168,20 +163,17 @@ def require_resolved(grid: Grid) -> None:
         if grid.rings * number > MAX_CELLS:
             raise InputError(f"grid must have at most {MAX_CELLS} bins, got {grid.rings} annuli x {number} {across}")
     for name, edges in (("annuli", grid.r_edges), ("depths", grid.z_edges)):
-        if edges is not None:
-            _require_resolved(name, edges)
-
-
-def _require_resolved(name: str, edges: np.ndarray) -> None:
-    lower, upper = edges[:-1], edges[1:]
-    narrow = upper - lower < NARROWEST_BIN * upper
-    if np.any(narrow):
-        at = int(np.argmax(narrow))
-        raise InputError(
-            f"grid must have {name} wider than {NARROWEST_BIN:g} of their place, which single precision resolves, "
-            f"got one from {float(lower[at])!r} to {float(upper[at])!r}"
-        )
-    if upper[0] < SHORTEST or upper[-1] > LONGEST:
-        raise InputError(
-            f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {upper[0]:g} to {upper[-1]:g} of {name}"
-        )
+        if edges is None:
+            continue
+        lower, upper = edges[:-1], edges[1:]
+        narrow = upper - lower < NARROWEST_BIN * upper
+        if np.any(narrow):
+            at = int(np.argmax(narrow))
+            raise InputError(
+                f"grid must have {name} wider than {NARROWEST_BIN:g} of their place, which single precision resolves, "
+                f"got one from {float(lower[at])!r} to {float(upper[at])!r}"
+            )
+        if upper[0] < SHORTEST or upper[-1] > LONGEST:
+            raise InputError(
+                f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {upper[0]:g} to {upper[-1]:g} of {name}"
+            )

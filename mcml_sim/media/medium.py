@@ -10,7 +10,7 @@ import numpy as np
 from mcml_sim.errors import InputError
 from mcml_sim.media import phase as phases
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require, shown
 
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
 
@@ -40,14 +40,12 @@ class Layer:
         _require_index("n", self.n)
         for name in ("mu_a", "mu_s"):
             value = getattr(self, name)
-            if not (is_number(value) and math.isfinite(value) and value >= 0):
-                raise InputError(f"{name} must be a coefficient >= 0, got {shown(value)}")
+            require(is_number(value) and math.isfinite(value) and value >= 0, name, "a coefficient >= 0", value)
         if not math.isfinite(self.mu_t):
             raise InputError(f"mu_a + mu_s must be finite, got {shown(self.mu_a)} and {shown(self.mu_s)}")
-        if not (is_number(self.g) and (-1 < self.g < 1 or (self.g == 1 and self.mu_s == 0))):
-            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
-        if not (is_number(self.thickness) and self.thickness > 0):
-            raise InputError(f"thickness must be > 0, or infinite in the last layer, got {shown(self.thickness)}")
+        g, thick = self.g, self.thickness
+        require(is_number(g) and (-1 < g < 1 or (g == 1 and self.mu_s == 0)), "g", "a mean cosine in (-1, 1)", g)
+        require(is_number(thick) and thick > 0, "thickness", "> 0, or infinite in the last layer", thick)
 
     @property
     def mu_t(self) -> float:
@@ -93,8 +91,7 @@ class Medium:
         layers = tuple(self.layers) if isinstance(self.layers, (list, tuple)) else (self.layers,)
         object.__setattr__(self, "layers", layers)
         for layer in layers:
-            if not isinstance(layer, Layer):
-                raise InputError(f"layers must be Layer objects, got {shown(layer)}")
+            require(isinstance(layer, Layer), "layers", "Layer objects", layer)
         if not 1 <= len(layers) <= MAX_LAYERS:
             raise InputError(f"a medium must have 1 to {MAX_LAYERS} layers, got {len(layers)}")
         _require_index("n_above", self.n_above)
@@ -136,13 +133,10 @@ def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -
         n: refractive index [-].
         g: mean cosine of the scattering angle [-].
     """
-    if not (is_number(alpha) and 0 <= alpha <= 1):
-        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {shown(alpha)}")
-    if not (is_number(mfp) and math.isfinite(mfp) and mfp > 0):
-        raise InputError(f"mfp must be a mean free path > 0, got {shown(mfp)}")
+    require(is_number(alpha) and 0 <= alpha <= 1, "alpha", "a single-scattering albedo in [0, 1]", alpha)
+    require(is_number(mfp) and math.isfinite(mfp) and mfp > 0, "mfp", "a mean free path > 0", mfp)
     return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp, g=g),))
 
 
 def _require_index(name: str, value: object) -> None:
-    if not (is_number(value) and math.isfinite(value) and value > 0):
-        raise InputError(f"{name} must be a refractive index > 0, got {shown(value)}")
+    require(is_number(value) and math.isfinite(value) and value > 0, name, "a refractive index > 0", value)

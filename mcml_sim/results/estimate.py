@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,10 @@ class Estimate:
         value: a small error bar there is no sign of accuracy.
         """
         return cast("bool | NDArray[np.bool_]", np.greater_equal(self.effective_samples, at_least))
+
+    def mapped(self, function: Callable[[Any], Any]) -> Estimate:
+        """Return the estimate with all its numbers passed through a function, such as an index."""
+        return Estimate(*map(function, (self.value, self.standard_error, self.effective_samples)))
 
     def scaled(self, factor: float | Floats) -> Estimate:
         """Return the estimate times a positive constant, which broadcasts against it."""

@@ -49,13 +49,12 @@ from __future__ import annotations
 
 import io
 import itertools
-import math
 import os
 import posixpath
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import read_whole
@@ -138,7 +137,13 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     """Return what `read_mci` gives for a file of this name and content."""
-    lines = Lines(name, _checked(name, content))
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
+    before, null, _ = content.partition(b"\x00")
+    if null:
+        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
+        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
+    lines = Lines(name, content)
     (version,) = lines.take(1, "the file version, 1.0 or mcmli2.0")
     if version.startswith(VERSION_2):
         return tuple(_runs_of_2(lines, read_media(lines)))
@@ -234,7 +239,6 @@ def read_run(lines: Lines, outputs: set[str]) -> Run:
 
 
 def _bins(lines: Lines, words: dict[str, str], decimal: bool = False) -> tuple[int, int, int]:
-    """Return nz, nr and na."""
     of = {name: lines.whole(f"{name}, a number of bins", word, MAX_BINS, 1, decimal) for name, word in words.items()}
     for other in ("nz", "na"):
         if (cells := of["nr"] * of[other]) > MAX_CELLS:
@@ -251,6 +255,25 @@ class Optics(NamedTuple):
     g: float
 
 
+def _optics(lines: Lines, of: str, n: str, mu_a: str, mu_s: str, g: str) -> Optics:
+    """Return optical properties; a mean cosine of 1 only where nothing scatters."""
+    index = lines.decimal(f"n {of}", n, INDICES)
+    absorbs, scatters = lines.coefficient(f"mu_a {of} in 1/cm", mu_a), lines.coefficient(f"mu_s {of} in 1/cm", mu_s)
+    cosine = lines.decimal(f"g {of}", g, (-1.0, 1.0))
+    if abs(cosine) == 1 and (scatters > 0 or cosine < 0):
+        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", quoted(g))
+    return Optics(index, absorbs, scatters, cosine)
+
+
+def _settled(lines: Lines, of: str, optics: Optics, word: str, is_last: bool, got: str) -> Layer:
+    """Return a layer of a thickness, infinite only where it is the last and not clear; `got` its mu_a and mu_s."""
+    if not (is_last and INFINITE.fullmatch(word)):
+        return Layer(*optics, thickness=lines.decimal(f"thickness {of} in cm", word, LENGTHS))
+    if optics.mu_a == optics.mu_s == 0:
+        raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", got)
+    return Layer(*optics)
+
+
 def read_media(lines: Lines) -> dict[str, Optics]:
     """Return the media that the next lines of a file of MCML 2 define, up to `end`."""
     media: dict[str, Optics] = {}
@@ -264,10 +287,7 @@ def read_media(lines: Lines) -> dict[str, Optics]:
             raise lines.error("each medium once", f"{quoted(name)} again")
         if len(name) > MAX_NAME:
             raise lines.error(f"a medium's name of at most {MAX_NAME} characters", quoted(name))
-        of = f"of {quoted(name)}"
-        mu_s = lines.coefficient(f"mu_s {of} in 1/cm", words[2])
-        n, g = lines.decimal(f"n {of}", words[0], INDICES), require_g(lines, of, words[3], mu_s)
-        media[name] = Optics(n, lines.coefficient(f"mu_a {of} in 1/cm", words[1]), mu_s, g)
+        media[name] = _optics(lines, f"of {quoted(name)}", *words[:4])
 
 
 def _runs_of_2(lines: Lines, media: dict[str, Optics]) -> Iterator[Run]:
@@ -336,14 +356,12 @@ def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
         rows.append((media[name], thickness[0] if thickness else ""))
     if len(rows) < 3 or not all(word for _, word in rows[1:-1]):
         raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(rows)} lines")
-    layers: list[Layer] = []
-    for at, (optics, word) in enumerate(rows[1:-1], start=1):
-        of, endless = f"of layer {at} of {len(rows) - 2}", INFINITE.fullmatch(word) and at == len(rows) - 2
-        if endless and optics.mu_a == optics.mu_s == 0:
-            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", "0 and 0")
-        thick = math.inf if endless else lines.decimal(f"thickness {of} in cm", word, LENGTHS)
-        layers.append(Layer(*optics, thickness=thick))
-    return Medium(tuple(layers), rows[0][0].n, rows[-1][0].n)
+    last = len(rows) - 2
+    layers = tuple(
+        _settled(lines, f"of layer {at} of {last}", optics, word, at == last, "0 and 0")
+        for at, (optics, word) in enumerate(rows[1:-1], start=1)
+    )
+    return Medium(layers, rows[0][0].n, rows[-1][0].n)
 
 
 def _output(lines: Lines, outputs: set[str], name: str, *form: str) -> tuple[str, str]:
@@ -366,36 +384,9 @@ def _index(lines: Lines, name: str) -> float:
 
 def _layer(lines: Lines, at: int, number: int) -> Layer:
     of = f"of layer {at} of {number}"
-    n, mu_a, mu_s, g, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
-    values: dict[str, Any] = {
-        "n": lines.decimal(f"n {of}", n, INDICES),
-        "mu_a": lines.coefficient(f"mu_a {of} in 1/cm", mu_a),
-        "mu_s": lines.coefficient(f"mu_s {of} in 1/cm", mu_s),
-    }
-    values["g"] = require_g(lines, of, g, values["mu_s"])
-    if at == number and INFINITE.fullmatch(thickness):
-        if values["mu_a"] == values["mu_s"] == 0:
-            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{quoted(mu_a)} and {quoted(mu_s)}")
-        return Layer(**values)
-    return Layer(**values, thickness=lines.decimal(f"thickness {of} in cm", thickness, LENGTHS))
-
-
-def require_g(lines: Lines, of: str, word: str, mu_s: float) -> float:
-    """Return a mean cosine, 1 only where nothing scatters; InputError on others."""
-    g = lines.decimal(f"g {of}", word, (-1.0, 1.0))
-    if abs(g) == 1 and (mu_s > 0 or g < 0):
-        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", quoted(word))
-    return g
-
-
-def _checked(name: str, content: bytes) -> bytes:
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
-    before, null, _ = content.partition(b"\x00")
-    if null:
-        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
-        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
-    return content
+    *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
+    got = f"{quoted(words[1])} and {quoted(words[2])}"
+    return _settled(lines, of, _optics(lines, of, *words), thickness, at == number, got)
 
 
 def _is_number(word: str) -> bool:

@@ -18,7 +18,6 @@ from mcml_sim.errors import InputError
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.grid import Grid
 from mcml_sim.results.mci import DECIMAL, OUTPUT, VERSION_2, Lines, Run, quoted, read_media, read_run, read_run_2
 from mcml_sim.results.tally import Tally
 
@@ -69,45 +68,16 @@ def made_by(seed: int) -> str:
     return f"# Made by mcml-sim {__version__}, seed {seed}.\n"
 
 
-@dataclass(frozen=True)
-class _Bins:
-    """Even bins, as an .mco has them [cm, rad], and V1's measures of them."""
-
-    dz: float
-    dr: float
-    nz: int
-    nr: int
-    na: int
-
-    @classmethod
-    def of(cls, grid: Grid) -> _Bins:
-        if grid.z_edges is None:
-            raise InputError(f"grid must resolve depths for an .mco, give it dz and nz, got {grid!r}")
-        widths = (_even_width("depths", grid.z_edges), _even_width("rings", grid.r_edges))
-        return cls(*widths, nz=grid.depths, nr=grid.rings, na=max(grid.angles, 1))
-
-    @property
-    def da(self) -> float:
-        return math.pi / 2 / self.na
-
-    @property
-    def areas(self) -> Floats:
-        """Areas of the rings [cm^2], (nr,)."""
-        return np.asarray(2 * math.pi * (np.arange(self.nr) + 0.5) * self.dr**2, np.float64)
-
-    @property
-    def solid_angles(self) -> Floats:
-        """Solid angles as V1 has them, width times middle [sr], (na,)."""
-        return 2 * math.pi * np.sin((np.arange(self.na) + 0.5) * self.da) * self.da
-
-    @property
-    def projected_solid_angles(self) -> Floats:
-        """Exact solid angles times the cosine of their middles [sr], (na,)."""
-        return 2 * math.pi * np.sin(2 * (np.arange(self.na) + 0.5) * self.da) * math.sin(self.da / 2)
-
-
 def _sections(tally: Tally, name: str) -> Iterator[str]:
-    bins = _Bins.of(tally.grid)
+    grid, da = tally.grid, math.pi / 2 / max(tally.grid.angles, 1)
+    if grid.z_edges is None:
+        raise InputError(f"grid must resolve depths for an .mco, give it dz and nz, got {grid!r}")
+    dz, dr = _even_width("depths", grid.z_edges), _even_width("rings", grid.r_edges)
+    angles = (np.arange(max(grid.angles, 1)) + 0.5) * da
+    areas = 2 * math.pi * (np.arange(grid.rings) + 0.5) * dr**2  # [cm^2]
+    # Solid angles as V1 has them, width times middle; and exact ones times the cosine of their middles [sr].
+    solid_angles = 2 * math.pi * np.sin(angles) * da
+    exits = areas[:, None] * (2 * math.pi * np.sin(2 * angles) * math.sin(da / 2))
     specular = float(tally.specular_reflectance)
     share = (1 - specular) / tally.deposits.started
     reflected = share * _folded(tally.deposits.reflected, 0)
@@ -117,21 +87,26 @@ def _sections(tally: Tally, name: str) -> Iterator[str]:
     layers = share * tally.deposits.absorbed
     yield HEAD
     yield f"{made_by(tally.seed)}\n"
-    yield _parameters(tally, bins, name)
-    yield _totals(specular, reflected.sum(), layers[-1], transmitted.sum())
+    yield _parameters(tally, dz, dr, name)
+    yield (
+        "RAT #Reflectance, absorption, transmission. \n"
+        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
+        f"{reflected.sum():<14.6G} \t#Diffuse reflectance [-]\n"
+        f"{layers[-1]:<14.6G} \t#Absorbed fraction [-]\n"
+        f"{transmitted.sum():<14.6G} \t#Transmittance [-]\n\n"
+    )
     yield _column("A_l #Absorption as a function of layer. [-]", layers[:-1], "%12.4G\n")
-    yield _column("A_z #A[0], [1],..A[nz-1]. [1/cm]", share * _folded(tally.deposits.absorbed_z, 0) / bins.dz)
-    yield _column("Rd_r #Rd[0], [1],..Rd[nr-1]. [1/cm2]", reflected.sum(axis=1) / bins.areas)
-    yield _column("Rd_a #Rd[0], [1],..Rd[na-1]. [sr-1]", reflected.sum(axis=0) / bins.solid_angles)
-    yield _column("Tt_r #Tt[0], [1],..Tt[nr-1]. [1/cm2]", transmitted.sum(axis=1) / bins.areas)
-    yield _column("Tt_a #Tt[0], [1],..Tt[na-1]. [sr-1]", transmitted.sum(axis=0) / bins.solid_angles)
-    exits = bins.areas[:, None] * bins.projected_solid_angles
-    yield _table("A_rz", "A[r][z]. [1/cm3]", "nz", absorbed / (bins.areas[:, None] * bins.dz))
+    yield _column("A_z #A[0], [1],..A[nz-1]. [1/cm]", share * _folded(tally.deposits.absorbed_z, 0) / dz)
+    yield _column("Rd_r #Rd[0], [1],..Rd[nr-1]. [1/cm2]", reflected.sum(axis=1) / areas)
+    yield _column("Rd_a #Rd[0], [1],..Rd[na-1]. [sr-1]", reflected.sum(axis=0) / solid_angles)
+    yield _column("Tt_r #Tt[0], [1],..Tt[nr-1]. [1/cm2]", transmitted.sum(axis=1) / areas)
+    yield _column("Tt_a #Tt[0], [1],..Tt[na-1]. [sr-1]", transmitted.sum(axis=0) / solid_angles)
+    yield _table("A_rz", "A[r][z]. [1/cm3]", "nz", absorbed / (areas[:, None] * dz))
     yield _table("Rd_ra", "Rd[r][angle]. [1/(cm2sr)].", "na", reflected / exits)
     yield _table("Tt_ra", "Tt[r][angle]. [1/(cm2sr)].", "na", transmitted / exits)
 
 
-def _parameters(tally: Tally, bins: _Bins, name: str) -> str:
+def _parameters(tally: Tally, dz: float, dr: float, name: str) -> str:
     layers = ""
     for at, layer in enumerate(tally.medium.layers, start=1):
         thickness = ENDLESS if math.isinf(layer.thickness) else layer.thickness
@@ -141,23 +116,13 @@ def _parameters(tally: Tally, bins: _Bins, name: str) -> str:
         "InParm \t\t\t# Input parameters. cm is used.\n"
         f"{word} \tA\t\t# output file name, ASCII.\n"
         f"{tally.photons} \t\t\t# No. of photons\n"
-        f"{_number(bins.dz)}\t{_number(bins.dr)}\t\t# dz, dr [cm]\n"
-        f"{bins.nz}\t{bins.nr}\t{bins.na}\t# No. of dz, dr, da.\n\n"
+        f"{_number(dz)}\t{_number(dr)}\t\t# dz, dr [cm]\n"
+        f"{tally.grid.depths}\t{tally.grid.rings}\t{max(tally.grid.angles, 1)}\t# No. of dz, dr, da.\n\n"
         f"{len(tally.medium.layers)}\t\t\t\t\t# Number of layers\n"
         "#n\tmua\tmus\tg\td\t# One line for each layer\n"
         f"{_number(tally.medium.n_above)}\t\t\t\t\t# n for medium above\n"
         f"{layers}"
         f"{_number(tally.medium.n_below)}\t\t\t\t\t# n for medium below\n\n"
-    )
-
-
-def _totals(specular: float, reflected: float, absorbed: float, transmitted: float) -> str:
-    return (
-        "RAT #Reflectance, absorption, transmission. \n"
-        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
-        f"{reflected:<14.6G} \t#Diffuse reflectance [-]\n"
-        f"{absorbed:<14.6G} \t#Absorbed fraction [-]\n"
-        f"{transmitted:<14.6G} \t#Transmittance [-]\n\n"
     )
 
 
@@ -241,13 +206,10 @@ def parse_mco(content: bytes, name: str) -> Output:
     if _beginning(lines) == OUTPUT_2:
         return _parse_2(lines)
     run = read_run(lines, set())
-    _keyword(lines, "RAT")
-    specular, diffuse, _, _ = _read_column(lines, "RAT", 4)
-    for key, size in (("A_l", len(run.medium.layers)), ("A_z", run.nz)):
-        _keyword(lines, key)
-        _read_column(lines, key, size)
-    _keyword(lines, "Rd_r")
-    return Output(run, specular, diffuse, np.array(_read_column(lines, "Rd_r", run.nr)))
+    sizes = {"RAT": 4, "A_l": len(run.medium.layers), "A_z": run.nz, "Rd_r": run.nr}
+    columns = {key: _read_column(lines, key, size) for key, size in sizes.items()}
+    specular, diffuse, *_ = columns["RAT"]
+    return Output(run, specular, diffuse, np.array(columns["Rd_r"]))
 
 
 def _parse_2(lines: Lines) -> Output:
@@ -280,7 +242,6 @@ def begins_mco(path: str | os.PathLike[str]) -> bool:
 
 
 def _beginning(lines: Lines) -> str:
-    """Return the version."""
     (version,) = lines.take(1, "the file version, A1")
     if version not in ("A1", OUTPUT_2):
         raise lines.error(f"the file version, A1 or {OUTPUT_2}", repr(version[:10]))
@@ -296,6 +257,7 @@ def _keyword(lines: Lines, key: str) -> None:
 
 
 def _read_column(lines: Lines, key: str, size: int) -> list[float]:
+    _keyword(lines, key)
     numbers = []
     for at in range(size):
         what = f"number {at + 1} of {size} of {key}"

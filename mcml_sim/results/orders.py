@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact import single_scattering
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import (
-    checked_numbers,
-    checked_whole,
-)
+from mcml_sim.media.arrays import Floats, scalar_or_array
+from mcml_sim.media.checks import checked_range, checked_whole
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results import estimate
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing import order_bins
-from mcml_sim.tracing.counts import Counts, Ledger
-from mcml_sim.tracing.order_bins import OrderBins
+from mcml_sim.tracing.order_bins import Counts, Ledger, OrderBins
 
 SEARCHLIGHT = Setting()
 
@@ -62,14 +58,14 @@ class Orders:
 
     def profile_derivative(self, alpha: ArrayLike) -> Estimate:
         """Return d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
-        albedo = _checked_alpha(alpha)
+        albedo = _albedos(alpha)
         weights, ones = self._bins.weight_derivatives(albedo), np.ones_like(albedo)
         slope = self._from_weights(self.ring_order_counts, weights, np.multiply.outer(ones, self._shares[:-1]))
         return slope.scaled(1 / self.grid.r_areas)
 
     def once(self, alpha: ArrayLike) -> Floats:
         """Return light scattered once, by ring, the last beyond the last ring [-]: part of `energy`, without error."""
-        return np.multiply.outer(_checked_alpha(alpha), self._shares)
+        return np.multiply.outer(_albedos(alpha), self._shares)
 
     def covariance_factor(self, alpha: ArrayLike, rank: int = 8, overflow: bool = False) -> tuple[Floats, float]:
         """Return the covariance of `energy` between albedos, ring by ring, in closed form.
@@ -80,7 +76,7 @@ class Orders:
         -E_i E_j / (N - 1), E without `once`, which no factor holds: next to nothing when there are many rings. With
         `overflow` a last row stands for the light beyond the last ring.
         """
-        albedos = np.atleast_1d(_checked_alpha(alpha))
+        albedos = np.atleast_1d(_albedos(alpha))
         if albedos.ndim != 1:
             raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
         limit = checked_whole("rank", rank, lowest=1, highest=self._bins.last_orders.size)
@@ -100,7 +96,7 @@ class Orders:
         """Return an upper bound on the reflectance that ending photons at the highest order took away [-]."""
         last = self._bins.max_order
         lost = self.entered * float(self._bins.roulette_weight(last)) * self.counts.cut / self.photons
-        return _scalar_or_array(lost * _checked_alpha(alpha) ** last)
+        return scalar_or_array(lost * _albedos(alpha) ** last)
 
     @property
     def ledger(self) -> Ledger:
@@ -119,7 +115,7 @@ class Orders:
 
     def weights(self, alpha: ArrayLike) -> Floats:
         """Return what one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
-        return self.entered * self._bins.weights(_checked_alpha(alpha))
+        return self.entered * self._bins.weights(_albedos(alpha))
 
     @property
     def entered(self) -> float:
@@ -136,7 +132,7 @@ class Orders:
         return self.entered * single_scattering.ring_shares(self.grid.r_edges, self.setting)
 
     def _estimate(self, counts: NDArray[np.int64], shares: Floats, alpha: ArrayLike) -> Estimate:
-        albedo = _checked_alpha(alpha)
+        albedo = _albedos(alpha)
         return self._from_weights(counts, self._bins.weights(albedo), np.multiply.outer(albedo, shares))
 
     def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
@@ -147,17 +143,7 @@ class Orders:
     def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
         """Return the estimate from one row of counts, in the shape of alpha."""
         rows = self._estimate(counts[None, :], np.array([share]), alpha)
-        parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
-        return Estimate(*map(_scalar_or_array, parts))
+        return rows.mapped(lambda part: scalar_or_array(part[..., 0]))
 
 
-def _checked_alpha(alpha: ArrayLike) -> Floats:
-    albedos = checked_numbers("alpha", alpha, "a single-scattering albedo in [0, 1]")
-    outside = ~((albedos >= 0) & (albedos <= 1))
-    if np.any(outside):
-        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {albedos[outside].flat[0]:g}")
-    return albedos
-
-
-def _scalar_or_array(values: Floats) -> float | Floats:
-    return values if np.ndim(values) else float(values)
+_albedos = partial(checked_range, "alpha", accepted="a single-scattering albedo in [0, 1]", low=0.0, high=1.0)

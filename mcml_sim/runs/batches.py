@@ -1,20 +1,23 @@
-"""Numbered batches on several threads or a cluster, summed: the result does not depend on who ran which, or when."""
+"""Numbered batches on threads or a Dask cluster, summed: the result does not depend on who ran which, or when."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import threading
+import warnings
 from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
+from types import ModuleType
 from typing import Generic
 
-from rich.progress import Progress
+from rich.progress import Progress, TaskID
 
+from mcml_sim.errors import ClusterError, InputError, Notice
 from mcml_sim.media.checks import checked_workers
-from mcml_sim.runs.cluster import Cluster
 from mcml_sim.runs.progress import bar
-from mcml_sim.runs.store import R, Store
+from mcml_sim.runs.store import RESUMES, R, Store, cpu_class, maker
 
 # How often the waiting thread looks up: where a wait cannot be interrupted, this is the delay of Ctrl-C [s].
 GLANCE = 0.1
@@ -22,6 +25,13 @@ GLANCE = 0.1
 FIRST_LOOK = 8
 # Batches in hand or waiting for an earlier one to be added, per thread: bounds the memory, whatever batch is slow.
 AHEAD = 2
+
+# Twice as many batches as there are threads: the next one is there when one is done.
+BATCHES_PER_THREAD = 2
+MIN_TASKS = 8  # a cluster that starts workers on demand has none before it sees some demand
+MAX_TASKS = 1024  # each of them waits in a thread here
+PATIENCE = 5.0  # for a scheduler to answer [s]
+REMEDY = "install the same profilefit there as here"
 
 
 def run_batches(
@@ -58,16 +68,37 @@ def run_batches(
     checked_workers(workers, scheduler)
     cluster = None if scheduler is None else Cluster(scheduler, trace)
     threads = min(cluster.tasks if cluster else workers or os.cpu_count() or 1, -(-photons // batch_photons))
+    fold = _Fold(enough, AHEAD * threads)
+
+    def work(shown: Progress, line: TaskID) -> None:
+        while (batch := fold.take()) is not None:
+            size = min(batch_photons, photons - batch * batch_photons)
+            if size <= 0:
+                return
+            kept = store.load(batch) if store else None
+            if kept is not None and kept.started == size:
+                result = kept
+            else:
+                result = (cluster.trace if cluster else trace)(batch, size)
+                # A fuller batch from a longer run holds these photons and more: keep it.
+                if store and (kept is None or kept.started < size):
+                    store.save(batch, result)
+            fold.add(batch, result)
+            shown.advance(line, size)
+
     # Leaving, the cluster is closed first: that frees the threads that wait for it.
     with (
         bar("photons", progress, kept=True) as shown,
         ThreadPoolExecutor(threads) as pool,
-        cluster or contextlib.nullcontext(),
+        contextlib.closing(cluster) if cluster else contextlib.nullcontext(),
     ):
-        fold = _Fold(enough, AHEAD * threads)
-        run = _Run(cluster.trace if cluster else trace, batch_photons, photons, store, fold, shown)
+        line = shown.add_task("photons", total=photons)
         try:
-            _wait([pool.submit(run.work) for _ in range(threads)])
+            pending = {pool.submit(work, shown, line) for _ in range(threads)}
+            while pending:
+                done, pending = wait(pending, timeout=GLANCE, return_when=FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
         finally:
             fold.stop()
     return fold.total()
@@ -116,46 +147,111 @@ class _Fold(Generic[R]):
         return self._sum
 
 
-class _Run(Generic[R]):
-    """State that the threads of one run share."""
+class Deserted(Notice):
+    """Notice that a Dask cluster has no workers; the run waits for one."""
 
-    def __init__(
-        self,
-        trace: Callable[[int, int], R],
-        batch_photons: int,
-        photons: int,
-        store: Store[R] | None,
-        fold: _Fold[R],
-        shown: Progress,
-    ) -> None:
-        self._trace, self._store, self._fold = trace, store, fold
-        self._batch_photons, self._photons = batch_photons, photons
-        self._bar, self._line = shown, shown.add_task("photons", total=photons)
 
-    def work(self) -> None:
-        """Take the next batch until there is none."""
-        while (batch := self._fold.take()) is not None:
-            photons = min(self._batch_photons, self._photons - batch * self._batch_photons)
-            if photons <= 0:
+class Cluster(Generic[R]):
+    """Connection to the scheduler at an address such as tcp://host:8786, whose workers call `trace`.
+
+    A batch whose worker dies goes to another one. A worker that would not give the bits of this machine (another
+    version, jaxlib, device or kind of CPU) refuses, whenever it joins: ClusterError says which, and what differs.
+    InputError if the optional package is missing or `scheduler` is no address; ClusterError if no scheduler answers,
+    or leaves. A Deserted warning after some seconds without workers.
+    """
+
+    def __init__(self, scheduler: str, trace: Callable[[int, int], R]) -> None:
+        self._dask = _dask()
+        self._scheduler, self._trace = scheduler, trace
+        _require_scheduler(self._dask, scheduler)
+        self._client = self._dask.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        try:
+            self._client.run_on_scheduler(cpu_class)  # which has the package, or cannot unpickle what it passes on
+        except Exception as error:  # whatever unpickling raises over there
+            self._client.close()
+            raise ClusterError(f"the scheduler at {scheduler} cannot load mcml_sim ({error}); {REMEDY}") from None
+        threads = sum(self._client.nthreads().values())
+        self.tasks = min(max(BATCHES_PER_THREAD * threads, MIN_TASKS), MAX_TASKS)
+        """Number of batches that may be under way at once."""
+        self._warning, self._has_warned = threading.Lock(), False
+
+    def trace(self, batch: int, photons: int) -> R:
+        """Return the result of `trace`, computed by a worker; may be called from several threads."""
+        try:
+            task = self._client.submit(_trace_alike, maker(), self._trace, batch, photons, pure=False)
+            while True:
+                try:
+                    return task.result(timeout=PATIENCE)
+                except TimeoutError:  # of the wait, or the batch's own; and it may have ended since
+                    if task.status == "error":
+                        return task.result()
+                if not task.done():
+                    self._warn_if_deserted()
+        except (CancelledError, self._dask.client.ClosedClientError):
+            raise ClusterError(f"the scheduler at {self._scheduler} has gone; {RESUMES}") from None
+        except self._dask.KilledWorker as error:
+            raise ClusterError(
+                f"batch {batch} was on {error.allowed_failures + 1} workers of {self._scheduler} when they died, "
+                f"the last one {error.last_worker.address}; look at their logs and memory"
+            ) from None
+        except ModuleNotFoundError as error:
+            raise ClusterError(f"a worker of {self._scheduler} lacks {error.name}; {REMEDY}") from None
+
+    def close(self) -> None:
+        """Disconnect, which frees the threads that wait."""
+        self._client.close()
+
+    def _warn_if_deserted(self) -> None:
+        with self._warning:  # many threads wait, and one says so
+            if self._has_warned:
                 return
-            self._fold.add(batch, self._batch(batch, photons))
-            self._bar.advance(self._line, photons)
-
-    def _batch(self, batch: int, photons: int) -> R:
-        kept = self._store.load(batch) if self._store else None
-        if kept is not None and kept.started == photons:
-            return kept
-        result = self._trace(batch, photons)
-        # A fuller batch from a longer run holds these photons and more: keep it.
-        if self._store and (kept is None or kept.started < photons):
-            self._store.save(batch, result)
-        return result
+            try:
+                self._has_warned = not self._client.nthreads()
+            except OSError:  # the scheduler is going: the batch's result says so
+                return
+        if self._has_warned:
+            text = f"no worker has come to the scheduler at {self._scheduler} so far; waiting for one"
+            warnings.warn(text, Deserted, stacklevel=2)
 
 
-def _wait(futures: list[Future[None]]) -> None:
-    """Wait for all, or raise the first error."""
-    pending: set[Future[None]] = set(futures)
-    while pending:
-        done, pending = wait(pending, timeout=GLANCE, return_when=FIRST_EXCEPTION)
-        for future in done:
-            future.result()
+def _dask() -> ModuleType:
+    try:
+        import distributed
+    except ModuleNotFoundError:
+        raise InputError(
+            "scheduler must be None where the package distributed is missing; pip install distributed"
+        ) from None
+    return distributed
+
+
+def _require_scheduler(dask: ModuleType, address: str) -> None:
+    """Ask who is there, since a dask Client waits forever for a port that accepts and then is silent."""
+    if not isinstance(address, str):
+        raise InputError(f"scheduler must be an address like tcp://host:8786, got {address!r}")
+
+    async def greet() -> dict[str, object]:
+        security = dask.Security().get_connection_args("client")
+        async with dask.rpc(address, connection_args=security) as there:
+            return await asyncio.wait_for(there.identity(), PATIENCE)
+
+    try:
+        with ThreadPoolExecutor(1) as aside:  # here an event loop may be running already, as in a notebook
+            kind = aside.submit(asyncio.run, greet()).result()["type"]
+    except ValueError as error:
+        raise InputError(f"scheduler must be an address like tcp://host:8786, got {address!r}: {error}") from None
+    except Exception as error:  # whatever an answer that is none makes of the protocol, a MemoryError for one
+        raise ClusterError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
+    if kind != "Scheduler":
+        raise ClusterError(f"at {address} there is a Dask {kind}, not a scheduler")
+
+
+def _trace_alike(made_by: dict[str, object], trace: Callable[[int, int], R], batch: int, photons: int) -> R:
+    """Trace, on a worker, if that gives the bits it would give to whoever sent `made_by`."""
+    here = maker()
+    for name, value in made_by.items():
+        if here.get(name) != value:
+            address = _dask().get_worker().address
+            raise ClusterError(
+                f"worker {address} would give other bits: {name} is {here.get(name)} there, {value} here"
+            )
+    return trace(batch, photons)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import jax.monitoring
@@ -16,8 +15,7 @@ from mcml_sim.files.whole_file import ROOM, read_whole, require_target, require_
 from mcml_sim.media.medium import Medium
 from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
-from mcml_sim.results.tally import Precision, quantities
-from mcml_sim.results.tally_file import Results, read_results, results_bytes
+from mcml_sim.results.tally import Precision, Results, quantities, read_results, results_bytes
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
 
@@ -35,9 +33,7 @@ class Compiling:
         jax.monitoring.register_event_duration_secs_listener(self._note)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         jax.monitoring.unregister_event_duration_listener(self._note)
 
     @property
@@ -80,11 +76,6 @@ class Job:
     mco: Path
     npz: Path
     store: Path
-
-    @property
-    def is_begun(self) -> bool:
-        """Whether the store holds batches."""
-        return bool(batches(self.store))
 
     @property
     def is_part_of_more(self) -> bool:
@@ -153,7 +144,7 @@ def done(job: Job, options: RunOptions) -> Done:
 def _traced(job: Job, options: RunOptions) -> Done:
     if job.is_in_the_way():
         discard(job.store)
-    resumed, start = job.is_begun, time.perf_counter()
+    resumed, start = bool(batches(job.store)), time.perf_counter()
     with Compiling() as compiling:
         tally = simulate(
             job.run.medium,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterable, Iterator, Sized
+from collections.abc import Callable, Iterable, Iterator, Sized
 from datetime import timedelta
 from typing import TypeVar
 
@@ -41,7 +41,15 @@ def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
         kept: whether it stays on the screen when all is done.
     """
     counted = () if unit == "photons" else (MofNCompleteColumn(),)
-    columns = (TextColumn("{task.description}"), BarColumn(), *counted, TimeElapsedColumn(), _Rate(unit), _Remaining())
+    speed = _Words(lambda task: rate(_speed(task), unit), "dim")
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        *counted,
+        TimeElapsedColumn(),
+        speed,
+        _Words(_remaining, "cyan"),
+    )
     is_shown = is_watched() if shown is None else shown
     return Progress(
         *columns, console=Console(stderr=True), transient=not kept, disable=not is_shown, speed_estimate_period=PERIOD
@@ -67,26 +75,22 @@ def working(what: str, quiet: bool = False) -> Iterator[None]:
         yield
 
 
-class _Rate(ProgressColumn):
-    """Column with the rate."""
+class _Words(ProgressColumn):
+    """Column of words that are blank until there are any."""
 
-    def __init__(self, unit: str) -> None:
+    def __init__(self, words: Callable[[Task], str], style: str) -> None:
         super().__init__()
-        self._unit = unit
+        self._words, self._style = words, style
 
     def render(self, task: Task) -> Text:
-        """Return the rate, blank until there is one."""
-        return Text(rate(_speed(task), self._unit), style="dim")
+        return Text(self._words(task), style=self._style)
 
 
-class _Remaining(ProgressColumn):
-    """Column with the time that remains."""
-
-    def render(self, task: Task) -> Text:
-        """Return the time, blank until anything is done, and once all is."""
-        speed = _speed(task)
-        left = 0.0 if task.total is None or not speed else (task.total - task.completed) / speed
-        return Text(f"{timedelta(seconds=round(left))} left" if left > 0 else "", style="cyan")
+def _remaining(task: Task) -> str:
+    """Return the time that remains, blank until anything is done, and once all is."""
+    speed = _speed(task)
+    left = 0.0 if task.total is None or not speed else (task.total - task.completed) / speed
+    return f"{timedelta(seconds=round(left))} left" if left > 0 else ""
 
 
 def _speed(task: Task) -> float | None:

@@ -16,8 +16,8 @@ from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store, manifest, require_ours
 from mcml_sim.tracing import deposits, layered_batch, matched_batch, order_bins, orders_batch, pool
-from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.deposits import Deposits
+from mcml_sim.tracing.order_bins import Counts
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
 SEARCHLIGHT = Setting()
@@ -202,14 +202,9 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple
 
 
 def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
-    shape = grid.rings + 1, order_bins.bins_of(setting).last_orders.size
-    return Store(folder, _orders_made_by(grid, seed, setting), partial(Counts.from_arrays, shape=shape))
-
-
-def _orders_made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
-    """Return what decides which photons a batch holds and how they are counted."""
     bins = order_bins.bins_of(setting)
-    return {
+    # What decides which photons a batch holds and how they are counted.
+    made_by: dict[str, object] = {
         "kind": "orders",
         "setting": str(setting),
         "seed": seed,
@@ -221,3 +216,5 @@ def _orders_made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object
         "last_exact_order": order_bins.LAST_EXACT,
         "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
     }
+    shape = grid.rings + 1, bins.last_orders.size
+    return Store(folder, made_by, partial(Counts.from_arrays, shape=shape))

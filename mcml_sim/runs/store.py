@@ -97,7 +97,10 @@ class Store(Generic[R]):
         """Return the batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
         path = self._path(batch)
         try:
-            fields = _unsealed(_read(path, MAX_BATCH))
+            data = _read(path, MAX_BATCH)
+            if data[-SEAL_BYTES:] != hashlib.sha256(data[:-SEAL_BYTES]).hexdigest().encode():
+                raise ValueError("its bytes are not those that were written")
+            fields = read_npz(data, MAX_BATCH, text=["made_by"])
             if str(fields.pop("made_by", "")) != self._digest:
                 raise StoreError(
                     f"{path} was made by another run; if that is still at work, {ELSEWHERE}; "
@@ -112,8 +115,11 @@ class Store(Generic[R]):
             return None
 
     def save(self, batch: int, result: R) -> None:
-        """Keep a batch, whole or not at all."""
-        self._write(self._path(batch), _sealed({"made_by": np.array(self._digest), **result.arrays()}))
+        """Keep a batch, whole or not at all; the last bytes, a zip file's comment, are the digest of all the others."""
+        file = io.BytesIO()
+        np.savez_compressed(file, allow_pickle=False, made_by=np.array(self._digest), **result.arrays())
+        body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
+        self._write(self._path(batch), body + hashlib.sha256(body).hexdigest().encode())
 
     def _path(self, batch: int) -> Path:
         # 1e13 photons in batches of 2^17 are 8 digits of batches: names sort as their numbers do.
@@ -186,25 +192,6 @@ def _read(path: Path, most: int) -> bytes:
     return content
 
 
-def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
-    """Return an .npz file whose last bytes, a zip file's comment, are the digest of all the others."""
-    file = io.BytesIO()
-    np.savez_compressed(file, allow_pickle=False, **arrays)
-    body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
-    return body + _seal(body)
-
-
-def _unsealed(data: bytes) -> dict[str, NDArray]:
-    """Return the arrays of a sealed file; ValueError if a bit of it has changed."""
-    if data[-SEAL_BYTES:] != _seal(data[:-SEAL_BYTES]):
-        raise ValueError("its bytes are not those that were written")
-    return read_npz(data, MAX_BATCH, text=["made_by"])
-
-
-def _seal(body: bytes) -> bytes:
-    return hashlib.sha256(body).hexdigest().encode()
-
-
 def manifest(folder: Path) -> dict[str, object] | None:
     """Return the manifest of a folder of batches, None if there is none; StoreError if that is damaged."""
     path = folder / MANIFEST
@@ -213,14 +200,12 @@ def manifest(folder: Path) -> dict[str, object] | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise _damaged(path, reason_of(error)) from None
-    if not isinstance(content, dict):
-        raise _damaged(path, "not an object")
-    return content
-
-
-def _damaged(path: Path, reason: str) -> StoreError:
-    return StoreError(f"{path} is damaged ({reason}); delete it, the batches beside it stay valid")
+        reason = reason_of(error)
+    else:
+        if isinstance(content, dict):
+            return content
+        reason = "not an object"
+    raise StoreError(f"{path} is damaged ({reason}); delete it, the batches beside it stay valid")
 
 
 def maker() -> dict[str, object]:
@@ -254,9 +239,8 @@ def _apart(theirs: object, ours: object) -> tuple[str, str]:
         return there, here
     differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)
     start = max(next(differ, 0) - SHARED_SHOWN, 0)
-    return _cut(there, start), _cut(here, start)
-
-
-def _cut(text: str, start: int) -> str:
     end = start + LONGEST_SHOWN
-    return ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "")
+    theirs, ours = (
+        ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "") for text in (there, here)
+    )
+    return theirs, ours

@@ -22,8 +22,7 @@ from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import deposits, half_space_event, layered_event, pool, rng
-from mcml_sim.tracing.bins import Axis, axis, groups
-from mcml_sim.tracing.deposits import Deposits
+from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
 from mcml_sim.tracing.layered_event import (
     CUT,
     EVENTS_PER_TURN,
@@ -48,21 +47,16 @@ class LayeredBins(NamedTuple):
 
     r: Axis
     z: Axis
-    cosines: Array
-    """Cosines of the lower edges of the angles, falling from 1, float32 (angles,)."""
-    groups_per_photon: Array
-    """Groups of photons over photons, float32."""
-    per_weight: Array
-    """Units of the sums in a weight of 1, float64."""
+    cosines: Array  # cosines of the lower edges of the angles, falling from 1, float32 (angles,)
+    groups_per_photon: Array  # groups of photons over photons, float32
+    per_weight: Array  # units of the sums in a weight of 1, float64
 
 
 class KernelShape(NamedTuple):
     """Properties that the kernels are compiled for, besides the shapes of their arrays."""
 
-    groups: int
-    """Number of groups of photons."""
-    depths: bool
-    """Whether depth is resolved."""
+    groups: int  # number of groups of photons
+    depths: bool  # whether depth is resolved
     lanes: int
 
 
@@ -72,14 +66,10 @@ class PhotonFates(NamedTuple):
     exits: Array
     """Complex rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 after roulette,
     complex64 (BATCH_PHOTONS + lanes,)."""
-    cosines: Array
-    """Cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
-    absorbed: tuple[Array, ...]
-    """Weight left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
-    by_layer: Array
-    """Weight left by each group in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
-    by_cell: Array
-    """Weight left by each group by ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
+    cosines: Array  # cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved
+    absorbed: tuple[Array, ...]  # weight left in each layer, or in all if they are many, float32, as exits
+    by_layer: Array  # weight left by group in each layer, in units, int64 (groups * layers,), or (0,)
+    by_cell: Array  # weight by group, ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)
 
 
 def trace_batch(
@@ -100,7 +90,11 @@ def trace_batch(
     diffuse = illumination == "diffuse"
     first = 1 if diffuse or medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):
-        return _all_ballistic(grid, photons)
+        # Of a single sheet of clear glass what is not reflected at once goes through.
+        sums: dict[str, Floats] = {name: np.zeros(size) for name, size in deposits.shapes(grid, 1).items()}
+        for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
+            sums[name] = np.asarray(float(photons))
+        return Deposits.from_arrays(sums, deposits.shapes(grid, 1))
     # Lengths are in the shortest free path, or in the whole thickness where all is clear.
     mu_t = max(layer.mu_t for layer in medium.layers)
     unit = 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
@@ -197,7 +191,6 @@ def _cell(bins: LayeredBins, place: Array, down: Array, top: Array, group: Array
 
 
 def _units(left: Array, bins: LayeredBins) -> Array:
-    """Return weights in whole units, int64."""
     return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
@@ -304,11 +297,3 @@ def _variance(parts: Floats) -> Floats:
     """Return the variance of the sum of independent, equally distributed groups, by spread: (groups, ...) -> (...)."""
     number = len(parts)
     return number * parts.var(axis=0, ddof=1) if number > 1 else np.full(parts.shape[1:], np.inf)
-
-
-def _all_ballistic(grid: Grid, photons: int) -> Deposits:
-    """Return the sums of a single sheet of clear glass: what is not reflected at once goes through."""
-    sums: dict[str, Floats] = {name: np.zeros(shape) for name, shape in deposits.shapes(grid, 1).items()}
-    for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
-        sums[name] = np.asarray(float(photons))
-    return Deposits.from_arrays(sums, deposits.shapes(grid, 1))

@@ -46,33 +46,19 @@ REFLECTED, ROULETTED, CUT = 0, -1, -2  # "layers" of photons that ended; transmi
 
 # sin(pi v) = v P(v^2) and cos(pi v) = P(v^2) on |v| <= 1/2, minimax by linear programming: errors 6.4e-8 and 4.4e-8.
 SINE = (3.1415927410125732, -5.167712211608887, 2.5501112937927246, -0.5984628200531006, 0.07794344425201416)
-COSINE = (
-    1.0,
-    -4.934802055358887,
-    4.058711528778076,
-    -1.3352385759353638,
-    0.23506110906600952,
-    -0.024593813344836235,
-)
+COSINE = (1.0, -4.934802055358887, 4.058711528778076, -1.3352385759353638, 0.23506110906600952, -0.024593813344836235)
 
 
 class Stack(NamedTuple):
     """Medium as float32 arrays by layer, (layers,)."""
 
-    thickness: Array
-    """Thickness [length]."""
-    top: Array
-    """Depth of the layer's upper interface [length]."""
-    mfp: Array
-    """Mean free path [length], FARTHEST in clear glass."""
-    absorbs: Array
-    """Number 1 - alpha = mu_a / mu_t [-], kept apart: the difference would lose the digits of weak absorption."""
-    phase: Phase
-    """Phase function of Henyey and Greenstein, its g by layer."""
-    others: tuple[Phase | None, ...]
-    """Phase functions of layers that have another one, a single one each; what is None is no array."""
-    n: Array
-    """Refractive indices [-], (layers + 2,): those above and below are first and last."""
+    thickness: Array  # thickness [length]
+    top: Array  # depth of the layer's upper interface [length]
+    mfp: Array  # mean free path [length], FARTHEST in clear glass
+    absorbs: Array  # 1 - alpha = mu_a / mu_t [-], kept apart: a difference loses the digits of weak absorption
+    phase: Phase  # phase function of Henyey and Greenstein, its g by layer
+    others: tuple[Phase | None, ...]  # of layers that have another phase function; None is no array
+    n: Array  # refractive indices [-], (layers + 2,): those above and below are first and last
 
     @property
     def layers(self) -> int:
@@ -83,23 +69,16 @@ class Stack(NamedTuple):
 class LayeredLanes(NamedTuple):
     """Photons in flight, arrays (lanes,)."""
 
-    place: Array
-    """Complex x + i y [length], complex64."""
-    down: Array
-    """Depth below the top of the layer [length], and i times the direction's cosine to the axis [-], complex64."""
-    heading: Array
-    """Other cosines of the direction, ux + i uy [-], complex64."""
-    weight: Array
-    """Weight left of the photon [-], negative while it waits at an interface and once it has ended."""
+    place: Array  # complex x + i y [length], complex64
+    down: Array  # depth below the top of the layer [length], and i times the cosine to the axis [-], complex64
+    heading: Array  # other cosines of the direction, ux + i uy [-], complex64
+    weight: Array  # weight left of the photon [-], negative while it waits at an interface and once it has ended
     layer: Array
     """Number of the layer it is in, from 1, int32; once it has ended REFLECTED, ROULETTED, CUT or, if it was
     transmitted, one more than there are layers."""
-    event: Array
-    """Number of events so far, waiting included, uint32."""
-    photon: Array
-    """Number of the photon in its batch, uint32."""
-    absorbed: tuple[Array, ...]
-    """Weight it has left in each of the layers, as far as they are followed one by one, or in all of them [-]."""
+    event: Array  # number of events so far, waiting included, uint32
+    photon: Array  # number of the photon in its batch, uint32
+    absorbed: tuple[Array, ...]  # weight left in each of the layers that are followed, or in all of them [-]
 
     @property
     def ended(self) -> Array:
@@ -241,7 +220,7 @@ def azimuth(v: Array) -> tuple[Array, Array]:
     """Return cosine and sine of pi v for v in [-1, 1], by the half angle."""
     half = v * jnp.float32(0.5)
     square = half * half
-    sine, cosine = half * _polynomial(SINE, square), _polynomial(COSINE, square)
+    sine, cosine = half * rng.polynomial(SINE, square), rng.polynomial(COSINE, square)
     return (cosine - sine) * (cosine + sine), 2 * sine * cosine
 
 
@@ -300,7 +279,6 @@ def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits
 
 
 def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array) -> Array:
-    """Return the layer after the interface and after roulette."""
     passes = (outcome.imag > 0) | (outcome.imag == ON)
     step = jnp.where(passes, jnp.where(outcome.real > 0, 1, -1), 0)
     layer = lanes.layer + step.astype(jnp.int32)
@@ -319,10 +297,3 @@ def _renormalising(lanes: LayeredLanes, layers: int) -> Array:
     """Return 1 / length of the direction, to first order: rounding lets it drift by 1e-7 an event. 1 after the end."""
     ux, uy, uz = lanes.heading.real, lanes.heading.imag, lanes.down.imag
     return jnp.where(inside(lanes.layer, layers), 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz), 1)
-
-
-def _polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
-    value = jnp.float32(coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        value = value * x + jnp.float32(coefficient)
-    return value

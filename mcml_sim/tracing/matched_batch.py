@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
-from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
-from mcml_sim.tracing.bins import Axis, axis, groups
-from mcml_sim.tracing.deposits import Deposits
-from mcml_sim.tracing.isotropic_event import IsotropicLanes
+from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
+from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
+from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.orders_batch import Ends
 
 # Where nothing is absorbed, 0.6 % of the light is still inside after this many scatterings; `cut` says so.
@@ -51,14 +50,10 @@ MOST_GROUPS = 16  # of photons, whose spread gives the errors of what is absorbe
 class Weights:
     """Weights of a photon by order n = 0 ... MAX_ORDER; all arrays float64 (MAX_ORDER + 1,) but `stops`."""
 
-    stops: NDArray[np.int32]
-    """Orders at which half of those inside end, and the last at which all do, int32 (STOPS,)."""
-    leaving: Floats
-    """Weight of one that leaves after n scatterings."""
-    visiting: Floats
-    """Weight of one that arrives at its n-th place; 1 - alpha of it stays there."""
-    absorbed: Floats
-    """Weight left by a photon at its first n places."""
+    stops: NDArray[np.int32]  # orders at which half of those inside end, and the last at which all do, int32 (STOPS,)
+    leaving: Floats  # weight of one that leaves after n scatterings
+    visiting: Floats  # weight of one that arrives at its n-th place; 1 - alpha of it stays there
+    absorbed: Floats  # weight left by a photon at its first n places
 
     @property
     def last(self) -> int:
@@ -71,19 +66,16 @@ def weights(alpha: float) -> Weights:
     """Return the roulette for an albedo, and the weights that follow from it."""
     order = np.arange(MAX_ORDER + 1)
     plain = alpha ** order.astype(np.float64)
-    stops = _stops(np.minimum(plain / THRESHOLD, 1) * np.sqrt(LONG_PATH / np.maximum(order, LONG_PATH)))
+    survival = np.minimum(plain / THRESHOLD, 1) * np.sqrt(LONG_PATH / np.maximum(order, LONG_PATH))
+    # Orders where the survival falls below 1, 1/2, 1/4, ..., and a last one for all.
+    below = np.argmax(survival < 0.5 ** np.arange(STOPS - 1)[:, None], axis=1)
+    tosses = np.maximum(below[below > 0], 1)
+    last = tosses[-1] + 1 if len(tosses) == STOPS - 1 else MAX_ORDER
+    stops = np.concatenate([tosses, np.full(STOPS - len(tosses), last)]).astype(np.int32)
     won = np.searchsorted(stops[:-1], order)  # a photon that leaves or arrives at n has not tossed at n
     leaving = plain * 2.0**won
     visiting = np.concatenate([[0.0], plain[:-1] * 2.0 ** won[1:]])
     return Weights(stops, leaving, visiting, (1 - alpha) * np.cumsum(visiting))
-
-
-def _stops(survival: Floats) -> NDArray[np.int32]:
-    """Return orders where the survival, (MAX_ORDER + 1,), falls below 1, 1/2, 1/4, ..., and a last one for all."""
-    below = np.argmax(survival < 0.5 ** np.arange(STOPS - 1)[:, None], axis=1)
-    tosses = np.maximum(below[below > 0], 1)
-    last = tosses[-1] + 1 if len(tosses) == STOPS - 1 else MAX_ORDER
-    return np.concatenate([tosses, np.full(STOPS - len(tosses), last)]).astype(np.int32)
 
 
 def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None) -> Deposits:
@@ -118,29 +110,22 @@ class MatchedBins(NamedTuple):
 
     r: Axis
     z: Axis | None
-    cosines: Array
-    """Cosines of the edges between angle bins, rising, float32 (angles - 1,); empty if angles are not resolved."""
-
-
-class Visits(NamedTuple):
-    """Weight that arrived at places, in float64, with the variance of each sum: by ring and depth, and by depth."""
-
-    rz: Array
-    rz_variance: Array
-    z: Array
-    z_variance: Array
+    cosines: Array  # cosines of the edges between angle bins, rising, float32 (angles - 1,), or empty
 
 
 @partial(jax.jit, static_argnames=("parts", "lanes"), compiler_options=pool.COMPILER_OPTIONS)
 def _trace_visits(
     key: Array, photons: Array, stops: Array, visiting: Array, bins: MatchedBins, parts: int, lanes: int
-) -> tuple[Ends, Visits]:
-    """Return ends as `orders_batch.trace` does, and arrivals by place; `visiting` (MAX_ORDER + 1,) int64, in UNITs."""
+) -> tuple[Ends, tuple[Array, ...]]:
+    """Return ends as `orders_batch.trace` does, and weight that arrived by ring and depth, by depth, and variances.
+
+    `visiting` (MAX_ORDER + 1,) int64, in UNITs.
+    """
     depths = cast("Axis", bins.z)
     shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
 
-    def turn(flying: IsotropicLanes, state: tuple[Array, Array]) -> tuple[IsotropicLanes, tuple[Array, Array]]:
+    def turn(flying: OrderLanes, state: tuple[Array, Array]) -> tuple[OrderLanes, tuple[Array, Array]]:
         group = ((flying.photon.astype(jnp.float32) + 0.5) * (jnp.float32(parts) / photons)).astype(jnp.int32)
         first = jnp.minimum(group, parts - 1) * (size // parts)
 
@@ -151,19 +136,19 @@ def _trace_visits(
             weight = visiting.at[flying.order + number.astype(jnp.int32) + 1].get(mode="clip")
             # Those that have ended add nothing, somewhere: a branch that no processor can foresee costs more.
             weight = jnp.where(place.imag < 0, 0, weight)
-            return isotropic_event.scatter(key, flying, place, number), table.at[cell].add(
+            return half_space_event.scatter(key, flying, place, number), table.at[cell].add(
                 weight, mode="promise_in_bounds"
             )
 
         table, ends = state
         place, table = lax.fori_loop(0, VISITS_PER_TURN, event, (flying.place, table))
-        flying = isotropic_event.landed(flying, place, VISITS_PER_TURN)
+        flying = half_space_event.landed(flying, place, VISITS_PER_TURN)
         return flying, (table, orders_batch.recorded(ends, flying))
 
     state = jnp.zeros(size, jnp.int64), orders_batch.no_ends(lanes)
-    table, ends = pool.follow(lambda photon: isotropic_event.enter(key, photon, stops), turn, state, photons, lanes)
+    table, ends = pool.follow(lambda photon: half_space_event.enter(key, photon, stops), turn, state, photons, lanes)
     by_group = table.reshape(shape) * UNIT
-    return orders_batch.as_ends(ends), Visits(*_summed(by_group), *_summed(by_group.sum(axis=1)))
+    return orders_batch.as_ends(ends), (*_summed(by_group), *_summed(by_group.sum(axis=1)))
 
 
 def _summed(by_group: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Bins of scattering order, exact where orders matter one by one, geometric beyond; and where roulette is played.
+"""Photons by ring and scattering order: counts, bins of order, and where roulette is played.
 
 Every order to 256 has its own bin; then 64 bins an octave to the last order. All powers of two are bin edges, so the
 roulette weight is constant in a bin. What alpha^n is inside a bin that holds several orders is taken as its mean
@@ -12,8 +12,8 @@ that scatters forwards takes 1 / (1 - g) scatterings to turn as far as one does 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -35,8 +35,7 @@ FARTHEST = 64  # reach, at most: MAX_ORDER times it is a whole float32
 class OrderBins:
     """Bins of order for a half space where one scattering turns light as far as 1 / `reach` of isotropic ones."""
 
-    reach: int = 1
-    """Power of two from 1 to FARTHEST."""
+    reach: int = 1  # power of two from 1 to FARTHEST
 
     @property
     def first_roulette(self) -> int:
@@ -117,3 +116,64 @@ def bins_of(setting: Setting) -> OrderBins:
 
 
 _bins = lru_cache(OrderBins)
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Numbers of photons by how they ended: started = exited + rouletted + cut."""
+
+    started: int
+    exited: int
+    rouletted: int
+    cut: int
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """Whole photons of one or more batches."""
+
+    exits: NDArray[np.int64]  # photons that left, by ring (the last row: beyond) and bin of order, (rings + 1, bins)
+    rouletted: int  # photons ended by roulette
+    cut: int  # photons ended by the cap on the order
+    started: int
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(*(getattr(self, part.name) + getattr(other, part.name) for part in fields(self)))
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Return all parts by name, as a store keeps them: of `exits`, which is mostly 0, only the other cells."""
+        cells = np.flatnonzero(self.exits)
+        rest = np.array([self.rouletted, self.cut, self.started], np.int64)
+        return {"cells": cells, "exits": self.exits.ravel()[cells], "rest": rest}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray], shape: tuple[int, int]) -> Counts:
+        """Return the counts of `arrays`, `shape` being that of `exits`; ValueError if they are none."""
+        try:
+            if any(arrays[name].dtype.kind != "i" or np.any(arrays[name] < 0) for name in ("cells", "exits", "rest")):
+                raise TypeError("numbers of cells and photons are whole and >= 0")
+            exits = np.zeros(shape, np.int64)
+            exits.ravel()[arrays["cells"]] = arrays["exits"]
+            rouletted, cut, started = map(int, arrays["rest"])
+        except (LookupError, TypeError) as error:
+            raise ValueError(f"these are no counts of shape {shape}: {error}") from None
+        counts = cls(exits, rouletted, cut, started)
+        if not counts.is_closed:
+            raise ValueError("its photons do not add up")
+        return counts
+
+    @property
+    def ledger(self) -> Ledger:
+        """Ledger of these photons."""
+        return Ledger(self.started, int(self.exits.sum()), self.rouletted, self.cut)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether every photon started is accounted for."""
+        ledger = self.ledger
+        return ledger.started == ledger.exited + ledger.rouletted + ledger.cut
+
+    def require_closed(self) -> None:
+        """Raise RuntimeError if a photon was lost: a defect of the tracer, not of its input."""
+        if not self.is_closed:
+            raise RuntimeError(f"photons were lost or made: {self.ledger}")

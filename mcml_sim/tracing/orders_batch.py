@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
-from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
-from mcml_sim.tracing.bins import rounded_up
-from mcml_sim.tracing.counts import Counts
-from mcml_sim.tracing.isotropic_event import IsotropicLanes
-from mcml_sim.tracing.order_bins import OrderBins
+from mcml_sim.tracing import half_space_event, order_bins, pool, rng
+from mcml_sim.tracing.deposits import rounded_up
+from mcml_sim.tracing.half_space_event import OrderLanes
+from mcml_sim.tracing.order_bins import Counts, OrderBins
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
-OrderLanes = IsotropicLanes | half_space_event.HalfSpaceLanes
 MATCHED = Setting()
 EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 
@@ -31,10 +29,8 @@ EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 class Ends(NamedTuple):
     """Ends of the photons of a batch, arrays (BATCH_PHOTONS,) by photon number."""
 
-    rho: Array
-    """Distance from the beam [mfp], float32."""
-    order: Array
-    """Scatterings n, int32: n of one that left, -n of one that ended inside (roulette, last order), 0 never started."""
+    rho: Array  # distance from the beam [mfp], float32
+    order: Array  # scatterings n, int32: n of one that left, -n of one that ended inside, 0 of one never started
 
 
 def trace_batch(
@@ -54,10 +50,7 @@ def trace_batch(
     edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns(bins))
     cells = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
     counts = Counts(
-        exits=cells[:, :-2],
-        rouletted=int(cells[:, -2].sum()),
-        cut=int(cells[:, -1].sum()),
-        started=photons,
+        exits=cells[:, :-2], rouletted=int(cells[:, -2].sum()), cut=int(cells[:, -1].sum()), started=photons
     )
     counts.require_closed()
     return counts
@@ -76,21 +69,16 @@ def trace(
     """Return the ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
 
     `where` is the half space and its light, by default matched and isotropic under this `illumination`. `stops` as in
-    `isotropic_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
+    `half_space_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
     nothing but the speed.
     """
     lanes = lanes or pool.lanes()
 
     def enter(photon: Array) -> OrderLanes:
-        if where is None:
-            return isotropic_event.enter(key, photon, stops, illumination)
-        return half_space_event.enter(key, photon, stops, where)
+        return half_space_event.enter(key, photon, stops, where, illumination)
 
     def turn(flying: OrderLanes, ends: Array) -> tuple[OrderLanes, Array]:
-        if isinstance(flying, IsotropicLanes):
-            flying = isotropic_event.fly(key, flying, events)
-        elif where is not None:
-            flying = half_space_event.fly(key, flying, events, where)
+        flying = half_space_event.fly(key, flying, events, where)
         return flying, recorded(ends, flying)
 
     return as_ends(pool.follow(enter, turn, no_ends(lanes), photons, lanes))

@@ -24,7 +24,7 @@ COLUMNS = 64  # of the table in which lanes are ranked
 # level is XLA's own, whatever a process has for other programs: lower ones trace six times as slowly.
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_backend_optimization_level": 3}
 
-# Any NamedTuple of arrays (lanes,) that has `place`, `photon` and `ended`, as isotropic_event.IsotropicLanes.
+# Any NamedTuple of arrays (lanes,) that has `place`, `photon` and `ended`, as half_space_event.OrderLanes.
 Lanes = Any
 Results = TypeVar("Results")
 Enter = Callable[[Array], Lanes]
@@ -89,7 +89,6 @@ def _emptied(pool: Lanes) -> Lanes:
 
 
 def _idle(enter: Enter, lanes: int) -> Lanes:
-    """Return lanes without a photon."""
     shapes = jax.eval_shape(enter, jax.ShapeDtypeStruct((lanes,), jnp.uint32))
     empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     place, photon = jnp.full(lanes, -1j, jnp.complex64), jnp.full(lanes, BATCH_PHOTONS, jnp.uint32)

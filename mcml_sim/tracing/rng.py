@@ -38,15 +38,18 @@ def draw(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array, 
     x, y, z, w = (
         v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2], key[3])
     )
-    x, y, z, w = _xor_shift(*_round(x, y, z, w))
-    return _xor_shift(*_round(x, y, z, w))
+    for _ in range(2):
+        x, y, z, w = _xor_shift(*_round(x, y, z, w))
+    return x, y, z, w
 
 
 def draw_three(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array]:
     """Return three independent uint32 words for each (photon, event), a fifth cheaper than four; key[:3] counts."""
     x, y, z = (v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2]))
     z = z | jnp.uint32(1)  # the one word that no event changes: odd, or its first product would lose some of `event`
-    return _xor_shift_three(*_round_three(*_xor_shift_three(*_round_three(x, y, z))))
+    for _ in range(2):
+        x, y, z = _xor_shift(*_round_three(x, y, z))
+    return x, y, z
 
 
 def uniform(words: Array) -> Array:
@@ -64,10 +67,15 @@ def exponential(words: Array) -> Array:
     bits = lax.bitcast_convert_type(number, jnp.int32)
     zeros = (158 - (bits >> 23)).astype(jnp.float32)
     y = 2 - lax.bitcast_convert_type((bits & 0x7FFFFF) | 0x3F800000, jnp.float32)
-    value = jnp.float32(LOGARITHM[-1])
-    for coefficient in LOGARITHM[-2::-1]:
-        value = value * y + jnp.float32(coefficient)
-    return value * y + zeros * jnp.float32(np.log(2))
+    return polynomial(LOGARITHM, y) * y + zeros * jnp.float32(np.log(2))
+
+
+def polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
+    """Return a polynomial of rising coefficients, in float32."""
+    value = jnp.float32(coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        value = value * x + jnp.float32(coefficient)
+    return value
 
 
 def symmetric(words: Array) -> Array:
@@ -84,8 +92,8 @@ def _round(x: Array, y: Array, z: Array, w: Array) -> tuple[Array, Array, Array,
     return x, y, z, w
 
 
-def _xor_shift(x: Array, y: Array, z: Array, w: Array) -> tuple[Array, Array, Array, Array]:
-    return x ^ (x >> 16), y ^ (y >> 16), z ^ (z >> 16), w ^ (w >> 16)
+def _xor_shift(*words: Array) -> tuple[Array, ...]:
+    return tuple(word ^ (word >> 16) for word in words)
 
 
 def _round_three(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
@@ -93,7 +101,3 @@ def _round_three(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
     y = y + z * x
     z = z + x * y
     return x, y, z
-
-
-def _xor_shift_three(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    return x ^ (x >> 16), y ^ (y >> 16), z ^ (z >> 16)

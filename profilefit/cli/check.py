@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
-
-if TYPE_CHECKING:
-    from profilefit.shader.check.chosen import Checked
 
 BROKEN = 1  # exit status
 
@@ -58,51 +54,25 @@ def check(
       profilefit check hazard albedo-rational
       profilefit check liang --constants published
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, typed
-        from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.whole_file import write_whole
-        from profilefit.recipes.evidence import measurement_origin, require_apart
-        from profilefit.report.tables.check_tables import content
-        from profilefit.shader.check.chosen import checked, chosen, scope
+    from mcml_sim.cli.screen import answer, typed
+    from profilefit.recipes.evidence import measurement_origin, require_apart
+    from profilefit.report.tables import check_tables as tables
+    from profilefit.shader.check.chosen import checked, chosen, scope
 
-    folder = records_folder(fits, quiet)
+    folder, in_half = records_folder(fits, quiet), precision is FloatFormat.HALF
     those = chosen(names or [], constants, folder)
     if out is not None:
         require_apart(out, folder, "check.json")
-    found = checked(those, folder, precision is FloatFormat.HALF, quiet)
-    if out is not None or as_json:
-        whole = content(found.laws, found.maps, found.costs, found.halves, found.device)
-        body = {"made": measurement_origin(typed(), folder), "of": scope(names, constants), **whole}
-    if out is not None:
-        write_whole(out / "check.json", json_text(body))
-        notes(quiet).print(f"wrote {out / 'check.json'}", markup=False)
-    if as_json:
-        print_json(body)
-    else:
-        _show(found, bool(names), precision is FloatFormat.HALF)
+    found = checked(those, folder, in_half, quiet)
+    whole = tables.content(found.laws, found.maps, found.costs, found.halves, found.device)
+    body = {"made": measurement_origin(typed(), folder), "of": scope(names, constants), **whole}
+    parts = tables.check_tables(found.laws, found.maps, found.device)
+    parts += tables.place_tables(found.laws) if names else []
+    parts += [tables.cost_table(found.costs, found.device)] if found.costs else []
+    parts += [tables.half_table(found.halves)] if found.halves else []
+    lacking = [found.lacking] if in_half and found.lacking else []
+    note = "" if out is None else f"wrote {out / 'check.json'}"
+    lines = [*lacking, *tables.verdict_lines(found.checks)]
+    answer(body, parts, lines, as_json, out, "check.json", note, quiet)
     if found.is_broken:
         raise typer.Exit(BROKEN)
-
-
-def _show(found: Checked, named: bool, in_half: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import screen, show
-        from profilefit.report.tables.check_tables import (
-            check_tables,
-            cost_table,
-            half_table,
-            place_tables,
-            verdict_lines,
-        )
-
-    console = screen()
-    parts = check_tables(found.laws, found.maps, found.device)
-    parts += place_tables(found.laws) if named else []
-    parts += [cost_table(found.costs, found.device)] if found.costs else []
-    parts += [half_table(found.halves)] if found.halves else []
-    show(parts, console)
-    if in_half and found.lacking:
-        console.print(found.lacking, markup=False)
-    for line in verdict_lines(found.checks):
-        console.print(line)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.options import AsJson, Quiet
 
 if TYPE_CHECKING:
@@ -20,12 +19,8 @@ if TYPE_CHECKING:
 UNSERVED = 1  # exit status
 
 
-class SceneNeed(NamedTuple):
-    """Answer for a scene, as data and as printed, and whether any option is within the scene's limits."""
-
-    content: dict[str, Any]
-    printed: Sequence[RenderableType]
-    served: bool = True
+# Answer for a scene as data and as printed, and whether any option is within the scene's limits.
+SceneNeed = tuple[dict[str, Any], "Sequence[RenderableType]", bool]
 
 
 def choose(
@@ -57,36 +52,31 @@ def choose(
       profilefit choose examples/skin.toml
       profilefit choose examples/layers-head.toml
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import print_json, screen
-        from mcml_sim.files.text_file import read_toml
-        from profilefit.errors import InputError
+    from mcml_sim.cli.screen import answer
+    from mcml_sim.files.text_file import read_toml
+    from profilefit.errors import InputError
 
     content = read_toml(scene)
     kind = str(content.get("scene"))
     if kind not in OTHERS:
-        answer = _technique(scene, content, measure, quiet)
+        body, printed, served = _technique(scene, content, measure, quiet)
     elif measure:
         raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
     else:
-        answer = OTHERS[kind](str(scene), content, quiet)
-    if as_json:
-        print_json(answer.content)
-    for part in () if as_json else answer.printed:
-        screen().print(part, markup=False)
-    if not answer.served:
+        body, printed, served = OTHERS[kind](str(scene), content, quiet)
+    answer(body, (), printed, as_json)
+    if not served:
         raise typer.Exit(UNSERVED)
 
 
 def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> SceneNeed:
-    with interruptible(__name__):
-        from mcml_sim.runs.progress import tracked, working
-        from profilefit.report.tables import choose_table as table
-        from profilefit.shader import opened
-        from profilefit.studies.choose import cost
-        from profilefit.studies.choose.choice import choose, laws
-        from profilefit.studies.choose.layers import of_each_colour
-        from profilefit.studies.choose.requirements import read
+    from mcml_sim.runs.progress import tracked, working
+    from profilefit.report.tables import choose_table as table
+    from profilefit.shader import opened
+    from profilefit.studies.choose import cost
+    from profilefit.studies.choose.choice import choose, laws
+    from profilefit.studies.choose.layers import of_each_colour
+    from profilefit.studies.choose.requirements import read
 
     of = read(scene, content)
     ratios = cost.shipped()
@@ -96,46 +86,43 @@ def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> Scene
     choice = choose(of, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
     stack, bar = of.layers, False if quiet else None
     layers = () if stack is None else of_each_colour(stack, of.tolerance, of.within, bar, of.setting.illumination)
-    printed = table.choose_table(choice, ratios, layers)
-    return SceneNeed(table.content(choice, ratios, layers), [printed], choice.chosen is not None)
+    printed = [table.choose_table(choice, ratios, layers)]
+    return table.content(choice, ratios, layers), printed, choice.chosen is not None
 
 
 def _heart(file: str, content: Table, quiet: bool) -> SceneNeed:
-    with interruptible(__name__):
-        from mcml_sim.runs.progress import working
-        from profilefit.report.tables.choose_table import atlas_content, atlas_line
-        from profilefit.scenes.heart.scene import read
-        from profilefit.shader import opened
-        from profilefit.studies.choose.atlas import atlas_need
+    from mcml_sim.runs.progress import working
+    from profilefit.report.tables.choose_table import atlas_content, atlas_line
+    from profilefit.scenes.heart.scene import read
+    from profilefit.shader import opened
+    from profilefit.studies.choose.scenes import atlas_need
 
     request = read(file, content)
     with working("summing what the screen does not see", quiet), opened() as context:
         need = atlas_need(context, request)
-    return SceneNeed(atlas_content(need), [atlas_line(need)])
+    return atlas_content(need), [atlas_line(need)], True
 
 
 def _sea(file: str, content: Table, quiet: bool) -> SceneNeed:
-    with interruptible(__name__):
-        from mcml_sim.runs.progress import working
-        from profilefit.report.tables.choose_table import sea_content, sea_lines
-        from profilefit.scenes.sea.scene import read
-        from profilefit.studies.choose.sea import sea_need
+    from mcml_sim.runs.progress import working
+    from profilefit.report.tables.choose_table import sea_content, sea_lines
+    from profilefit.scenes.sea.scene import read
+    from profilefit.studies.choose.scenes import sea_need
 
     request = read(file, content)
     with working("summing the haze", quiet):
         need = sea_need(request)
-    return SceneNeed(sea_content(need), sea_lines(need))
+    return sea_content(need), sea_lines(need), True
 
 
 def _fur(file: str, content: Table, quiet: bool) -> SceneNeed:
-    with interruptible(__name__):
-        from mcml_sim.runs.progress import tracked
-        from profilefit.report.tables.choose_table import fur_content, fur_lines
-        from profilefit.scenes.fur.scene import read
-        from profilefit.studies.choose.fur import ANGLES, fur_need
+    from mcml_sim.runs.progress import tracked
+    from profilefit.report.tables.choose_table import fur_content, fur_lines
+    from profilefit.scenes.fur.scene import read
+    from profilefit.studies.choose.scenes import ANGLES, fur_need
 
     need = fur_need(read(file, content), tracked(ANGLES, "casting rays", "angles", quiet=quiet))
-    return SceneNeed(fur_content(need), fur_lines(need), need.way is not None)
+    return fur_content(need), fur_lines(need), need.way is not None
 
 
 OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes of which another question is answered

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.errors import OutputError
 from profilefit.recipes.folder import shipped
 
@@ -27,9 +26,8 @@ def examples(
       profilefit examples --out .
       profilefit examples --out trial
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import screen
-        from mcml_sim.files.whole_file import require_writable, write_together
+    from mcml_sim.cli.screen import screen
+    from mcml_sim.files.whole_file import require_writable, write_together
 
     files = sorted(path for path in shipped("examples").iterdir() if path.is_file())
     if taken := [path.name for path in files if os.path.lexists(out / path.name)]:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import Fits, records_folder
 
@@ -60,10 +59,9 @@ def export(
       profilefit export hazard-diffuse --n 1.4 --g 0.9 --lang hlsl --out skin.hlsl
       profilefit export hazard-diffuse --n 1.37
     """
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import write_whole
-        from profilefit.scenes import SOURCES
-        from profilefit.shader.law_file import export_subject
+    from mcml_sim.files.whole_file import write_whole
+    from profilefit.scenes import SOURCES
+    from profilefit.shader.law_file import export_subject
 
     records_folder(fits)  # says where those are from that are not the shipped ones
     given = {key: value for key, value in (("constants", constants), ("n", n), ("g", g)) if value is not None}

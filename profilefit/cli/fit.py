@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from mcml_sim.cli.program import one_line
 from profilefit.cli import options
-from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
+from profilefit.cli.options import AsJson, Fits, Quiet, percent, records_folder, refused
 from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
     from mcml_sim import Medium
-    from profilefit.measured import Known, Measured, MediumPosterior
-    from profilefit.measured.oblique import Oblique
+    from profilefit.measured import Known, Measured
+    from profilefit.measured.model import Oblique
     from profilefit.measured.premises import Premises
 
 FAILED = 1  # exit status
@@ -123,26 +120,29 @@ def fit(
       profilefit fit examples/phantom.csv --n 1.4 --g 0.8:0.95
       profilefit fit petzold --kind phase
     """
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import require_folder
-        from mcml_sim.runs.progress import working
-        from profilefit.measured import read
-        from profilefit.measured.fitting import fitted
-        from profilefit.measured.premises import premises, specified
-        from profilefit.measured.result import content, judged
+    from mcml_sim.cli.screen import answer
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import working
+    from profilefit.measured import fit as medium_of
+    from profilefit.measured import read
+    from profilefit.measured.data import length
+    from profilefit.measured.premises import premises
+    from profilefit.measured.result import content
+    from profilefit.report.tables.fit_tables import fit_lines, fit_tables
 
     if kind not in KINDS:
-        raise InputError(f"--kind must be {PROFILE} or {PHASE}, got {kind!r}")
+        raise refused("--kind", f"{PROFILE} or {PHASE}", kind)
     if kind == PHASE:
         _fit_phase(context, data, angles, out, as_json, quiet)
         return
     if angles is not None:
         raise InputError("--angles must be left out where --kind is not phase")
     if seed < 0:
-        raise InputError(f"--seed must be a whole number >= 0, got {seed}")
+        raise refused("--seed", "a whole number >= 0", seed)
     folder = records_folder(fits, quiet)
     measured = read(data, unit, scale == FREE, colour)
-    measured = measured.within(_radius("--r-min", r_min, measured.unit), _radius("--r-max", r_max, measured.unit))
+    ends = (("--r-min", r_min), ("--r-max", r_max))
+    measured = measured.within(*(None if text is None else length(name, text, measured.unit) for name, text in ends))
     given = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
     where = premises(measured, law, given, {name: f"--{name}" for name in given})
     held = _held(fix or [], measured.unit)
@@ -159,57 +159,23 @@ def fit(
         require_folder(out, "fit.json", *FIGURES)
     try:
         with working("fitting", quiet):
-            spec = specified(measured, law, constants, where, held, known, factor, folder, oblique_centre)
-            result = judged(fitted(measured, spec), seed)
+            result = medium_of(
+                measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=oblique_centre
+            )
     except SettingError as error:
         raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
     model = "exact light" if law == options.EXACT else f"law {law}"
     title = f"{one_line(data.name)}: {_rows(measured)}, {model}, {result.fit.spec.law.setting}"
-    body = options.in_options(content(result))
-    _put(body, partial(_tables, result, title), out, as_json, quiet, partial(_figures, result))
-    if result.identifiability is None:
-        raise typer.Exit(FAILED)
-
-
-def _put(
-    body: dict[str, Any],
-    tables: Callable[[], tuple[list[Any], list[str]]],
-    out: Path | None,
-    as_json: bool,
-    quiet: bool,
-    figures: Callable[[Path], int] | None = None,
-) -> None:
-    """Write a fit into a folder, if there is one, and print it: as JSON, or as tables and sentences."""
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, screen, show
-        from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.whole_file import write_whole
-
+    note = ""
     if out is not None:
-        write_whole(out / "fit.json", json_text(body))
-        drawn = "" if figures is None else f" and {figures(out)} figures"
-        notes(quiet).print(f"wrote fit.json{drawn} into {out}", markup=False)
-    if as_json:
-        print_json(body)
-        return
-    parts, lines = tables()
-    show(parts, screen())
-    for line in lines:
-        screen().print(line, markup=False, emoji=False)
-
-
-def _tables(result: MediumPosterior, title: str) -> tuple[list[Any], list[str]]:
-    with interruptible(__name__):
-        from profilefit.report.tables.fit_tables import fit_lines, fit_tables
-
-    return list(fit_tables(result, title)), [options.in_options(line.plain) for line in fit_lines(result)]
-
-
-def _figures(result: MediumPosterior, out: Path) -> int:
-    with interruptible(__name__):
         from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
 
-    return len([*residual_figure(result, out), *posterior_figure(result, out)])
+        figures = [*residual_figure(result, out), *posterior_figure(result, out)]
+        note = f"wrote fit.json and {len(figures)} figures into {out}"
+    lines = [options.in_options(line.plain) for line in fit_lines(result)]
+    answer(options.in_options(content(result)), fit_tables(result, title), lines, as_json, out, "fit.json", note, quiet)
+    if result.identifiability is None:
+        raise typer.Exit(FAILED)
 
 
 def _rows(measured: Measured) -> str:
@@ -220,13 +186,12 @@ def _fit_phase(
     context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
 ) -> None:
     """Fit every form of a phase function to a table, print and write; exit status 1 if the fit fails."""
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import require_folder
-        from mcml_sim.runs.progress import working
-        from profilefit.recipes.kinds.phase import content, fits_of, request
-        from profilefit.recipes.phases.data import read_phase
-        from profilefit.recipes.phases.fit import ALL_ANGLES
-        from profilefit.report.tables.phase_table import phase_tables, premise_lines
+    from mcml_sim.cli.screen import answer
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import working
+    from profilefit.recipes.kinds.phase import content, fits_of, request
+    from profilefit.recipes.phases import ALL_ANGLES, read_phase
+    from profilefit.report.kinds import phase_tables, premise_lines
 
     accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}
     options.require_left_out(context, (name for name in context.params if name not in accepted), f"--kind is {PHASE}")
@@ -235,7 +200,7 @@ def _fit_phase(
         require_folder(out, "fit.json")
     with working("fitting", quiet):
         body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
-    _put(body, lambda: (phase_tables(body), list(premise_lines(body))), out, as_json, quiet)
+    answer(body, phase_tables(body), premise_lines(body), as_json, out, "fit.json", quiet=quiet)
     if body["fit"]["result"] != "converged":
         raise typer.Exit(FAILED)
 
@@ -251,11 +216,11 @@ def _fit_layers(
     quiet: bool,
 ) -> None:
     """Fit layers in place of one semi-infinite medium, print and write; exit status 1 if the fit fails."""
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import require_folder
-        from mcml_sim.runs.progress import working
-        from profilefit.measured.layers import fit_layers
-        from profilefit.report.tables.layers_fit_tables import layers_content, layers_lines, layers_tables
+    from mcml_sim.cli.screen import answer
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import working
+    from profilefit.measured.layers import fit_layers
+    from profilefit.report.tables.fit_tables import layers_content, layers_lines, layers_tables
 
     medium = _medium(file, measured.unit)
     if out is not None:
@@ -263,19 +228,19 @@ def _fit_layers(
     with working("fitting layers", quiet):
         fit = fit_layers(measured, medium, [name.strip() for name in free.split(",")], premises, scale)
     title = f"{one_line(measured.source)}: {_rows(measured)}, {len(medium.layers)} layers, exact light"
-    _put(layers_content(fit), lambda: (layers_tables(fit, title), list(layers_lines(fit))), out, as_json, quiet)
+    tables, lines = layers_tables(fit, title), layers_lines(fit)
+    answer(layers_content(fit), tables, lines, as_json, out, "fit.json", quiet=quiet)
     if fit.result != "converged":
         raise typer.Exit(FAILED)
 
 
 def _medium(file: Path, unit: str) -> Medium:
     """Return the stack of a file, in the data's unit of length."""
-    with interruptible(__name__):
-        from dataclasses import replace
+    from dataclasses import replace
 
-        from mcml_sim.files.text_file import read_toml
-        from profilefit.measured.data import factor
-        from profilefit.recipes.stack.file import read_layers
+    from mcml_sim.files.text_file import read_toml
+    from profilefit.measured.data import factor
+    from profilefit.recipes.stack.file import read_layers
 
     stack = read_layers(file, read_toml(file))
     if not stack.is_grey or stack.map is not None:
@@ -291,39 +256,27 @@ def _medium(file: Path, unit: str) -> Medium:
 
 
 def _range(text: str) -> tuple[float, float]:
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-
     match = PAIR.fullmatch(text.strip())
     low, high = (_number("--angles", match[at]) for at in (1, 2)) if match else (1.0, 0.0)
     if not 0 <= low < high <= 180:
-        raise InputError(f"--angles must be two rising angles in 0 ... 180 degrees, such as 1:180, got {shown(text)}")
+        raise refused("--angles", "two rising angles in 0 ... 180 degrees, such as 1:180", text)
     return low, high
-
-
-def _radius(option: str, text: str | None, unit: str) -> float | None:
-    with interruptible(__name__):
-        from profilefit.measured.data import length
-
-    return None if text is None else length(option, text, unit)
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:
     """Return what `--fix` holds: alpha or A, and l."""
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-        from profilefit.measured.data import length
+    from profilefit.measured.data import length
 
     held: dict[str, float] = {}
     for text in fix:
         match = FIXED.fullmatch(text.strip())
         if match is None:
-            raise InputError(f"--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got {shown(text)}")
+            raise refused("--fix", "l=LENGTH, alpha=NUMBER or A=NUMBER", text)
         name, value, option = match[1], match[2], f"--fix {match[1]}"
         if name in held or {"alpha", "A"} <= {name, *held}:
             raise InputError(f"--fix must hold each of l and alpha (or A) once, got {' and '.join(fix)}")
-        if name != "l" and (hint := options.percent(value)):
-            raise InputError(f"{option} must be a number in (0, 1), got {shown(value)}{hint}")
+        if name != "l" and (hint := percent(value)):
+            raise refused(option, "a number in (0, 1)", value, hint)
         held[name] = length(option, value, unit) if name == "l" else _number(option, value)
     return held
 
@@ -337,26 +290,24 @@ def _scale(text: str) -> float | Known | None:
 
 
 def _total(text: str) -> Known:
-    accepted, hint = "a reflectance in (0, 1) with its error, such as 0.52+-0.01", options.percent(text)
-    if hint:
-        raise InputError(f"--total must be {accepted}, got {text!r}{hint}")
+    accepted = "a reflectance in (0, 1) with its error, such as 0.52+-0.01"
+    if hint := percent(text):
+        raise refused("--total", accepted, text, hint)
     known = _known("--total", text)
     if known.error == 0 or known.value >= 1:
-        raise InputError(f"--total must be {accepted}, got {text!r}")
+        raise refused("--total", accepted, text)
     return known
 
 
 def _oblique(text: str, unit: str) -> Oblique:
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-        from profilefit.measured.data import length
-        from profilefit.measured.oblique import Oblique
+    from profilefit.measured.data import length
+    from profilefit.measured.model import Oblique
 
     angle, r, shift = text.split(":") if text.count(":") == 2 else ("", "", "")
     match = WITH_ERROR.fullmatch(shift.strip())
     if match is None:
         accepted = "an angle in degrees, a radius and a shift with its error, such as 45:4mm:0.52mm+-0.01mm"
-        raise InputError(f"--oblique must be {accepted}, got {shown(text)}")
+        raise refused("--oblique", accepted, text)
     degrees = _number("--oblique's angle", angle)
     if not 0 < degrees < 90:
         raise InputError(f"--oblique's angle must lie between 0 and 90 degrees, got {angle!r}")
@@ -366,32 +317,26 @@ def _oblique(text: str, unit: str) -> Oblique:
 
 def _known(option: str, text: str) -> Known:
     """Return a number > 0, with or without an error."""
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-        from profilefit.measured import Known
-        from profilefit.measured.data import LARGEST, SMALLEST
+    from mcml_sim.media.checks import shown
+    from profilefit.measured import Known
+    from profilefit.measured.data import LARGEST, SMALLEST
 
     match = WITH_ERROR.fullmatch(text.strip())
     value = _number(option, match["value"] if match else text)
     error = _number(option, match["error"]) if match else 0.0
     if not value > 0 or error < 0 or (match is not None and error == 0):
-        accepted = (
-            f"a number > 0, {'free, ' if option == '--scale' else ''}or a number with its error such as 1.0+-0.02"
-        )
-        raise InputError(f"{option} must be {accepted}, got {shown(text)}")
+        free = "free, " if option == "--scale" else ""
+        raise refused(option, f"a number > 0, {free}or a number with its error such as 1.0+-0.02", text)
     if not SMALLEST <= value <= LARGEST or error > LARGEST:
         raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {shown(text)}")
     return Known(value, error)
 
 
 def _number(option: str, text: str) -> float:
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{option} must be a number, got {shown(text)}")
+        raise refused(option, "a number", text)
     return number

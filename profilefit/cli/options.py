@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.errors import InputError, OtherRecords
 from profilefit.laws import PROFILES
 from profilefit.recipes import kinds
@@ -59,6 +58,13 @@ def require_left_out(context: typer.Context, names: Iterable[str], where: str) -
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             raise InputError(f"--{name.replace('_', '-')} must be left out where {where}")
+
+
+def refused(option: str, accepted: str, got: object, hint: str = "") -> InputError:
+    """Return the error of an option whose value is none that is accepted."""
+    from mcml_sim.media.checks import shown
+
+    return InputError(f"{option} must be {accepted}, got {shown(got)}{hint}")
 
 
 def percent(text: str) -> str:
@@ -107,31 +113,23 @@ def evidence_folder(records: Path, requested: Path | None = None) -> Path:
 
 def _among(known: Iterable[str]) -> Callable[[str], Iterator[str]]:
     """Return the completion of a word that is one of those known."""
+    return lambda incomplete: _starting(incomplete, known)
 
-    def offered(incomplete: str) -> Iterator[str]:
-        return _starting(incomplete, known)
+
+def _named(kind: Callable[[kinds.Kind], object] = bool, forms: bool = True) -> Callable[..., Iterator[str]]:
+    """Return the completion by names of some kinds, in the folder that the command has been given so far."""
+
+    def offered(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+        requested = ctx.params.get("fits")
+        folder = Path(requested) if requested else None
+        return _starting(incomplete, kinds.names(filter(kind, kinds.KINDS), folder, forms=forms))
 
     return offered
-
-
-def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Return the names of the records in the folder that the command has been given so far."""
-    return _starting(incomplete, kinds.names(kinds.KINDS, _folder(ctx), forms=False))
 
 
 def recipes(incomplete: str) -> Iterator[str]:
     """Return the names of what ships to regenerate records from."""
     return _starting(incomplete, sorted({name for kind in kinds.KINDS for name in kind.requests()}))
-
-
-def subjects(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Return the names of laws, maps and their records."""
-    return _starting(incomplete, kinds.names((kind for kind in kinds.KINDS if kind.forms), _folder(ctx)))
-
-
-def exported(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Return the names of laws, maps and every record."""
-    return _starting(incomplete, kinds.names(kinds.KINDS, _folder(ctx)))
 
 
 def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
@@ -140,7 +138,9 @@ def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     yield from _starting(incomplete, FUNCTIONS)
 
 
-laws = _among(PROFILES)
+records = _named(forms=False)
+subjects = _named(lambda kind: kind.forms)  # laws, maps and their records
+exported = _named()
 fitted = _among((EXACT, *PROFILES))
 languages = _among(LANGUAGES)
 parts = _among(PARTS)
@@ -148,15 +148,9 @@ parts = _among(PARTS)
 
 def constants(incomplete: str) -> Iterator[str]:
     """Return the sets of constants, of whatever law."""
-    with interruptible(__name__):
-        from profilefit.laws.published import SETS
+    from profilefit.laws.published import SETS
 
     return _starting(incomplete, dict.fromkeys(("regenerated", *(one.name for one in SETS))))
-
-
-def _folder(ctx: typer.Context) -> Path | None:
-    requested = ctx.params.get("fits")
-    return Path(requested) if requested else None
 
 
 def _starting(incomplete: str, known: Iterable[str]) -> Iterator[str]:

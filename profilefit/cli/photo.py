@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import AsJson, Quiet, percent, require_left_out
+from profilefit.cli.options import AsJson, Quiet, percent, refused, require_left_out
 from profilefit.errors import InputError
 
 if TYPE_CHECKING:
     from profilefit.measured import Known
-    from profilefit.measured.photo.workflow import Photo
 
 FAILED = 1  # exit status
 SEVERAL = ("--card", "--grey", "--dark")
@@ -79,16 +77,15 @@ def photo(
       profilefit photo shots/spot-*.dng --scale 0.04mm/px --beam 0.5mm+-0.05mm
       profilefit photo spot-*.dng --card card-*.dng --scale aruco:20mm
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, screen, show
-        from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.whole_file import require_folder, write_whole
-        from mcml_sim.media.setting import Setting
-        from mcml_sim.runs.progress import working
-        from profilefit.measured.photo.medium import Beliefs
-        from profilefit.measured.photo.workflow import photo as measured
-        from profilefit.report.page.photo import diffuse_law, medium_text, photo_page
-        from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
+    from mcml_sim.cli.screen import answer
+    from mcml_sim.files.whole_file import require_folder, write_whole
+    from mcml_sim.media.setting import Setting
+    from mcml_sim.runs.progress import working
+    from profilefit.measured.photo.medium import Beliefs
+    from profilefit.measured.photo.workflow import photo as measured
+    from profilefit.report.figures.fit_figures import rings_figure, spot_figure
+    from profilefit.report.page.photo import diffuse_law, medium_text, photo_page
+    from profilefit.report.tables.fit_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
         used = {"simulate", "out", "as_json", "quiet", "shots"}
@@ -110,44 +107,30 @@ def photo(
         require_folder(out, "medium.glsl", "photo.html", "photo.json", make=False)
     law = None if out is None else diffuse_law(setting)
     with working("measuring", quiet):
-        answer = measured(
+        measurement = measured(
             shots, scale, card or [], grey or [], dark or [], setting, beliefs,
             _known("--reflectance", reflectance),
         )  # fmt: skip
-    body = photo_content(answer)
+    note = ""
     if out is not None and law is not None:  # after photographs that cannot be measured, which leave no folder
         require_folder(out)
-        text = medium_text(answer, law)
-        figures = _figures(answer, out)
+        text = medium_text(measurement, law)
+        figures = [*spot_figure(measurement, out), *rings_figure(measurement, out)]
         write_whole(out / "medium.glsl", text)
-        write_whole(out / "photo.html", photo_page(answer, out, text))
-        write_whole(out / "photo.json", json_text(body))
-        notes(quiet).print(f"wrote photo.html, photo.json, medium.glsl and {figures} figures into {out}", markup=False)
-    if as_json:
-        print_json(body)
-    else:
-        console = screen()
-        show(photo_tables(answer), console)
-        for line in photo_lines(answer):
-            console.print(line, markup=False, emoji=False)
-    if not all(one.converged for one in answer.fits.values()):
+        write_whole(out / "photo.html", photo_page(measurement, out, text))
+        note = f"wrote photo.html, photo.json, medium.glsl and {len(figures)} figures into {out}"
+    tables, lines = photo_tables(measurement), photo_lines(measurement)
+    answer(photo_content(measurement), tables, lines, as_json, out, "photo.json", note, quiet)
+    if not all(one.converged for one in measurement.fits.values()):
         raise typer.Exit(FAILED)
 
 
-def _figures(answer: Photo, out: Path) -> int:
-    with interruptible(__name__):
-        from profilefit.report.figures.photo_figures import rings_figure, spot_figure
-
-    return len([*spot_figure(answer, out), *rings_figure(answer, out)])
-
-
 def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, screen, show
-        from mcml_sim.files.whole_file import require_folder
-        from mcml_sim.runs.progress import working
-        from profilefit.measured.photo.setup import fisher_bounds, read_setup, room, written
-        from profilefit.report.tables.photo_tables import setup_tables
+    from mcml_sim.cli.screen import answer, notes
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import working
+    from profilefit.measured.photo.setup import fisher_bounds, read_setup, room, written
+    from profilefit.report.tables.fit_tables import setup_tables
 
     if shots:
         raise InputError("SHOT must be left out where photographs are simulated")
@@ -159,36 +142,27 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
         bounds = fisher_bounds(setup)
         files = written(setup, out)
     notes(quiet).print(f"wrote {len(files)} photographs into {out}", markup=False)
-    if as_json:
-        print_json(bounds)
-    else:
-        show(setup_tables(bounds), screen())
+    answer(bounds, setup_tables(bounds), as_json=as_json)
 
 
 def _known(option: str, text: str, lengths: bool = False) -> Known:
     """Return a value and its error, 0.18+-0.005; of lengths, in mm, where fwhm: may stand before."""
-    with interruptible(__name__):
-        from mcml_sim.media.checks import shown
-        from profilefit.cli.fit import WITH_ERROR
-        from profilefit.measured import Known
-        from profilefit.measured.data import length
-        from profilefit.measured.instrument import BY_FWHM, FWHM
+    from profilefit.cli.fit import WITH_ERROR
+    from profilefit.measured import Known
+    from profilefit.measured.data import length
+    from profilefit.measured.instrument import BY_FWHM, FWHM
 
     is_fwhm = lengths and text.strip().lower().startswith(FWHM)
     match = WITH_ERROR.fullmatch(text.strip()[len(FWHM) if is_fwhm else 0 :])
     example = "0.5mm+-0.05mm or fwhm:0.6mm+-0.06mm" if lengths else "0.02+-0.02"
-    got = f"got {shown(text)}{'' if lengths else percent(text)}"
-    if match is None:
-        raise InputError(f"{option} must be a value with its error, such as {example}, {got}")
+    hint = "" if lengths else percent(text)
+    parts = match.group("value", "error") if match else ("", "")
     try:
-        value, error = (
-            length(option, match[name], "mm") if lengths else float(match[name]) for name in ("value", "error")
-        )
+        value, error = (length(option, part, "mm") if lengths else float(part) for part in parts)
     except ValueError:
-        raise InputError(f"{option} must be a value with its error, such as {example}, {got}") from None
-    most = 1e6 if lengths else 1.0
+        raise refused(option, f"a value with its error, such as {example}", text, hint) from None
+    most, accepted = (1e6, "> 0") if lengths else (1.0, "between 0 and 1")
     if not (0 < value < most and 0 < error < most):
-        accepted = "> 0" if lengths else "between 0 and 1"
-        raise InputError(f"{option} must be a value {accepted} with an error {accepted}, {got}")
+        raise refused(option, f"a value {accepted} with an error {accepted}", text, hint)
     factor = BY_FWHM if is_fwhm else 1.0
     return Known(factor * value, factor * error)

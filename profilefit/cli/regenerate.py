@@ -9,9 +9,8 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.options import Quiet
+from profilefit.cli.options import Quiet, refused
 from profilefit.errors import InputError
 from profilefit.recipes.folder import LOCAL, fits_folder
 
@@ -68,20 +67,19 @@ def regenerate(
       profilefit regenerate albedo-liang --photons 100000 --out mine
       profilefit regenerate examples/layers-head.toml --out mine
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, put
-        from mcml_sim.files.whole_file import require_folder
-        from mcml_sim.runs.progress import is_watched
-        from profilefit.recipes.regenerate import regenerate as regenerate_records
-        from profilefit.recipes.regenerate import reproduction, requests_of
-        from profilefit.recipes.run import RecipeRun
-        from profilefit.recipes.workers import cores
-        from profilefit.report.tables.summary_tables import outcome, reproduced, verdict
+    from mcml_sim.cli.screen import notes, print_json, put
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import is_watched
+    from profilefit.recipes.regenerate import regenerate as regenerate_records
+    from profilefit.recipes.regenerate import reproduction, requests_of
+    from profilefit.recipes.run import RecipeRun
+    from profilefit.recipes.workers import cores
+    from profilefit.report.tables.record_tables import outcome, reproduced, verdict
 
     if not 0 <= seed <= MAX_SEED:
-        raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")
+        raise refused("seed", f"a whole number in [0, {MAX_SEED}]", seed)
     if photons is not None and photons < 1:
-        raise InputError(f"photons must be a whole number >= 1, got {photons}")
+        raise refused("photons", "a whole number >= 1", photons)
     said = notes(quiet)
     requests = requests_of(recipes or ())
     is_named = getattr(context.get_parameter_source("out"), "name", "") == "COMMANDLINE"

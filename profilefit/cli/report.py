@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import AsJson, Fits, Quiet, evidence_folder, records_folder
 from profilefit.errors import InputError, OtherRecords, ShaderError
 
 if TYPE_CHECKING:
     from profilefit.recipes.kinds import Chosen, Kind
-    from profilefit.report.tables.law_tables import Qualities
 
     Groups = Mapping[Kind, Mapping[str, Path]]
 
@@ -45,8 +44,7 @@ def report(
         Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
     ] = None,
     html: Annotated[
-        Path | None,
-        typer.Option(help="Write all of it as one HTML page, with figures and an explorer: two minutes."),
+        Path | None, typer.Option(help="Write all of it as one HTML page, with figures and an explorer: two minutes.")
     ] = None,
     evidence: Annotated[
         Path | None,
@@ -72,14 +70,15 @@ def report(
       profilefit report liang-whole --figures figures
       profilefit report --html report.html
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import print_json, screen, show
-        from mcml_sim.files.whole_file import require_folder
-        from profilefit.recipes.kinds import KINDS, no_records, records_of
-        from profilefit.report import every_law
-        from profilefit.report.kinds import tables_of
-        from profilefit.report.tables import law_tables
-        from profilefit.report.tables.claims_table import read_claims
+    from mcml_sim.cli.screen import notes, print_json, screen, show
+    from mcml_sim.files.whole_file import require_folder
+    from mcml_sim.runs.progress import tracked
+    from profilefit.recipes.evidence import stale
+    from profilefit.recipes.kinds import KINDS, no_records, records_of
+    from profilefit.report import every_law
+    from profilefit.report.kinds import tables_of
+    from profilefit.report.tables import law_tables
+    from profilefit.report.tables.claims_table import claim_tables, read_claims
 
     printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
     flags = {"--markdown": markdown, "--html": html, **printed}
@@ -97,28 +96,49 @@ def report(
     _require_together(chosen, folder, [option for option, value in outputs.items() if value])
     if figures_to is not None:
         require_folder(figures_to)
+    said = notes(quiet)
+    bar = partial(tracked, quiet=quiet)
+    measured = partial(
+        law_tables.measured,
+        folder,
+        names or None,
+        track=lambda laws, title, total: bar(laws, f"measuring {title}", "laws", total),
+    )
     if markdown is not None:
         _fill(markdown, groups, folder, quiet)
     elif html is not None:
-        _page(html, folder, evidence_folder(folder, evidence), names, quiet)
+        from profilefit.report.page.document import write_page
+
+        where = evidence_folder(folder, evidence)
+        write_page(html, folder, where, names, lambda parts: bar(parts, "writing", "parts"))
+        said.print(f"wrote {html}, {html.stat().st_size / MEGABYTE:.1f} MB", markup=False)
     elif as_json:
         body: dict[str, Any] = {}
         for kind, name, path in chosen:
             if (shown := tables_of(kind)) is not None:
                 body.setdefault(shown.key, {})[name] = kind.module.read(path)
         if quality:
-            body["quality"] = law_tables.content(_measured(folder, names, quiet))
+            body["quality"] = law_tables.content(measured())
         if claims:
             body["claims"] = read_claims(evidence_folder(folder, evidence))[1]
         print_json(body)
     elif quality:
-        show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())
+        show(list(every_law(measured(), bool(names))), screen())
     elif claims:
-        _show_claims(evidence_folder(folder, evidence), folder, quiet)
+        made, rows = read_claims(evidence_folder(folder, evidence))
+        show(claim_tables(rows), screen())
+        if stale(made, folder):
+            said.print("since then records or version have changed: `make claims` measures again", markup=False)
     else:
         _show(chosen if names else (), groups, folder)
     if figures_to is not None:
-        _draw(folder, figures_to, names, quiet)
+        from profilefit.recipes.workers import cores
+        from profilefit.report import draw_all
+
+        drawn, skipped = draw_all(folder, figures_to, names, lambda plans: bar(plans, "drawing", "figures"), cores())
+        said.print(f"drew {len(drawn)} figures into {figures_to}", markup=False)
+        for line in skipped:
+            said.print(f"left out: {line}", markup=False)
 
 
 def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[str]) -> None:
@@ -134,9 +154,8 @@ def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[st
 
 def _show(named: Sequence[Chosen], groups: Groups, folder: Path) -> None:
     """Print the tables of records, or a summary of every kind where none is named."""
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import put, screen
-        from profilefit.report.kinds import tables_of
+    from mcml_sim.cli.screen import put, screen
+    from profilefit.report.kinds import tables_of
 
     parts: list[Any] = []
     for kind, _, path in named:
@@ -150,63 +169,12 @@ def _show(named: Sequence[Chosen], groups: Groups, folder: Path) -> None:
         put(part, console)
 
 
-def _show_claims(evidence: Path, folder: Path, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, screen, show
-        from profilefit.recipes.evidence import stale
-        from profilefit.report.tables.claims_table import claim_tables, read_claims
-
-    made, rows = read_claims(evidence)
-    show(claim_tables(rows), screen())
-    if stale(made, folder):
-        notes(quiet).print("since then records or version have changed: `make claims` measures again", markup=False)
-
-
-def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Qualities:
-    with interruptible(__name__):
-        from mcml_sim.runs.progress import tracked
-        from profilefit.report.tables import law_tables
-
-    def track(laws: Iterator[Any], title: str, total: int) -> Iterator[Any]:
-        return tracked(laws, f"measuring {title}", "laws", total, quiet)
-
-    return law_tables.measured(folder, names or None, track=track)
-
-
-def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes
-        from mcml_sim.runs.progress import tracked
-        from profilefit.recipes.workers import cores
-        from profilefit.report import draw_all
-
-    def track(plans: Iterable[Any]) -> Iterator[Any]:
-        return tracked(plans, "drawing", "figures", quiet=quiet)
-
-    drawn, skipped = draw_all(folder, out, names, track, cores())
-    said = notes(quiet)
-    said.print(f"drew {len(drawn)} figures into {out}", markup=False)
-    for line in skipped:
-        said.print(f"left out: {line}", markup=False)
-
-
-def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes
-        from mcml_sim.runs.progress import tracked
-        from profilefit.report.page.document import write_page
-
-    write_page(path, folder, evidence, names, lambda parts: tracked(parts, "writing", "parts", quiet=quiet))
-    notes(quiet).print(f"wrote {path}, {path.stat().st_size / MEGABYTE:.1f} MB", markup=False)
-
-
 def _fill(path: Path, groups: Groups, folder: Path, quiet: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes
-        from mcml_sim.files.whole_file import read_whole, require_writable, write_whole
-        from mcml_sim.runs.progress import working
-        from profilefit.report import fill
-        from profilefit.report.kinds import tables_of
+    from mcml_sim.cli.screen import notes
+    from mcml_sim.files.whole_file import read_whole, require_writable, write_whole
+    from mcml_sim.runs.progress import working
+    from profilefit.report import fill
+    from profilefit.report.kinds import tables_of
 
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")

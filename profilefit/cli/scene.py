@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import AsJson, Quiet
+from profilefit.cli.options import AsJson, Quiet, refused
+from profilefit.errors import InputError
+from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")
@@ -38,49 +40,39 @@ def scene(
       profilefit scene skin --example
       profilefit scene examples/skin-head.toml --out pictures
     """
-    with interruptible(__name__):
-        from importlib import import_module
-
-        from mcml_sim.cli.screen import notes, print_json, screen, typed
-        from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.text_file import read_toml
-        from mcml_sim.files.version import __version__
-        from mcml_sim.files.whole_file import require_writable, write_together
-        from mcml_sim.runs.progress import working
-        from profilefit.errors import InputError
-        from profilefit.recipes.folder import shipped
+    from mcml_sim.cli.screen import notes, print_json, screen, typed
+    from mcml_sim.files.text_file import as_json as json_text
+    from mcml_sim.files.text_file import read_toml
+    from mcml_sim.files.version import __version__
+    from mcml_sim.files.whole_file import require_writable, write_together
+    from mcml_sim.runs.progress import working
+    from profilefit.report import scene_report as report
+    from profilefit.shader.context import opened, renderer
 
     known = ", ".join(SCENES)
     if example:
         if file not in SCENES:
-            raise InputError(f"NAME must be one of {known} with --example, got {file!r}")
+            raise refused("NAME", f"one of {known} with --example", file)
         typer.echo((shipped("examples") / SCENES[file][1]).read_text(encoding="utf-8"), nl=False)
         return
     content = read_toml(file)
     name = content.get("scene")
     if not isinstance(name, str) or name not in SCENES:
         raise InputError(f"{file}: scene must be one of {known}, got {'nothing' if name is None else repr(name)}")
-
-    with interruptible(__name__):
-        home = import_module(SCENES[name][0])
-        from profilefit.report.scene_report import content as numbers
-        from profilefit.report.scene_report import scene_figures, scene_lines
-        from profilefit.shader.context import opened, renderer
-
+    home = import_module(SCENES[name][0])
     request = home.read(file, content)
     stem = out / Path(file).stem
     for end in (".json", ".png", "-truth.png", "-error.png"):
         require_writable(Path(f"{stem}{end}"))
     with working("drawing, and summing the truth", quiet), opened() as context:
         drawn, device = home.draw(context, request), renderer(context)
-    files: dict[Path, Any] = {
-        Path(f"{stem}{end}.png"): png for end, png in scene_figures(drawn, device.partition(",")[0]).items()
-    }
-    body = {"made": {"by": typed(), "version": __version__}, "of": content, **numbers(drawn, device)}
-    write_together({**files, Path(f"{stem}.json"): json_text(body)})
+    figures = report.scene_figures(drawn, device.partition(",")[0])
+    files: dict[Path, bytes | str] = {Path(f"{stem}{end}.png"): png for end, png in figures.items()}
+    body = {"made": {"by": typed(), "version": __version__}, "of": content, **report.content(drawn, device)}
+    files[Path(f"{stem}.json")] = json_text(body)
+    write_together(files)
     if as_json:
         print_json(body)
-    else:
-        for line in scene_lines(drawn, device):
-            screen().print(line, markup=False, soft_wrap=True)
-    notes(quiet).print(f"wrote {', '.join(map(str, (*files, f'{stem}.json')))}", markup=False)
+    for line in () if as_json else report.scene_lines(drawn, device):
+        screen().print(line, markup=False, soft_wrap=True)
+    notes(quiet).print(f"wrote {', '.join(map(str, files))}", markup=False)

@@ -6,8 +6,6 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
-
 FILES = ("scene", "stack", "recipe", "photo")
 
 
@@ -23,14 +21,12 @@ def schema(
       profilefit schema scene
       profilefit schema stack
     """
-    with interruptible(__name__):
-        from mcml_sim.files.text_file import as_json
-        from profilefit.errors import InputError
+    from mcml_sim.files.text_file import as_json
+    from profilefit.errors import InputError
 
     if kind not in FILES:
         raise InputError(f"KIND must be one of {', '.join(FILES)}, got {kind!r}")
 
-    with interruptible(__name__):
-        from profilefit.report.tables.keys_table import models, schema_of
+    from profilefit.report.tables.keys_table import models, schema_of
 
     typer.echo(as_json(schema_of(models()[kind])), nl=False)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
-
-if TYPE_CHECKING:
-    from profilefit.studies.stability.atlas import Findings
 
 BROKEN = 1  # exit status
 
@@ -48,68 +43,34 @@ def stability(
       profilefit stability --quick --out atlas
       profilefit stability liang
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, typed
-        from mcml_sim.files.text_file import as_json as json_text
-        from mcml_sim.files.whole_file import write_whole
-        from mcml_sim.runs.progress import tracked
-        from profilefit.recipes.evidence import measurement_origin, require_apart
-        from profilefit.report.tables.stability_tables import content
-        from profilefit.studies.stability.atlas import jobs, run
+    from mcml_sim.cli.screen import answer, typed
+    from mcml_sim.files.whole_file import write_whole
+    from mcml_sim.runs.progress import tracked
+    from profilefit.recipes.evidence import measurement_origin, require_apart
+    from profilefit.report.tables import stability_tables as tables
+    from profilefit.studies.stability.atlas import jobs, run
 
     folder = records_folder(fits, quiet)
     todo = jobs(names or [], folder, quick)
     if out is not None:
         require_apart(out, folder, "stability.json", "stability.csv")
     parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
-    if out is not None or as_json:
-        body = {
-            "made": measurement_origin(typed(), folder),
-            "of": names or ("quick" if quick else "all"),
-            **content(parts),
-        }
+    origin = {"made": measurement_origin(typed(), folder), "of": names or ("quick" if quick else "all")}
+    fitted = [one for part in parts for one in part.fits]
+    shown = [tables.region_table(part) for part in parts if part.regions] if names else []
+    if any(part.regions for part in parts):
+        shown.append(tables.advice_table(parts))
+    if fitted:
+        shown.append(tables.fit_table(fitted) if names else tables.fit_summary(fitted))
     if out is not None:
-        _write(parts, out)
-        write_whole(out / "stability.json", json_text(body))
-        notes(quiet).print(f"{out}: stability*.png, .svg; stability.csv, .json", markup=False)
-    if as_json:
-        print_json(body)
-    else:
-        _show(parts, bool(names))
+        from profilefit.report.figures.stability_figure import stability_figures
+
+        stability_figures([one for part in parts for one in part.cells], out)
+        write_whole(out / "stability.csv", tables.regions_csv(parts))
+        if fitted:
+            write_whole(out / "stability-fits.csv", tables.fits_csv(fitted))
+    note = f"{out}: stability*.png, .svg; stability.csv, .json"
+    body, lines = {**origin, **tables.content(parts)}, tables.verdict_lines(parts)
+    answer(body, shown, lines, as_json, out, "stability.json", note, quiet)
     if any(part.failures for part in parts):
         raise typer.Exit(BROKEN)
-
-
-def _show(parts: Sequence[Findings], named: bool) -> None:
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import screen, show
-        from profilefit.report.tables.stability_tables import (
-            advice_table,
-            fit_summary,
-            fit_table,
-            region_table,
-            verdict_lines,
-        )
-
-    tables = [region_table(part) for part in parts if part.regions] if named else []
-    fits = [one for part in parts for one in part.fits]
-    if any(part.regions for part in parts):
-        tables.append(advice_table(parts))
-    if fits:
-        tables.append(fit_table(fits) if named else fit_summary(fits))
-    console = screen()
-    show(tables, console)
-    for line in verdict_lines(parts):
-        console.print(line)
-
-
-def _write(parts: Sequence[Findings], out: Path) -> None:
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import write_whole
-        from profilefit.report.figures.stability_figure import stability_figures
-        from profilefit.report.tables.stability_tables import fits_csv, regions_csv
-
-    stability_figures([one for part in parts for one in part.cells], out)
-    write_whole(out / "stability.csv", regions_csv(parts))
-    if fits := [one for part in parts for one in part.fits]:
-        write_whole(out / "stability-fits.csv", fits_csv(fits))

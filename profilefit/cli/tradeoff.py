@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
-
-if TYPE_CHECKING:
-    from profilefit.studies.tradeoff.points import TradeoffPart
 
 OUT = Path("tradeoff")
 WIDTH = 120  # columns that the tables take
@@ -29,8 +25,7 @@ def tradeoff(
         ),
     ] = None,
     out: Annotated[
-        Path,
-        typer.Option(help="Folder for the figures (PNG, SVG), their data (CSV), and tradeoff.json."),
+        Path, typer.Option(help="Folder for the figures (PNG, SVG), their data (CSV), and tradeoff.json.")
     ] = OUT,
     quick: Annotated[bool, typer.Option("--quick", help="Less of everything: under a minute, and noisy.")] = False,
     fits: Fits = None,
@@ -48,13 +43,14 @@ def tradeoff(
     Example:
       profilefit tradeoff laws --quick --out charts
     """
-    with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json, screen, show, typed
-        from mcml_sim.runs.progress import tracked
-        from profilefit.recipes.evidence import measurement_origin, require_apart
-        from profilefit.report.tables.tradeoff_tables import as_numbers, tradeoff_tables
-        from profilefit.studies.tradeoff import stopwatch
-        from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
+    from mcml_sim.cli.screen import notes, print_json, screen, show, typed
+    from mcml_sim.files.whole_file import write_whole
+    from mcml_sim.runs.progress import tracked
+    from profilefit.recipes.evidence import measurement_origin, require_apart
+    from profilefit.report.figures.tradeoff_figure import tradeoff_figure
+    from profilefit.report.tables.tradeoff_tables import as_csv, as_numbers, tradeoff_tables
+    from profilefit.studies.tradeoff import stopwatch
+    from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
 
     names = chosen(parts or [])
     folder = records_folder(fits, quiet)
@@ -71,23 +67,13 @@ def tradeoff(
         body: dict[str, Any] = {**origin, "machine": (known := stopwatch.facts(pinned))}
         for name in names:
             part = measured(name, quick, folder, track)
-            files = _written(part, known, out)
+            data = out / f"tradeoff-{part.name}.csv"
+            write_whole(data, as_csv(part, known))
+            files = (*tradeoff_figure(part, stopwatch.caption(known), out), data, file)
             body[name] = {**as_numbers(part), **origin, "machine": known}
             keep(file, body)
             if not as_json:
                 show(list(tradeoff_tables(part)), screen(WIDTH))
-            said.print(f"wrote {', '.join(map(str, (*files, file)))}", markup=False)
+            said.print(f"wrote {', '.join(map(str, files))}", markup=False)
     if as_json:
         print_json(body)
-
-
-def _written(part: TradeoffPart, known: dict[str, str], out: Path) -> list[Path]:
-    with interruptible(__name__):
-        from mcml_sim.files.whole_file import write_whole
-        from profilefit.report.figures.tradeoff_figure import tradeoff_figure
-        from profilefit.report.tables.tradeoff_tables import as_csv
-        from profilefit.studies.tradeoff import stopwatch
-
-    data = out / f"tradeoff-{part.name}.csv"
-    write_whole(data, as_csv(part, known))
-    return [*tradeoff_figure(part, stopwatch.caption(known), out), data]

@@ -1,4 +1,9 @@
-"""Exact total reflectance A of a semi-infinite medium, and its inverse: A is a function of alpha, n and g alone.
+"""Exact total reflectance A of a semi-infinite medium and its inverse, and the colours that renderers map to albedos.
+
+A is a function of alpha, n and g alone.
+
+A renderer turns the colour that is typed into an albedo by a formula of its own: what to type is its inverse at alpha.
+Four are closed forms of A alone; that of Wrenninge et al. has g as well.
 
 alpha is the reduced albedo mu_s' / (mu_s' + mu_a). Exact light with g is known under a refracting surface only; where
 n = 1 the isotropic medium of the same alpha stands for it (similarity relation), whose A is too large in dark media.
@@ -16,6 +21,8 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.checks import checked_numbers
 from profilefit.errors import InputError
+from profilefit.laws import published
+from profilefit.laws.printed_maps import Chiang, VanDeHulst
 
 Floats = NDArray[np.float64]
 # Below this A the root is sought in alpha, above it in sqrt(1 - alpha): each is where A has a finite slope.
@@ -101,3 +108,68 @@ def checked(name: str, values: ArrayLike, low: float, high: float) -> Floats:
     if np.any(outside):
         raise InputError(f"{name} must be {accepted}, got {numbers[outside].flat[0]:g}")
     return numbers
+
+
+_OF_HULST = published.constants("van_de_hulst_albedo")
+# Maps of A alone, by name. Hyperion's has internal reflection at n = 1.4: B. Burley et al., The design and evolution of
+# Disney's Hyperion renderer, ACM Transactions on Graphics 37(3), 2018; Unreal Engine PathTracingCore.ush. In
+# appleseed's randomwalkbssrdf.cpp two digits of q0 = 9.59217 are transposed.
+MAPS: dict[str, VanDeHulst | Chiang] = {
+    "van de Hulst": VanDeHulst(Setting("diffuse"), **_OF_HULST),
+    "Chiang": Chiang(Setting("diffuse"), **published.constants("chiang_albedo")),
+    "Hyperion": Chiang(Setting("diffuse", n=1.4), -11.43, 15.38, -13.91),
+    "appleseed": VanDeHulst(Setting("diffuse"), **{**_OF_HULST, "q0": 9.59271}),
+}
+# M. Wrenninge, R. Villemin and C. Hery, Path traced subsurface scattering using anisotropic phase functions and
+# non-exponential free flights, Pixar Technical Memo 17-07, 2017, as in blender/cycles subsurface_random_walk.h
+# (Apache-2.0). Polynomials in g from its power 0: A, exponent of B, C, D, exponent of E, F, where B and E are
+# c + e exp(exponent), by these pairs.
+WRENNINGE_B, WRENNINGE_E = (4.98511194385, 0.127355959438), (4.23190299701, 0.00310603949088)
+WRENNINGE = np.array(
+    (
+        (1.8260523782, -1.28451056436, -1.79904629312, 9.19393289202),
+        (-22.8215585862, 32.0234874259, -23.6264803333, 7.21067002658),
+        (0.0, 31.1491581433, -201.847017512, 841.576016723),
+        (-2018.09288505, 2731.71560286, -1935.41424244, 559.009054474),
+        (1.09686102424, -0.394704063468, 1.05258115941, -8.83963712726),
+        (28.8643230661, -46.8802913581, 38.5402837518, -12.7181042538),
+        (0.496310210422, 0.360146581622, -2.15139309747, 17.8896899217),
+        (-55.2984010333, 82.065982243, -58.5106008578, 15.8478295021),
+        (0.0, 76.7316253952, -594.356773233, 2448.8834203),
+        (-5576.68528998, 7116.60171912, -4763.54467887, 1303.5318055),
+        (2.40602999408, -2.51814844609, 9.18494908356, -79.2191708682),
+        (259.082868209, -403.613804597, 302.85712436, -87.4370473567),
+    )
+).reshape(6, 8)
+
+
+def mapped_colour(name: str, alpha: Floats) -> Floats:
+    """Return the colour [-] of one of `MAPS` at the reduced albedo [-], which by similarity holds whatever g.
+
+    Chiang's is 1 from its last albedo, 0.9989, on.
+    """
+    return np.asarray(MAPS[name].reflectance(alpha))
+
+
+def wrenninge_alpha(colour: float, g: float = 0.0) -> float:
+    """Return the albedo mu_s / (mu_s + mu_a) [-], not reduced, of Wrenninge et al.'s fit; it may end above 1.
+
+    (1 - b) A atan(B C)^Cc + b D atan(E C)^F at colour C, b = C^(1/4), for an index-matched medium and 0 <= g <= 0.9.
+    """
+    a, of_b, c, d, of_e, f = np.polynomial.polynomial.polyval(g, WRENNINGE.T)
+    b, e = (first + second * np.exp(at) for (first, second), at in ((WRENNINGE_B, of_b), (WRENNINGE_E, of_e)))
+    blend = colour**0.25
+    return float((1.0 - blend) * (a * np.arctan(b * colour) ** c) + blend * (d * np.arctan(e * colour) ** f))
+
+
+def wrenninge_colour(alpha: Floats, g: float = 0.0) -> Floats:
+    """Return the colour [-] that Wrenninge et al. map to this reduced albedo; van de Hulst's where g < 0, as Cycles."""
+    if g < 0.0:
+        return mapped_colour("van de Hulst", alpha)
+
+    def colour(albedo: float) -> float:
+        if albedo <= 0.0 or wrenninge_alpha(1.0, g) <= albedo:
+            return float(albedo > 0.0)
+        return float(brentq(lambda c: wrenninge_alpha(c, g) - albedo, 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST))
+
+    return np.vectorize(colour, otypes=[float])(unreduced(alpha, g))

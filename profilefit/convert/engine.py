@@ -1,28 +1,160 @@
-"""Fields of a renderer for a medium: a colour and a length, by product, version and method.
+"""Fields of a renderer for a medium: a colour and a length, by product, version and method, as `engines.toml` has them.
 
 Most engines turn the typed colour into an albedo by a map of their own, so that the number to type is the map's inverse
 at the medium's alpha, and not its A. Engines that blur with a profile multiply by the colour: for these it is A under
 an index-matched surface, whatever n the medium has. What a renderer then shows is A only where light enters as the map
 assumes: `Engine.renders` has what Cycles' walks show instead.
 
-Numbers and formulas are quoted from the sources that `Engine.source` names, read on 2026-11-30; no code is.
+Cycles' four methods have changed their meaning three times since 2.79. bssrdf_setup_radius multiplies the radius,
+radius times scale, by 1 / (4 pi) or by nothing. Until 2.93 both methods had the factor. Since 3.0 Christensen-Burley's
+d has it and is no longer divided by s(A): bssrdf_burley_setup, which does that, has no caller. The walk has it as
+Random Walk (Fixed Radius) of 3.x, Random Walk of 4.0 to 5.1 and Random Walk (Legacy) since 5.2. Random Walk since 5.2
+has none: the typed radius is the mean free path. Since 4.0 walks enter along the refracted ray, while colours are
+mapped as if light entered diffusely, and leave unrefracted: they show less than the A of their medium. Seen from the
+normal through roughness 1 this is exact, and agrees with renders of Blender 5.0 to 5.3 within 0.5 %.
+
+HDRP's rasteriser draws normalized diffusion with the typed d; its path tracer walks with l = d s(A), s the diffuse one.
+
+Unreal's rasteriser takes a mean free path since 5.1 and a diffuse one before. It draws d = dmfp / s_dmfp(A), dmfp being
+mfp s_dmfp(A) / (0.6 s_searchlight(A)): an l of 1 is typed as 0.6. Profiles from before 5.1 were drawn 10/3 wider than
+their numbers, as the code that upgrades them says. Its path tracer multiplies by 0.6 again and walks with what was
+typed, so that rasteriser and path tracer want different numbers for one medium.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import resources
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
-from profilefit.convert.colour import reflectance_of
-from profilefit.convert.lengths import Factor
+from mcml_sim import Setting
+from mcml_sim.exact.light import unreduced
+from profilefit.convert.colour import MAPS, mapped_colour, reflectance_of, reflectance_rough, wrenninge_colour
+from profilefit.convert.lengths import (
+    Factor,
+    Length,
+    classical,
+    falloff_diffuse,
+    falloff_searchlight,
+    scale_diffuse,
+    scale_dmfp,
+    scale_searchlight,
+    stretch,
+    transport,
+    unreduced_path,
+)
+from profilefit.laws.diffusion import BeamDiffusion
 
 Floats = NDArray[np.float64]
 Colour = Callable[[Floats, float, float], Floats]  # of reduced albedo, index n of the surface, and g
 METRES = {"um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-ANY_G, ISOTROPIC = (-1.0, 1.0), (0.0, 0.0)
+
+# Cycles' src/kernel/closure/bssrdf.h, bssrdf_setup_radius: what a radius is multiplied by; in Random Walk by nothing
+# since commit e5f41641 of 2026-06-02.
+SHRINK = 0.25 / np.pi
+# The same file, bssrdf_dipole_compute_alpha_prime.
+SKIN_HALVINGS = 12
+SKIN_DARKEST, SKIN_BRIGHTEST, SKIN_HIGHEST = 1e-4, 0.995, 0.999999
+# src/scene/shader_nodes.cpp: IOR of the Subsurface Scattering node, and Subsurface IOR of Principled.
+INDEX = 1.4
+# Unity-Technologies/Graphics, .../Runtime/Material/DiffusionProfile/DiffusionProfileSettings.cs: UpdateKernel.
+HDRP_SHARE = 0.997
+# r/d within which normalized diffusion has that share of its light.
+HDRP_REACH = float(brentq(lambda t: 0.25 * np.exp(-t) + 0.75 * np.exp(-t / 3.0) - (1.0 - HDRP_SHARE), 0.0, 100.0))
+# Unreal Engine SubsurfaceProfile.cpp: Dmfp2MfpMagicNumber, and SUBSURFACE_KERNEL_SIZE / CmToMm.
+UNREAL_MAGIC = 0.6
+UNREAL_SHRINK = 3.0 / 10.0
+
+
+def skin_alpha(colour: ArrayLike, index: float = INDEX) -> Floats:
+    """Return the alpha' [-] that Cycles takes a skin's colour for, as coarse as its twelve halvings make it.
+
+    They solve C = alpha'/2 (1 + e^(-4/3 K s)) e^-s, s = sqrt(3 (1 - alpha')): the dipole, Jensen and Buhler 2002.
+    """
+    a = np.asarray(colour, float)
+    low, high = np.zeros_like(a), np.ones_like(a)
+    for _ in range(SKIN_HALVINGS):
+        middle = 0.5 * (low + high)
+        dark = dipole_reflectance(middle, index) < a
+        low, high = np.where(dark, middle, low), np.where(dark, high, middle)
+    return np.where(a < SKIN_DARKEST, 0.0, np.where(a >= SKIN_BRIGHTEST, SKIN_HIGHEST, middle))
+
+
+def dipole_reflectance(alpha: ArrayLike, index: float) -> Floats:
+    """Return the total reflectance of the standard dipole at reduced albedo alpha' [-] and relative index [-]."""
+    values = np.asarray(alpha, float)
+    fresnel = -1.440 / index**2 + 0.710 / index + 0.668 + 0.0636 * index
+    s = np.sqrt(3.0 * (1.0 - values))
+    return 0.5 * values * (1.0 + np.exp(-4.0 / 3.0 * (1.0 + fresnel) / (1.0 - fresnel) * s)) * np.exp(-s)
+
+
+def _by_map(name: str) -> Colour:
+    return lambda alpha, n, g: mapped_colour(name, alpha)
+
+
+def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
+    """Return A [-] by photon beam diffusion per light that entered, which pbrt inverts; at most 1 can be typed."""
+    law = BeamDiffusion(Setting(n=n))
+    return np.minimum(np.asarray(law.reflectance(alpha)) / law.entered, 1.0)
+
+
+def _entered(alpha: Floats, n: float, g: float) -> Floats:
+    """Return A [-] under a pencil beam and this surface per light that entered."""
+    return reflectance_of(alpha, "searchlight", n, g) / reflectance_of(1.0, "searchlight", n, g)
+
+
+def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
+    return UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
+
+
+# Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface.
+COLOURS: dict[str, Colour] = {
+    **{name: _by_map(name) for name in MAPS},
+    "Wrenninge": lambda alpha, n, g: wrenninge_colour(alpha, g),
+    "diffuse": lambda alpha, n, g: reflectance_of(alpha, "diffuse", 1.0, g),
+    "searchlight": lambda alpha, n, g: reflectance_of(alpha, "searchlight", 1.0, g),
+    "beam diffusion": _beam_diffusion,
+    "entered": _entered,
+    "albedo": lambda alpha, n, g: unreduced(alpha, g),
+}
+# Lengths that are typed, over l [-]. The extinction of Cycles' legacy walk is 4 pi / (radius (1 - g)), that of its skin
+# depends on the colour that is typed, too; walks of HDRP and of appleseed in 2017 multiply by s of the typed colour.
+FACTORS: dict[str, Factor] = {
+    "l": transport,
+    "unreduced": unreduced_path,
+    "falloff": falloff_diffuse,
+    "Cycles' legacy": lambda alpha, g: stretch(alpha, g) / SHRINK,
+    "Cycles 2": lambda alpha, g: transport(alpha, g) / SHRINK,
+    "Cycles' Burley": lambda alpha, g: falloff_diffuse(alpha, g) / SHRINK,
+    "Cycles' skin": lambda alpha, g: classical(skin_alpha(wrenninge_colour(alpha, g)), g) * stretch(alpha, g),
+    "HDRP's radius": lambda alpha, g: HDRP_REACH * falloff_diffuse(alpha, g),
+    "HDRP's walk": lambda alpha, g: 1.0 / scale_diffuse(mapped_colour("Chiang", alpha)),
+    "Unreal's": lambda alpha, g: UNREAL_MAGIC * transport(alpha, g),
+    "Unreal's before 5.1": _unreal_dmfp,
+    "appleseed's walk of 2017": lambda alpha, g: 1.0 / scale_searchlight(mapped_colour("Chiang", alpha)),
+}
+# A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half
+# of the light enters diffusely.
+RENDERS: dict[str, Callable[[Floats], Floats]] = {
+    "rough entry": lambda alpha: reflectance_rough(alpha, INDEX),
+    "skin entry": lambda alpha: 0.5 * (reflectance_rough(alpha, INDEX) + reflectance_of(alpha, "diffuse")),
+}
+TYPED_LENGTHS = (
+    Length("cycles_radius", FACTORS["unreduced"]),
+    Length("cycles_legacy_radius", FACTORS["Cycles' legacy"]),
+    Length("cycles_burley_radius", FACTORS["Cycles' Burley"]),
+    Length("cycles_skin_radius", FACTORS["Cycles' skin"]),
+    Length("hdrp_distance", FACTORS["falloff"]),
+    Length("hdrp_radius", FACTORS["HDRP's radius"]),
+    Length("unreal_mfp", FACTORS["Unreal's"]),
+    Length("unreal_dmfp", FACTORS["Unreal's before 5.1"]),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +189,7 @@ class Engine:
     formula: str
     source: str
     checked: str = "source"
-    g: tuple[float, float] = ANY_G
+    g: tuple[float, float] = (-1.0, 1.0)
     renders: Callable[[Floats], Floats] | None = None
 
     @property
@@ -86,18 +218,15 @@ class Engine:
         return self.g[0] <= g <= self.g[1]
 
 
-def diffuse(alpha: Floats, n: float, g: float) -> Floats:
-    """Return A [-] under diffuse illumination and an index-matched surface."""
-    del n
-    return reflectance_of(alpha, "diffuse", 1.0, g)
+def _engines() -> Iterator[Engine]:
+    """Yield the rows of `engines.toml` in order, each with what its product's rows share and the functions it names."""
+    products = tomllib.loads((resources.files("profilefit.convert") / "engines.toml").read_text(encoding="utf-8"))
+    for product in products.values():
+        for own in product.pop("rows"):
+            row: dict[str, Any] = {"colour": None, "renders": None, **product, **own}
+            row |= {key: tuple(row[key]) for key in ("fields", "g") if key in row}
+            row |= {key: table[row[key]] for key, table in (("colour", COLOURS), ("renders", RENDERS)) if row[key]}
+            yield Engine(**{**row, "length": FACTORS[row["length"]]})
 
 
-def searchlight(alpha: Floats, n: float, g: float) -> Floats:
-    """Return A [-] under a pencil beam and an index-matched surface."""
-    del n
-    return reflectance_of(alpha, "searchlight", 1.0, g)
-
-
-def by(colour: Callable[[Floats], Floats]) -> Colour:
-    """Return the colour as one of reduced albedo alone."""
-    return lambda alpha, n, g: colour(alpha)
+ENGINES = tuple(_engines())

@@ -53,7 +53,6 @@ def scale_dmfp(reflectance: ArrayLike) -> Floats:
 
 def transport(alpha: Floats, g: float = 0.0) -> Floats:
     """Return 1, the transport mean free path over itself."""
-    del g
     return np.ones_like(alpha)
 
 
@@ -69,7 +68,6 @@ def stretch(alpha: Floats, g: float) -> Floats:
 
 def classical(alpha: Floats, g: float = 0.0) -> Floats:
     """Return 1 / sqrt(3 (1 - alpha)) [-]."""
-    del g
     with np.errstate(divide="ignore"):
         return 1.0 / np.sqrt(3.0 * (1.0 - alpha))
 
@@ -81,20 +79,17 @@ def grosjean(alpha: Floats, g: float = 0.0) -> Floats:
 
 def decay(alpha: Floats, g: float = 0.0) -> Floats:
     """Return 1 / kappa(alpha) [-], of isotropic scattering."""
-    del g
     with np.errstate(divide="ignore"):
         return 1.0 / np.asarray(exact.decay_rate(alpha), float)
 
 
 def falloff_searchlight(alpha: Floats, g: float = 0.0) -> Floats:
     """Return 1 / s(A) [-], A under a pencil beam."""
-    del g
     return 1.0 / scale_searchlight(reflectance_of(alpha, "searchlight"))
 
 
 def falloff_diffuse(alpha: Floats, g: float = 0.0) -> Floats:
     """Return 1 / s(A) [-], A under diffuse illumination."""
-    del g
     return 1.0 / scale_diffuse(reflectance_of(alpha, "diffuse"))
 
 

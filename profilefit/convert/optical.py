@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
-from profilefit.convert import blender, real_time
 from profilefit.convert.colour import LARGEST, checked, reflectance_of
+from profilefit.convert.engine import TYPED_LENGTHS
 from profilefit.convert.lengths import QUANTITIES, Length
 from profilefit.errors import InputError
 
 Floats = NDArray[np.float64]
-LENGTHS = (*QUANTITIES, *blender.LENGTHS, *real_time.LENGTHS)
+LENGTHS = (*QUANTITIES, *TYPED_LENGTHS)
 BY_NAME = {length.name: length for length in LENGTHS}
 
 

@@ -14,8 +14,7 @@ statistical   exp(-Q(theta*) / 2 s^2) with theta* = theta^ + C (theta - theta^):
               that Q is probed as far from its optimum as the photons move it
 misfit        exp(-Q(theta) / 2 s^2), s^2 the misfit per degree of freedom: what the law's misfit leaves open if it were
               noise. It is not, so read it beside the fit's jackknife
-Priors are flat in the constants, each within ten times its size or its own misfit error, whichever is larger: a
-misfit that is blind to a constant leaves it to the prior, and the interval then shows it.
+Priors are flat in the constants, each within ten times its size or its own misfit error, whichever is larger.
 """
 
 from __future__ import annotations
@@ -65,10 +64,7 @@ LAPLACE_SHARE = 0.5  # of the moves; the others walk where the density is nothin
 
 
 def laplace_move(centre: Floats, covariance: Floats) -> emcee.moves.MHMove:
-    """Return proposals that do not depend on where a walker is: t about `centre` (p,), scaled to `covariance` (p, p).
-
-    Accepted by pi(x') q(x) / pi(x) q(x'), so what is sampled is the density and not the approximation to it.
-    """
+    """Return proposals that do not depend on where a walker is: t about `centre` (p,) with `covariance` (p, p)."""
     root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
 
     def log_q(white: Floats) -> Floats:
@@ -84,10 +80,7 @@ def laplace_move(centre: Floats, covariance: Floats) -> emcee.moves.MHMove:
 
 
 def default_moves(centre: Floats, covariance: Floats) -> Moves:
-    """Return moves of which half are draws from Laplace's approximation, and the others evolve.
-
-    The autocorrelation time is a few steps wherever the density is near that approximation.
-    """
+    """Return moves of which half are draws from Laplace's approximation, and the others evolve."""
     others = tuple((move, (1.0 - LAPLACE_SHARE) * weight) for move, weight in EVOLUTION)
     return (laplace_move(centre, covariance), LAPLACE_SHARE), *others
 
@@ -96,9 +89,7 @@ def default_moves(centre: Floats, covariance: Floats) -> Moves:
 class Node:
     """Best values of all parameters but the first where that has one value, and their errors there.
 
-    first, others (p - 1,)  the values
-    slope  (p - 1,) derivatives of the others by the first
-    root   (p - 1, p - 1) of the others' covariance: triangular, its diagonal positive
+    slope  (p - 1,) derivatives of the others by the first; root (p - 1, p - 1) of their covariance: triangular
     log    ln density of the first, the others integrated over as a normal; -inf where it is not finite
     """
 
@@ -110,12 +101,9 @@ class Node:
 
     @classmethod
     def of(cls, there: Solution, free: Sequence[int], log_density: Callable[[Floats], Floats]) -> Node:
-        """Return the node of a fit of the others.
+        """Return the node of a fit of the others, whose residuals are in standard errors.
 
-        Args:
-            there: the fit, whose residuals are in standard errors.
-            free: places of the p parameters among those of the fit, the first one first.
-            log_density: ln density there, up to a constant, for ln of the volume of the others' errors.
+        free  places of the p parameters in the fit; log_density there for ln of the volume of the others' errors
         """
         first, others = free[0], list(free[1:])
         ways, point = there.jacobian[:, others], there.parameters
@@ -130,21 +118,14 @@ class Node:
 
 @dataclass(frozen=True)
 class Ridge:
-    """Nodes whose first parameter rises, two at least, and what is between them.
-
-    spread  (p - 1, p - 1) covariance of the straight coordinates but the first; None for 1
-    """
+    """Nodes whose first parameter rises, two at least; `spread` is the covariance of the others, None for 1."""
 
     nodes: tuple[Node, ...]
     spread: Floats | None = None
 
     @classmethod
     def normal(cls, centre: Floats, covariance: Floats) -> Ridge:
-        """Return the straight ridge of a normal density of `centre` (p,) and `covariance` (p, p).
-
-        Parameters keep their units: where such a density is an approximation only, as of many constants of a law, tau
-        in units of errors is half as long again.
-        """
+        """Return the straight ridge of a normal density of `centre` (p,) and `covariance` (p, p)."""
         root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
         across = root[1:, 0] / root[0, 0]
         firsts = centre[0] + NORMAL * root[0, 0]
@@ -156,13 +137,9 @@ class Ridge:
 
     @classmethod
     def along(cls, best: Node, moved: Callable[[Node, float], Node], ends: tuple[float, float], error: float) -> Ridge:
-        """Follow a ridge from its best node to either side.
+        """Follow a ridge from its best node to either side, in strides of the first parameter's standard `error`.
 
-        Args:
-            best: where to start.
-            moved: the node where the first parameter has another value, from one near it.
-            ends: lowest and highest value of the first parameter.
-            error: its standard error, in which strides are measured.
+        moved  the node where that has another value, from one near it; ends its lowest and highest value
         """
         nodes = [best]
         for side in (-1.0, 1.0):
@@ -249,8 +226,7 @@ def sample(
         seed: of starts and proposals.
         max_steps: after which a chain ends though it is too short.
         kept: how many draws to keep at most.
-        pilot: steps of a first chain, whose spread makes the proposals of the one that counts: for a density that is
-            like the ridge's only near its top.
+        pilot: steps of a first chain, whose spread makes the proposals of the one that counts.
     """
 
     def straight_density(straight: Floats) -> Floats:
@@ -282,15 +258,8 @@ def walk(
 ) -> Walk:
     """Sample from `start` (walkers, p) until the chain is 50 autocorrelation times long, or `max_steps`.
 
-    Args:
-        log_density: of points (m, p), (m,), vectorised; -inf where there is none.
-        start: where the walkers begin. One where there is no density moves towards `centre`, by halves.
-        centre: (p,) a point of the density.
-        seed: of emcee's random numbers.
-        max_steps: the longest that the chain may get.
-        kept: how many draws to keep at most.
-        moves: emcee's, with their weights.
-        first_look: steps after which the chain is judged first.
+    A walker that starts where there is no density moves towards `centre` (p,), by halves; other arguments as of
+    `sample`. The chain is judged first after `first_look` steps.
     """
     start = start.copy()
     for _ in range(HALVINGS):
@@ -317,12 +286,7 @@ def walk(
 
 @dataclass(frozen=True)
 class Posterior(Walk):
-    """Chains of one fit's constants.
-
-    kind       "statistical" or "misfit"
-    law        its name, and objective what it was fitted by
-    names      (p,) of the constants
-    """
+    """Chains of one fit's constants (p,), of a kind "statistical" or "misfit"."""
 
     kind: str
     law: str
@@ -341,7 +305,7 @@ class Posterior(Walk):
         """Return the draws as an xarray.DataTree of ArviZ, a walker a chain, with the log density as `lp`.
 
         Walkers of one ensemble learn from each other, so ArviZ's comparison of chains flatters them: `tau` does not.
-        Needs the package arviz-base; InputError without it.
+        InputError without the package arviz-base.
         """
         try:
             from arviz_base import from_dict
@@ -362,8 +326,7 @@ def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int
         fit: one that converged.
         kind: "statistical" (photon noise) or "misfit" (the law's, taken for noise).
         seed: of the walkers.
-        max_steps: the longest that a chain may get. One that is not 50 autocorrelation times long then is returned with
-            that result, not refused.
+        max_steps: the longest that a chain may get; one that is not 50 autocorrelation times long then says so.
     """
     require_own_process()
     if kind not in ("statistical", "misfit"):
@@ -391,10 +354,7 @@ def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int
 
 
 class _Density(eqx.Module):
-    """Logarithm of a posterior density at many points at once.
-
-    Every number is an array: one that is a Python float would be compiled in, and every fit would compile anew.
-    """
+    """Logarithm of a posterior density at many points at once; every number is an array, lest it be compiled in."""
 
     law: eqx.Module
     rings: eqx.Module
@@ -411,11 +371,11 @@ class _Density(eqx.Module):
             adjust, variance = curvature_adjustment(_positive_curvature(fit), covariance)
         else:
             adjust, variance = np.eye(len(fit.free)), fit.variance
-        problem = ResidualFunction(fit.objective, fit.free)
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.misfit)))
+        numbers = centre, adjust, variance, fit.solution.cost, bound
         with jax.enable_x64(True):
-            density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
+            density = cls(fit.law, fit.rings, *numbers, ResidualFunction(fit.objective, fit.free))
             return jax.tree.map(jnp.asarray, density)
 
     @filter_jit

@@ -1,4 +1,4 @@
-"""Model discrepancy: the error of a law as a random function of radius and albedo, and its effect on a fit.
+"""Model discrepancy: the error of a law as a random function of radius and albedo, and what it does to a fit.
 
 A law is not the truth: truth = law (1 + delta), delta small. Its residuals are smooth and repeat each other, so they
 are no independent noise. Here delta is a Gaussian process of mean zero over ln r and sqrt(1 - alpha) (Kennedy and
@@ -14,26 +14,31 @@ Another draw of that process would have led the fit elsewhere: the derivative of
 the constants' model error, and the law that was fitted is off by what remains of delta after the fit has followed it.
 A fit to r R_d unweighted (objective "radial") lets the law go where the profile fades: there delta counts in units of
 the profile's source limit, alpha / 4 pi r, instead of the profile itself.
+
+A derived quantity (reflectance, radius of a share of the energy, profile) has two errors. Statistical: the photons'
+covariance of the constants, carried over by the derivative. Model: how far the law that was fitted is from the truth.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm
 
+from mcml_sim.errors import InputError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.estimate import Fit, ResidualFunction, followed
-from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
-from profilefit.fitting.objectives import Rings
+from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
+from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, likeliest, matern
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.fitting.solver import unit_columns
@@ -52,6 +57,11 @@ SEEN = 3.9  # gain in log likelihood that three parameters exceed by chance in o
 SHARES = 400  # nodes of an inverse cdf between which it is a straight line
 FOUND, NOT_SEEN = "found", "not seen: noise alone explains the residuals"
 FAILED = f"no convergence in {MAX_STEPS} steps: amplitude and lengths are where they stopped"
+FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
+KEPT = ("u", "s", "influence")
+SHOWN = (0.2, 0.5, 0.8, 0.95, 0.99)  # albedos of a record's table
+# Rings fine enough that their middles stand for them, from the source to where no light is left [mfp].
+EDGES = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 601)])
 
 
 @dataclass(frozen=True)
@@ -89,10 +99,7 @@ class Discrepancy:
         return {f"discrepancy_{name}": getattr(self, name) for name in KEPT}
 
     def law_covariance(self, u: Floats, s: Floats, slope: Floats) -> Floats:
-        """Covariance (k, k) of the law that was fitted, less the truth, at points (k,) of ln r and `places`.
-
-        slope  (k, p) d law / d constants there, in what `unit` calls 1: where the fit follows delta, less is left
-        """
+        """Return the covariance (k, k) of the law less the truth at points (k,), d law / d constants being `slope`."""
         joint = self._kernel(s, self.s, self.length_s)[:, :, None] * self._kernel(u, self.u, self.length_r)[:, None, :]
         own = self._kernel(s, s, self.length_s) * self._kernel(u, u, self.length_r)
         followed = self.amplitude**2 * np.einsum("kp,pai,lai->kl", slope, self.influence, joint, optimize=True)
@@ -106,10 +113,6 @@ class Discrepancy:
         if not np.isfinite(length):  # a fit that sees no rings knows of no radius
             return np.ones((len(one), len(other)))
         return matern(apart(one, other) / length)
-
-
-FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
-KEPT = ("u", "s", "influence")
 
 
 def read(content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Discrepancy | None:
@@ -127,8 +130,7 @@ class Residuals:
     """Relative residuals of a law on groups of neighbouring rings.
 
     table      (m, g) law less data over what counts as 1 [-]; live where a group counts
-    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha), (m, 2) of that and rho where profiles are of several indices, and
-               (m, 3) with g
+    u, s       (g,), (m,) as of `Discrepancy`
     slope      (m, g, p) d table / d constants; noise (g, m, k) factors of the photons' relative covariance
     influence  (p, m, g) d constants / d delta, `delta` of all the rings of a group
     """
@@ -163,7 +165,7 @@ def of_residuals(data: Residuals) -> Discrepancy:
     )
     amplitude, length_u, length_s = map(float, np.exp(theta))
     gain = worth if np.any(noise) else np.inf
-    kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
+    kernel_u, kernel_s = (matern(apart(x, x) / length) for x, length in ((data.u, length_u), (data.s, length_s)))
     across = data.influence, kernel_s, kernel_u, data.influence
     covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
     result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED
@@ -176,10 +178,7 @@ def of_residuals(data: Residuals) -> Discrepancy:
 
 
 def _as_large(one: Discrepancy, left: Floats, squares: float) -> Discrepancy:
-    """`one`, or if it leaves residuals of a smaller sum of squares than `squares`, with the amplitude that does not.
-
-    left  (k, k) covariance of the residuals that it leaves
-    """
+    """Return `one`, or if the residuals it leaves, of covariance `left`, have less than `squares`, a larger one."""
     more = squares / np.trace(left)
     if more <= 1.0:
         return one
@@ -218,7 +217,7 @@ def unit_energy(objective: str, energy: Floats, alpha: Floats, r_edges: Floats) 
 
 
 def predicted(problem: ResidualFunction, law: Any, rings: Rings) -> tuple[Floats, Floats]:
-    """Ring energies of a law as the problem's objective means them (m, n), and their derivatives (m, n, p)."""
+    """Return ring energies of a law as the problem's objective means them (m, n), and derivatives (m, n, p)."""
     with jax.enable_x64(True):
         theta = jnp.asarray(law.vector(problem.free))
         energy, slope = _predicted(problem, theta, jax.tree.map(jnp.asarray, law), rings)
@@ -261,7 +260,7 @@ def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
 
 
 def _noise(profiles: Profiles, judged: Live, member: Floats, law: Floats) -> Floats:
-    """Factors (g, m, k) of the relative covariance of groups: rings of one group add up, photons are shared."""
+    """Return factors (g, m, k) of the relative covariance of groups, whose rings add up and share photons."""
     groups = member.shape[1]
     if profiles.covariance is None:
         return np.zeros((groups, profiles.alpha.size, 1))
@@ -276,7 +275,7 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _flat(data: Residuals):
-    """Live points in one row: u, s, residual (n,), slope (n, p), noise (n, n)."""
+    """Return live points in one row: u, s, residual (n,), slope (n, p), noise (n, n)."""
     a, g = np.nonzero(data.live)
     noise = np.einsum("gak,gbk->gab", data.noise, data.noise)
     full = np.where(g[:, None] == g, noise[g[:, None], a[:, None], a], 0.0)
@@ -321,3 +320,176 @@ def _error(curved: Floats) -> float:
         return np.inf
     inverse = np.linalg.pinv(curved[np.ix_(keep, keep)], hermitian=True)
     return float(np.sqrt(max(inverse[0, 0], 0.0)))
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Numbers (k,) with two standard errors; statistical is NaN where the truth had no photon noise."""
+
+    value: Floats
+    statistical: Floats
+    model: Floats
+
+    @property
+    def error(self) -> Floats:
+        """Both together (k,)."""
+        return np.hypot(np.nan_to_num(self.statistical), self.model)
+
+    def interval(self, level: float = 0.95) -> tuple[Floats, Floats]:
+        """Low and high ends (k,) of the interval that holds the truth with probability `level`."""
+        half = norm.isf(0.5 - level / 2) * self.error
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True)
+class LawWithErrors:
+    """A law with the names of its constants and its objective; `statistical` (p, p) is None without photon noise."""
+
+    law: Any
+    free: tuple[str, ...]
+    objective: str
+    statistical: Floats | None
+    discrepancy: Discrepancy | None
+
+    @classmethod
+    def of_record(cls, law: Any, content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> LawWithErrors:
+        """Return `law` with the constants of a record and its errors; old ones say nothing of the model."""
+        covariance = content.get("covariance", {})
+        statistical = covariance.get("statistical")
+        noise = None if statistical is None else np.asarray(statistical, float)
+        objective = content["protocol"]["weighting"]["objective"]
+        return cls(law, tuple(covariance.get("names", ())), objective, noise, read(content, arrays))
+
+    @property
+    def reduced(self) -> Any:
+        """The law of the reduced albedos and radii that all quantities here are of."""
+        return self.law.in_reduced()
+
+    @property
+    def is_map(self) -> bool:
+        return self.objective in OF_MAPS
+
+    def statistical_error(self, slope: Floats) -> Floats:
+        """Return statistical errors (k,) of quantities whose derivatives are `slope` (k, p)."""
+        if self.statistical is None:
+            return np.full(len(slope), np.nan)
+        return np.sqrt(np.einsum("kp,pq,kq->k", slope, self.statistical, slope))
+
+
+@dataclass(frozen=True)
+class AtAlbedo:
+    """A profile law at one albedo, ring by ring of `EDGES`: energy (n,) [-] and slope (n, p), its derivatives."""
+
+    known: LawWithErrors
+    alpha: float
+
+    @cached_property
+    def _predicted(self) -> tuple[Floats, Floats]:
+        problem = ResidualFunction(self.known.objective, self.known.free)
+        total = float(self.known.reduced.albedo.reflectance(self.alpha))
+        alone, none = np.array([self.alpha]), np.zeros((1, EDGES.size - 1))
+        rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
+        energy, slope = predicted(problem, self.known.reduced, rings)
+        lit = energy[0] > 0  # (7) ends where it falls below zero
+        return np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0)
+
+    @property
+    def energy(self) -> Floats:
+        return self._predicted[0]
+
+    @property
+    def slope(self) -> Floats:
+        return self._predicted[1]
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance (n, n) of the model's error in ring energies."""
+        process, n = self.known.discrepancy, EDGES.size - 1
+        if process is None:
+            return np.full((n, n), np.nan)
+        unit = unit_energy(self.known.objective, self.energy[None], np.array([self.alpha]), EDGES)[0]
+        unit = np.where(self.energy > 0, unit, 0.0)
+        relative = self.slope / np.where(unit > 0, unit, 1.0)[:, None]
+        u, s = np.log(self.middle), process.places(np.full(n, self.alpha), self.known.law.setting)
+        return process.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
+
+    @property
+    def middle(self) -> Floats:
+        """(n,) [mfp]."""
+        return np.sqrt(EDGES[1:] * np.maximum(EDGES[:-1], 0.25 * EDGES[1:]))
+
+    def radius(self, share: float) -> tuple[float, float, float]:
+        """Return the radius within which `share` of the energy leaves [mfp], and its two errors."""
+        total = self.energy.sum()
+        inside = np.cumsum(self.energy) / total
+        place = int(np.searchsorted(inside, share))
+        weight = (np.arange(inside.size) <= place) * 1.0
+        before = inside[place - 1] if place else 0.0
+        part = (share - before) / (inside[place] - before)
+        weight[place] = part
+        value = EDGES[place] + part * (EDGES[place + 1] - EDGES[place])
+        density = (inside[place] - before) / (EDGES[place + 1] - EDGES[place])
+        moved = -(weight - share) / total / density  # d radius / d ring energy
+        gain = moved @ self.slope
+        model = float(np.sqrt(max(moved @ self.covariance @ moved, 0.0))) if self.known.discrepancy else np.nan
+        return float(value), float(self.known.statistical_error(gain[None])[0]), model
+
+
+def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quantity:
+    """Return the radius (k,) [mfp] within which `share` of the light leaves; beyond 99.5 % see `tail_error`."""
+    if known.is_map or not 0 < share < 1:
+        raise InputError(f"share must be in (0, 1), of a profile law, got {share!r} of {type(known.law).__name__}")
+    rows = [AtAlbedo(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]
+    return Quantity(*np.array(rows).T)
+
+
+def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
+    """Return R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
+    if known.is_map or known.objective in QUANTILES:
+        raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
+    here, radii = AtAlbedo(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
+    value = np.asarray(known.reduced.profile(radii, alpha), float)
+    energy = np.where(here.energy > 0, here.energy, 1.0)
+    noise = known.statistical_error(here.slope) / energy
+    model = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
+    at = np.log(radii)
+    relative = [np.interp(at, np.log(here.middle), np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
+    return Quantity(value, np.abs(value) * relative[0], np.abs(value) * relative[1])
+
+
+def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
+    """Return the total reflectance A (k,) [-] at albedos `alpha` (k,), by a map."""
+    if not known.is_map:
+        raise InputError(f"known must be of a map between alpha and A, got {type(known.law).__name__}")
+    albedos = np.atleast_1d(np.asarray(alpha, float))
+    one, none = np.ones(albedos.size), np.zeros((albedos.size, 1))
+    rings = Rings(albedos, np.array([0.0, 1.0]), none, one, none, one, np.array(NO_LIMITS), np.zeros(0))
+    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
+    value = energy[:, 0]
+    model = np.full(value.size, np.nan)
+    if known.discrepancy is not None:
+        spread = known.discrepancy.law_covariance(
+            0.0 * albedos, known.discrepancy.places(albedos, known.law.setting), slope[:, 0] / energy
+        )
+        model = value * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return Quantity(value, known.statistical_error(slope[:, 0]), model)
+
+
+def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
+    """Return the root mean square of law/data - 1 of the radius of `share` [-], over the law's albedos that hold it."""
+    errors = []
+    settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
+    for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
+        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > share:
+            truth = float(np.interp(share, cdf, profiles.r_edges))
+            errors.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
+
+
+def summary(known: LawWithErrors, profiles: Profiles) -> dict[str, Any]:
+    """Return a record's table of A, or of the radius that holds 99.5 % of the energy, at a few albedos."""
+    if known.is_map:
+        return {"alpha": SHOWN, "quantity": "reflectance", **vars(reflectance(known, SHOWN))}
+    radii = radius(known, SHOWN)
+    model = np.fmax(radii.model, radii.value * tail_error(known, profiles))
+    return {"alpha": SHOWN, "quantity": "radius", **vars(replace(radii, model=model))}

@@ -13,8 +13,7 @@ error, row by row, that brings chi-square to n - p.
 
 Which error of the model would leave such residuals is a question to a restricted likelihood (REML), that of what the
 fitted constants cannot take up. `lack_of_fit` sums over relative standard deviations d and some correlations along
-ln r, by the likelihood of z under S + d^2 D. `likeliest` finds amplitude and lengths of a process over two coordinates,
-with Matern's covariance (nu = 3/2) along each.
+ln r; `likeliest` finds amplitude and lengths of a process over two coordinates, with Matern's covariance (nu = 3/2).
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ class Misfit:
     chi2, freedom    by the data's errors alone; chance its p-value
     scatter, waves   p-values where data and law have the errors stated; joined that of both
     along_r          lag-1 autocorrelation of the residuals; runs the number of sign runs, and that expected of noise
-    relative         relative error [-] that brings chi-square to its degrees of freedom; 0 if nothing is left
+    relative         relative error [-] that brings chi-square to its degrees of freedom
     """
 
     chi2: float
@@ -92,29 +91,20 @@ def misfit(
         law: (m, m) covariance of the law's own error.
         shape: (m, m) that of a relative error 1 in waves.
         rows: how many lie along r.
-        uneven: (m, m) that of a relative error 1 which differs from row to row; by default, shape without its
-            correlations.
+        uneven: (m, m) that of a relative error 1 of each row; by default, shape without its correlations.
         pooled: degrees of freedom of what the rows' errors share.
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
-    z = free.T @ residuals
+    z, along = free.T @ residuals, residuals[:rows]
     own, waved = np.eye(z.size) + free.T @ law @ free, free.T @ shape @ free
     scatter = scatter_chance(float(z @ np.linalg.solve(own, z)), z.size, pooled)
     score = wave_chance(z, own, waved, pooled)
-    signs = np.sign(residuals[:rows])
-    chi2 = float(residuals @ residuals)
-    along = residuals[:rows]
-    return Misfit(
-        chi2,
-        z.size,
-        scatter_chance(chi2, z.size, pooled),
-        scatter,
-        score,
-        1.0 - (1.0 - min(scatter, score)) ** 2,
-        float(along[1:] @ along[:-1]) / max(float(along @ along), TINY),
-        (1 + int(np.sum(signs[1:] != signs[:-1])), 1 + (rows - 1) / 2),
-        amplitude(z, own, free.T @ (np.diag(np.diag(shape)) if uneven is None else uneven) @ free),
-    )
+    signs, chi2 = np.sign(along), float(residuals @ residuals)
+    lag = float(along[1:] @ along[:-1]) / max(float(along @ along), TINY)
+    runs = 1 + int(np.sum(signs[1:] != signs[:-1])), 1 + (rows - 1) / 2
+    relative = amplitude(z, own, free.T @ (np.diag(np.diag(shape)) if uneven is None else uneven) @ free)
+    chances = scatter_chance(chi2, z.size, pooled), scatter, score, 1.0 - (1.0 - min(scatter, score)) ** 2
+    return Misfit(chi2, z.size, *chances, lag, runs, relative)
 
 
 def lack_of_fit(
@@ -122,9 +112,8 @@ def lack_of_fit(
 ) -> tuple[Floats, float]:
     """Estimate the relative variances (k,) of errors of these shapes (k, m, m), of which the residuals show the sum.
 
-    The prior is flat in ln d and among the shapes; a variance is the posterior's mean of d^2 times the shape's share.
-    Other arguments are those of `misfit`. The second value is ln of how many times likelier z is with such errors than
-    without any, over the prior; -inf where there is nothing to estimate.
+    The prior is flat in ln d and among the shapes. The second value is ln of how many times likelier z is with such
+    errors than without any, over the prior; -inf where there is nothing to estimate.
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     root = np.linalg.cholesky(np.eye(free.shape[1]) + free.T @ law @ free)
@@ -177,58 +166,40 @@ def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
     return LARGEST if excess(LARGEST) > 0 else float(brentq(excess, 0.0, LARGEST, xtol=1e-8))
 
 
-def own_degrees_of_freedom(freedom: Floats, pooled: float) -> Floats:
-    """Return degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d, add up."""
+def gaussianised(residuals: Floats, freedom: Floats, pooled: float = np.inf) -> Floats:
+    """Return residuals (m,), the first of which are over errors of `freedom` (n,), as normal ones of equal chance."""
+    # Of what each row's error has for itself: errors of ln variance, 2 / d, add up.
     own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
-    return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
-
-
-def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
-    """Return residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
-    size = np.abs(residuals)
-    tail = stats.t.logsf(size, freedom)
+    own = np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
+    rows, rest = np.split(residuals, [freedom.size])
+    size = np.abs(rows)
+    tail = stats.t.logsf(size, own)
     # Where Student's tail has no float left, so many degrees of freedom are behind it that it is a normal one.
-    few = np.isfinite(freedom) & np.isfinite(tail)
-    return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)
+    few = np.isfinite(own) & np.isfinite(tail)
+    return np.append(np.sign(rows) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size), rest)
 
 
 def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
-    """Return ln likelihood (m,) where chi-square has risen by `rise` (m,).
-
-    It is a normal one, or Student's in `free` coordinates where errors share a scale of `pooled` degrees of freedom.
-    """
+    """Return ln likelihood (m,) where chi-square has risen by `rise`: normal, or Student's in `free` coordinates."""
     if np.isinf(pooled):
         return -0.5 * rise
     return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
-def waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows."""
-    return np.asarray(np.exp(-0.5 * _in_lengths(r, length) ** 2), float)
+def waves(r: Floats, length: float, rough: bool = False) -> Floats:
+    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows.
 
-
-def rough_waves(r: Floats, length: float) -> Floats:
-    """Return correlations (n, n) of an error of this length along ln r with which rows are weighed; 0: independent.
-
-    With those of `waves`, which are smooth, neighbouring rows would be trusted for what they say beside the error.
+    Rows are weighed by rough ones: by smooth ones neighbours would be trusted for what they say beside the error.
     """
-    return np.asarray(np.exp(-_in_lengths(r, length)), float)
-
-
-def _in_lengths(r: Floats, length: float) -> Floats:
     distance = apart(np.log(r), np.log(r))
-    return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    far = distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+    return np.asarray(np.exp(-far if rough else -0.5 * far**2), float)
 
 
 def apart(first: Floats, other: Floats) -> Floats:
     """Return distances (k, l) of numbers, or of points in a plane or in space."""
     between = first[:, None] - other
     return np.abs(between) if first.ndim == 1 else np.linalg.norm(between, axis=-1)
-
-
-def kernel(x: Floats, length: float) -> Floats:
-    """Return correlations (k, k) between places."""
-    return matern(apart(x, x) / length)
 
 
 def matern(distance: Floats) -> Floats:
@@ -254,10 +225,7 @@ def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floa
 
 
 def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
-    """Return minus the log likelihood of `y` but for `slope` times anything, and its derivatives by `covariance`.
-
-    Patterson and Thompson's (3).
-    """
+    """Return minus Patterson and Thompson's (3) of `y` but for `slope` times anything; derivatives by `covariance`."""
     root = np.linalg.cholesky(covariance)
     lower = np.tril(dpotri(root, lower=1)[0])  # of the inverse: a third of what solving for it takes
     across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
@@ -269,13 +237,9 @@ def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Fl
 
 
 def likeliest(begin: Floats, limits: Floats, args) -> tuple[Floats, Floats, float, bool]:
-    """Return theta, the curvature of the loss there, the gain over noise alone, and whether it converged.
-
-    A length at a limit is held there: it has no curvature.
-    """
-    theta, loss, converged = minimise(
-        lambda x: _loss(x, *args), begin, (limits[:, 0], limits[:, 1]), TOLERANCE, MAX_STEPS
-    )
+    """Return theta, the curvature of the loss there (0 at a limit), the gain over noise alone, and convergence."""
+    ends = limits[:, 0], limits[:, 1]
+    theta, loss, converged = minimise(lambda x: _loss(x, *args), begin, ends, TOLERANCE, MAX_STEPS)
     around = [[_loss(theta + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
     curved = np.array([(after - before) / (2.0 * STEP) for after, before in around])
     free = (limits[:, 0] < theta) & (theta < limits[:, 1])

@@ -26,17 +26,14 @@ COVARIANCE_RANK = 8
 # A reweighted ring that rests on fewer photons than this has a standard error that is itself unknown by a tenth,
 # and that collapses where the heavy photons are missing altogether.
 FEWEST_EFFECTIVE_SAMPLES = 50.0
-# Directions of a ring below this share of its largest are rounding where few photons arrived: E has no part in them.
-FAINTEST = 1e-3
 
 
 @dataclass(frozen=True)
 class Covariance:
     """Covariance of ring energies between rings and albedos, in the closed form of a multinomial tally.
 
-    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
-             ring is one more
-    energy   (alphas, rings + 1) energies E that were counted: between rings i != j, cov(E_i(a), E_j(b)) =
+    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond last
+    energy   (alphas, rings + 1) energies E that were counted: between rings cov(E_i(a), E_j(b)) =
              -E_i(a) E_j(b) / (photons - 1)
     dropped  the largest share of any one variance that the truncation to `rank` leaves out
     """
@@ -51,10 +48,9 @@ class Covariance:
         return self.factor.shape[-1]
 
     def sandwich(self, weights: Floats) -> Floats:
-        """Covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
+        """Return the covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
 
-        Rings at the end that only one of the two knows count for nothing: a fit to trimmed rings sees no light beyond,
-        and a tally without an overflow has none.
+        Rings at the end that only one of the two knows count for nothing.
         """
         rings = min(weights.shape[-1], len(self.factor))
         within = np.einsum("pai,iak->pik", weights[..., :rings], self.factor[:rings])
@@ -63,39 +59,19 @@ class Covariance:
         between = np.outer(total, total) - ring @ ring.T
         return np.einsum("pik,qik->pq", within, within) - between / max(self.photons - 1, 1)
 
-    def draws(self, number: int, seed: int) -> Floats:
-        """Noise of ring energies (number, alphas, rings + 1) as another run's photons would have it, taken for normal.
-
-        Photons are shared out: what one ring gets, another lacks. So noise that is independent between rings, as of
-        Poisson counts, is drawn first, and then freed of the fluctuation t of its total [standard deviations]. Within
-        the directions L that each ring keeps, E = sqrt(photons - 1) L y: v of covariance 1 + y y^T, less t y.
-        """
-        generator = np.random.default_rng(seed)
-        root = self.energy.T[:, :, None] / np.sqrt(max(self.photons - 1, 1))
-        unit = np.linalg.norm(self.factor, axis=2, keepdims=True)
-        unit = np.where(unit > 0, unit, 1.0)
-        y = np.einsum("ika,iao->ik", np.linalg.pinv(self.factor / unit, rcond=FAINTEST), root / unit)
-        size = 1.0 + np.sum(y**2, axis=1)
-        rest = np.sqrt(max(1.0 - float(np.sum(1.0 - 1.0 / size)), 0.0))  # photons that no ring saw
-        v = generator.standard_normal((number, *y.shape)) + generator.standard_normal((number, len(y), 1)) * y
-        total = np.einsum("rik,ik->r", v, y / size[:, None]) + rest * generator.standard_normal(number)
-        return np.einsum("iak,rik->rai", self.factor, v - total[:, None, None] * y, optimize=True)
-
 
 @dataclass(frozen=True)
 class Profiles:
     """Reflectance profiles in units of the transport mean free path (l* = 1).
 
-    alpha              (m,) reduced single-scattering albedos [-]
-    r_edges            (n + 1,) ring edges from 0 [mfp]
+    alpha, r_edges     (m,) reduced single-scattering albedos [-], (n + 1,) ring edges from 0 [mfp]
     energy             (m, n) energy reflected through each ring, per unit incident [-]: the integral of 2 pi r R_d
     standard_error     (m, n) of `energy`; zero where the truth has no noise
     effective_samples  (m, n) photons that the estimate really rests on; infinite where it has no noise
     beyond             (m,) energy reflected beyond the last edge [-]
     covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
-    settings           of each profile (m,), where those of several indices and g are joined; none where all are of
-                       `setting`
+    settings           of each profile (m,), where several are joined; none where all are of `setting`
     """
 
     alpha: Floats
@@ -114,12 +90,10 @@ class Profiles:
     def joined(cls, parts: Sequence[Profiles], setting: Setting) -> Profiles:
         """Return profiles without noise of several indices and g, each of the same albedos and rings.
 
-        The illumination is that of `setting`, to which the record of a fit will belong.
+        `setting` is the one to which the record of a fit will belong.
         """
-        first = parts[0]
-        if not all(
-            np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
-        ):
+        first, same = parts[0], np.array_equal
+        if not all(same(first.alpha, one.alpha) and same(first.r_edges, one.r_edges) for one in parts):
             raise InputError("profiles of several settings must have the same albedos and rings, got others")
         rows: dict[str, Any] = {
             name: np.concatenate([getattr(one, name) for one in parts])
@@ -146,18 +120,9 @@ class Profiles:
             factor, dropped = orders.covariance_factor(albedos, rank, overflow=True)
             counted = np.column_stack([value, beyond]) - orders.once(albedos)
             covariance = Covariance(factor, counted, orders.photons, dropped)
-        return cls(
-            albedos,
-            orders.grid.r_edges,
-            value,
-            np.asarray(energy.standard_error),
-            np.asarray(energy.effective_samples),
-            beyond,
-            "orders",
-            orders.setting,
-            orders.photons,
-            covariance,
-        )
+        noise = np.asarray(energy.standard_error), np.asarray(energy.effective_samples)
+        rings, setting = orders.grid.r_edges, orders.setting
+        return cls(albedos, rings, value, *noise, beyond, "orders", setting, orders.photons, covariance)
 
     @classmethod
     def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:
@@ -232,10 +197,9 @@ def walk(last: float) -> Floats:
 
 
 def trimmed_radius(r: Floats, quantity: Floats, epsilon: float = 0.005) -> float:
-    """r'_max of (6): the first r of the walk where `quantity` (n,) at ring centres `r` is at most epsilon its largest.
+    """Return r'_max of (6): the first r of the walk where `quantity` (n,) at centres `r` is <= epsilon its largest.
 
-    The paper compares with the value at 0; R_d and r R_d are largest in the first rings, and r R_d is zero at r = 0
-    itself, so the largest value stands for it. Returns the last ring's centre where the walk never gets that low.
+    The paper compares with the value at 0, which r R_d has not. Where the walk never gets that low it is the last r.
     """
     steps = walk(float(r[-1]))
     steps = steps[steps <= r[-1]]

@@ -8,23 +8,19 @@ leaves (2 pi r R_d / A). Then, xi uniform:
     error of the inverse remains: even light comes out right if f is the law's too, an edge does not;
     Var[w] is the chi-square divergence of f from pdf.
 
-A clip, r = min(g, r_max), draws r_max itself with a finite chance: an atom. No light leaves from a circle, so these
-samples weigh nothing, and the light beyond r_max is lost.
-
-A sampler may draw one part of the light below some xi and another above it, where radii begin at 0 anew: then two xi
-have one radius, and the error of the inversion is taken to the nearer.
+A clip, r = min(g, r_max), draws r_max itself with a finite chance: an atom, whose samples weigh nothing. A sampler may
+draw one part of the light below some xi and another above it, where radii begin at 0 anew: then two xi have one radius.
 
 All of it is integrated over xi by Gauss's rule between the places where r(xi) turns, stops, begins anew or crosses a
-radius at which the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to
-1 - 2^-24: an exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a
-renderer meets.
+radius at which the integrand jumps. xi goes up to 1 - 2^-24, as single-precision generators draw it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import NamedTuple, Protocol
+from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -48,6 +44,7 @@ BESIDE = np.geomspace(1e-9, 0.1, 9)  # of t, on either side of a jump: radii go 
 ZOOM, ZOOMS = 65, 8  # a bracket shrinks by 32 each time: to rounding
 BATCH = 512  # calls have one shape, so that a compiled sampler compiles once
 LAST_SHARE = 0.999
+Radius = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,6 @@ class SamplerQuality:
 
     inversion_error  max over xi in [0, 0.999] of |cdf(sample(xi)) - xi|, the target's cdf [-]; where one radius has two
                      xi, `Sampler.undone` in place of the law's cdf
-    missing          1 less the integral of pdf less the atom [-]: 0 if pdf is the sampler's
     atom             share of the samples at radii that are drawn with a finite chance [-]
     bias             relative error of even light (m,), and of light beyond a straight edge, `edge_bias`, with pdf
     bias_by_law_pdf  the same with the law's density in place of pdf; infinite where that is 0 and samples fall
@@ -65,23 +61,12 @@ class SamplerQuality:
 
     alpha: Floats
     inversion_error: Floats
-    missing: Floats
     atom: Floats
     bias: Floats
     edge_bias: Floats
     bias_by_law_pdf: Floats
     edge_bias_by_law_pdf: Floats
     variance: Floats
-
-
-class Target(Protocol):
-    """The light that is to be gathered; x = r/l, alpha and l the medium's own, not its reduced ones."""
-
-    def density(self, x: Floats, alpha: float) -> Floats:
-        """2 pi x R_d / A [1/mfp]."""
-
-    def cdf(self, x: Floats, alpha: float) -> Floats:
-        """Share of the light within x [-]."""
 
 
 @dataclass(frozen=True)
@@ -92,10 +77,10 @@ class LawTarget:
 
     def density(self, x: Floats, alpha: float) -> Floats:
         """Return the slope of the law's cdf: whatever the law scales its profile to."""
-        return _called(_slope, self.law, x, alpha)
+        return _called("slope", self.law, x, alpha)
 
     def cdf(self, x: Floats, alpha: float) -> Floats:
-        return _called(_share, self.law, x, alpha)
+        return _called("cdf", self.law, x, alpha)
 
 
 @dataclass(frozen=True)
@@ -112,14 +97,18 @@ class ExactTarget:
         return np.asarray(exact.cdf(x, alpha, setting=self.setting))
 
 
+# Light that is to be gathered: `density` 2 pi x R_d / A [1/mfp] and `cdf` its share within x [-], at x = r/l; alpha and
+# l are the medium's own, not its reduced ones.
+Target = LawTarget | ExactTarget
+
+
 def sampler_quality(
     sampler: Sampler, alpha: ArrayLike, target: Target | None = None, edge: float = 1.0
 ) -> SamplerQuality:
-    """Measure a sampler at each albedo in `alpha` (m,), all in (0, 1].
+    """Measure a sampler at each albedo in `alpha` (m,), all in (0, 1]; else InputError.
 
     target  the light it gathers, by default its own law's
     edge    distance of the straight edge beyond which there is light [mfp], > 0
-    Raises InputError.
     """
     albedos = np.atleast_1d(np.asarray(alpha, float))
     if not np.all((albedos > 0) & (albedos <= 1)):
@@ -147,47 +136,29 @@ def edge_light(target: Target, alpha: float, edge: float) -> float:
     return float(0.25 * np.sum(weights * (1.0 - target.cdf(edge / np.cos(angle), alpha))))
 
 
-class _Map(NamedTuple):
-    """Pieces of a sampler's map t -> x = r/l: `breaks` in t, `levels` in x where it turns, ends or stops.
-
-    flats  (low, high, x) of the stretches where x stands still
-    """
-
-    breaks: Floats
-    levels: Floats
-    flats: list[tuple[float, float, float]]
-
-
 def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str, float]:
     def radius(t: Floats) -> Floats:
-        return _called(_sample, sampler, -np.expm1(-t), alpha)
-
-    def own(x: Floats) -> Floats:
-        return _called(_pdf, sampler, x, alpha)
+        return _called("sample", sampler, -np.expm1(-t), alpha)
 
     with jax.enable_x64(True):
         jump = float(sampler.jump(jnp.asarray(sampler.law.similar(alpha, 1.0)[0])))
-    shape = _map(radius, edge, -np.log1p(-jump) if jump < 1.0 else np.inf)
-    t, dt = _rule(shape.breaks)
+    breaks, flats = _map(radius, edge, -np.log1p(-jump) if jump < 1.0 else np.inf)
+    t, dt = _rule(breaks)
     share = np.exp(-t) * dt
     x = radius(t)
     light = target.density(x, alpha)
     lit = lit_beyond_edge(x, edge)
-    moving = ~np.any([np.zeros(t.size, bool), *((t > low) & (t < high) for low, high, _ in shape.flats)], axis=0)
-    weight = np.where(moving, _ratio(light, own(x)), 0.0)
+    moving = ~np.any([np.zeros(t.size, bool), *((t > low) & (t < high) for low, high, _ in flats)], axis=0)
+    weight = np.where(moving, _ratio(light, _called("pdf", sampler, x, alpha)), 0.0)
     by_law = np.where(moving, _ratio(light, LawTarget(sampler.law).density(x, alpha)), 0.0)
-    lost = _at_atoms(sampler, alpha, target, shape.flats, edge)
-    atom = float(sum(_mass(low, high) for low, high, _ in shape.flats))
+    lost = _at_atoms(sampler, alpha, target, flats, edge)
     beyond = edge_light(target, alpha, edge)
     mean = float(share @ weight)
-    # The density's only jumps and infinities are at the levels.
-    fine, dx = _rule(np.unique(np.concatenate([shape.levels, shape.levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
     xi = np.linspace(0.0, LAST_SHARE, BATCH)
     return {
         "alpha": alpha,
         "inversion_error": float(np.max(np.abs(drawn_by(sampler, xi, alpha, target) - xi))),
-        "missing": 1.0 - atom - float(dx @ own(fine)),
-        "atom": atom,
+        "atom": float(sum(_mass(low, high) for low, high, _ in flats)),
         "bias": mean - 1.0,
         "edge_bias": float(share @ (weight * lit)) / beyond - 1.0,
         "bias_by_law_pdf": float(share @ by_law) + lost[0] - 1.0,
@@ -201,7 +172,7 @@ def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floa
 
     Where a sampler draws a radius twice, it is the nearer of its own two, moved by the difference of the cdfs.
     """
-    x = _called(_sample, sampler, xi, alpha)
+    x = _called("sample", sampler, xi, alpha)
     with jax.enable_x64(True):
         own = np.asarray(sampler.undone(x, xi, alpha))
     if isinstance(target, LawTarget) and target.law is sampler.law:
@@ -212,13 +183,10 @@ def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floa
 def _at_atoms(
     sampler: Sampler, alpha: float, target: Target, flats: list[tuple[float, float, float]], edge: float
 ) -> tuple[float, float]:
-    """Return what samples at atoms add to the means of f / law's density, of even light and light beyond the edge.
-
-    Densities are those just outside: where a law ends in a zero, rounding decides whether it is one.
-    """
+    """Return what samples at atoms add to the means of f / law's density, of even light and light beyond the edge."""
     total, beyond = 0.0, 0.0
     for low, high, x in flats:
-        outside = np.array([x * (1.0 + 1e-12)])
+        outside = np.array([x * (1.0 + 1e-12)])  # where a law ends in a zero, rounding decides whether it is one
         ratio = 1.0  # of the law's light to the law's density, even where both end
         if not (isinstance(target, LawTarget) and target.law is sampler.law):
             ratio = float(_ratio(target.density(outside, alpha), LawTarget(sampler.law).density(outside, alpha))[0])
@@ -238,71 +206,59 @@ def _ratio(above: Floats, below: Floats) -> Floats:
         return np.where(above > 0, above / np.maximum(below, 0.0), 0.0)
 
 
-def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) -> _Map:
-    """`jump`: t at which radii begin at 0 anew."""
+def _map(radius: Radius, edge: float, jump: float) -> tuple[Floats, list[tuple[float, float, float]]]:
+    """Return places in t that divide a sampler's map t -> x = r/l, and (low, high, x) where x stands still.
+
+    jump  t at which radii begin at 0 anew
+    """
     beside = np.concatenate([[jump], jump * (1.0 - BESIDE), jump * (1.0 + BESIDE)]) if jump < LAST else np.array([])
-    beside = np.sort(beside[beside < LAST])
-    last: Floats | list[float] = radius(beside[beside < jump][-1:]) if beside.size else []
     x = radius(SCAN)
-    still = np.diff(x) == 0
-    flats = _flats(radius, x, still)
     step = np.sign(np.diff(x))
+    flats = _flats(radius, x, step == 0)
     step[(SCAN[:-1] <= jump) & (jump <= SCAN[1:])] = 0.0
-    turns = np.flatnonzero(step[1:] * step[:-1] < 0) + 1
-    places = [_turn(radius, SCAN[i - 1], SCAN[i + 1], float(step[i - 1])) for i in turns]
+    turns = np.flatnonzero(step[1:] * step[:-1] < 0)
+    places = [0.5 * sum(_zoomed(radius, SCAN[i], SCAN[i + 2], partial(_largest, step[i]))) for i in turns]
     extremes = [float(radius(np.array([place]))[0]) for place in places]
-    levels = [float(x[0]), float(x[-1]), *extremes, *last, *(flat[2] for flat in flats)]
     crossings = [
-        _crossing(radius, SCAN[i], SCAN[i + 1], level)
+        0.5 * sum(_zoomed(radius, SCAN[i], SCAN[i + 1], partial(_passing, np.greater, level)))
         for level in {*extremes, edge}
         for i in np.flatnonzero(np.diff(np.sign(x - level)) != 0)
     ]
     ends = [end for low, high, _ in flats for end in (low, high)]
-    breaks = np.unique(np.concatenate([SPLITS, beside, places, crossings, ends]))
-    return _Map(breaks, np.unique([0.0, *levels]), flats)
+    return np.unique(np.concatenate([SPLITS, beside[beside < LAST], places, crossings, ends])), flats
 
 
-def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> list[tuple[float, float, float]]:
+def _flats(radius: Radius, x: Floats, still: NDArray[np.bool_]) -> list[tuple[float, float, float]]:
     """Return runs of equal radii on the scan, their ends found to rounding."""
     edges = np.diff(np.concatenate([[0], still.astype(int), [0]]))
     flats = []
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        value = float(x[first])
-        low, high = float(SCAN[first]), float(SCAN[last])
+        low, high, value = float(SCAN[first]), float(SCAN[last]), float(x[first])
         if first > 0:
-            low = _boundary(radius, SCAN[first - 1], low, value)
+            _, low = _zoomed(radius, SCAN[first - 1], low, partial(_passing, np.equal, value))
         if last < SCAN.size - 1:
-            high = _boundary(radius, SCAN[last + 1], high, value)
+            _, high = _zoomed(radius, SCAN[last + 1], high, partial(_passing, np.equal, value))
         flats.append((low, high, value))
     return flats
 
 
-def _boundary(radius: Callable[[Floats], Floats], outside: float, inside: float, value: float) -> float:
-    """Find where between the two the radius begins to be `value`."""
-    for _ in range(ZOOMS):
-        t = np.linspace(outside, inside, ZOOM)
-        first = max(int(np.argmax(radius(t) == value)), 1)
-        outside, inside = float(t[first - 1]), float(t[first])
-    return inside
-
-
-def _turn(radius: Callable[[Floats], Floats], low: float, high: float, rising: float) -> float:
-    """Find where between the two the radius is largest, if it rises first, or smallest."""
+def _zoomed(radius: Radius, low: float, high: float, pick: Callable[[Floats], tuple[int, int]]) -> tuple[float, float]:
+    """Narrow a bracket in t to rounding: `pick` names the ends of the next one, of ZOOM radii across it."""
     for _ in range(ZOOMS):
         t = np.linspace(low, high, ZOOM)
-        best = int(np.argmax(rising * radius(t)))
-        low, high = float(t[max(best - 1, 0)]), float(t[min(best + 1, ZOOM - 1)])
-    return 0.5 * (low + high)
+        low, high = (float(t[at]) for at in pick(radius(t)))
+    return low, high
 
 
-def _crossing(radius: Callable[[Floats], Floats], low: float, high: float, level: float) -> float:
-    """Find where between the two the radius passes `level`."""
-    for _ in range(ZOOMS):
-        t = np.linspace(low, high, ZOOM)
-        above = radius(t) > level
-        first = int(np.argmax(above != above[0])) or ZOOM - 1
-        low, high = float(t[first - 1]), float(t[first])
-    return 0.5 * (low + high)
+def _passing(compare: np.ufunc, level: float, x: Floats) -> tuple[int, int]:
+    true = compare(x, level)
+    first = int(np.argmax(true != true[0])) or ZOOM - 1
+    return first - 1, first
+
+
+def _largest(rising: float, x: Floats) -> tuple[int, int]:
+    best = int(np.argmax(rising * x))
+    return max(best - 1, 0), min(best + 1, ZOOM - 1)
 
 
 def _rule(breaks: Floats) -> tuple[Floats, Floats]:
@@ -315,30 +271,17 @@ def _rule(breaks: Floats) -> tuple[Floats, Floats]:
     return t.ravel(), dt.ravel()
 
 
-def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
-    """Call a compiled function on every value, BATCH of them at a time."""
+def _called(name: str, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
+    """Call a method, or "slope" of a cdf, compiled, on every value, BATCH of them at a time."""
     padded = np.pad(values, (0, -values.size % BATCH), mode="edge").reshape(-1, BATCH)
     with jax.enable_x64(True):
         owner, at = jax.tree.map(jnp.asarray, (owner, alpha))  # traced, so that other constants compile nothing
-        parts = [np.asarray(function(owner, jnp.asarray(part), at)) for part in padded]
+        parts = [np.asarray(_method(owner, jnp.asarray(part), at, name)) for part in padded]
     return np.concatenate(parts)[: values.size]
 
 
 @filter_jit
-def _sample(sampler: Sampler, xi: Array, alpha: Array) -> Array:
-    return sampler.sample(xi, alpha)
-
-
-@filter_jit
-def _pdf(sampler: Sampler, x: Array, alpha: Array) -> Array:
-    return sampler.pdf(x, alpha)
-
-
-@filter_jit
-def _share(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return law.cdf(x, alpha)
-
-
-@filter_jit
-def _slope(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return jax.jvp(lambda y: law.cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]
+def _method(owner: Any, values: Array, alpha: Array, name: str) -> Array:
+    if name == "slope":
+        return jax.jvp(lambda x: owner.cdf(x, alpha), (values,), (jnp.ones_like(values),))[1]
+    return getattr(owner, name)(values, alpha)

@@ -3,9 +3,7 @@
 Residuals and Jacobian are evaluated here, by one small compiled program per model and shape of data, or by any numpy
 function. Levenberg and Marquardt's method needs only their triangular factor: the QR factor of the matrix (J, r) has
 the same products J'J, J'r and r'r. `optimistix.LevenbergMarquardt` therefore steps on a problem of p + 1 rows, through
-its interface for interactive solves. That step compiles once per size of p, whatever the model and the data.
-
-A failure is a result, not an exception: `Solution.result` is "converged" or states what happened and what to try.
+its interface for interactive solves, which compiles once per size of p, whatever the model and the data.
 """
 
 from __future__ import annotations
@@ -66,8 +64,7 @@ class Solution:
     """End of a least-squares search.
 
     parameters  (p,) the minimiser, in the caller's units
-    residuals   (n,) there; jacobian (n, p) d residual / d parameter
-    steps       number of points at which the residuals were evaluated
+    residuals   (n,) there; jacobian (n, p) d residual / d parameter; steps how often these were evaluated
     result      "converged", or what failed and what to try next
     at_bound    (p,) True for each parameter that a bound holds
     others      other minima that a search from several starts found, the lowest first
@@ -114,10 +111,10 @@ def _squares(values: Floats) -> float:
 
 
 def covariance(jacobian: Floats) -> Floats:
-    """Return (J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
+    """Return (J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors; infinite where one is not finite.
 
-    The singular values of J itself, columns of unit length, give it: products would lose half of the digits. Directions
-    beyond rounding get the error of rounding, which is large but finite. Infinite where derivatives are not finite.
+    By singular values of J, columns of unit length: products would lose half of the digits. Directions beyond rounding
+    get the error of rounding.
     """
     if not np.all(np.isfinite(jacobian)):
         return np.full((jacobian.shape[1],) * 2, np.inf)
@@ -143,10 +140,9 @@ def least_squares(
             of tables (m, k). XLA would compute what parts share for each row anew if a program joined them.
         start: (p,) parameters to start from, in the caller's units.
         data: any pytree of arrays.
-        bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
-        worth: share of the sum of squares by which a step must promise to reduce it for the search to go on [-].
-        scale: (p,) size of each parameter, in its unit. By default the size with which its column of the Jacobian at
-            the start has length 1.
+        bounds: as of `solve`, and so are worth and scale.
+        worth: share of the sum of squares that a step must promise.
+        scale: (p,) size of each parameter.
     """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
@@ -180,12 +176,7 @@ def solve_batch(
 
 
 def best_apart(places: NDArray[np.int_], costs: Floats) -> list[int]:
-    """Return the rows of a coarse search where descents start: the cheapest, no two of them neighbours.
-
-    Args:
-        places: (m, 2) whole numbers, where each row lies in the search's grid.
-        costs: (m,) sum of squares of each.
-    """
+    """Return the rows of a coarse search where descents start: the cheapest, no two at neighbouring places (m, 2)."""
     chosen: list[int] = []
     for at in np.argsort(costs):
         if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
@@ -214,14 +205,13 @@ def _linearise(residual, parameters, data):
 
 
 def _joined(parts: Array | tuple[Array, ...], axis: int) -> Floats:
-    """Parts of residuals, or of their Jacobian, as one array."""
     return np.concatenate([np.asarray(part) for part in parts], axis) if isinstance(parts, tuple) else np.asarray(parts)
 
 
 def differences(
     residual: Callable[[Floats], Floats], step: float | Floats, highest: Floats | float = np.inf
 ) -> Linearised:
-    """Residuals and their Jacobian by forward differences of `step`, backward where that passes `highest`."""
+    """Return residuals and their Jacobian by forward differences of `step`, backward where that passes `highest`."""
 
     def at(x: Floats) -> tuple[Floats, Floats]:
         here, ways = residual(x), np.broadcast_to(np.where(x + step > highest, -step, step), x.shape)
@@ -309,7 +299,7 @@ def solve(
 
 
 def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
-    """Reduction of the sum of squares that the linear model promises for a step."""
+    """Return the reduction of the sum of squares that the linear model promises for a step."""
     _, values, jacobian = best
     change = jacobian @ step
     return -float(change @ (2.0 * values + change))
@@ -340,7 +330,7 @@ def _scaled(numbers: Floats, scale: Floats | float) -> Floats:
 
 
 def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:
-    """Jacobian without what would move a parameter beyond its bound (Bertsekas, SIAM J. Control Optim. 20, 221)."""
+    """Return the Jacobian without what would move parameters beyond bounds (Bertsekas, SIAM J. Control Optim. 20)."""
     return np.where(_active(values, jacobian, y, ends), 0.0, jacobian)
 
 
@@ -357,14 +347,10 @@ class _Tangent(eqx.Module):
 
 @lru_cache
 def _step(solver: Any, size: int, rows: tuple[int, ...]) -> tuple[Callable[..., Any], list[Array]]:
-    """Compiled step of a solver for so many parameters and values, and the arrays of its state before the first one.
-
-    The step accepts or takes back the point that the state proposed, and proposes the next one.
-    """
+    """Compile the step of a solver, which accepts or takes back a point and proposes another; with its first state."""
     y, value = jnp.zeros(size), jnp.zeros(rows)
-    blank = solver.init(
-        _Tangent(y, value, jnp.zeros((*rows, size))), y, None, OPTIONS, jax.eval_shape(lambda: value), None, NO_TAGS
-    )
+    tangent = _Tangent(y, value, jnp.zeros((*rows, size)))
+    blank = solver.init(tangent, y, None, OPTIONS, jax.eval_shape(lambda: value), None, NO_TAGS)
     leaves, tree = jax.tree.flatten(blank)
 
     @jit
@@ -422,7 +408,7 @@ def unit_columns(columns: Floats) -> Floats:
 def minimise(
     at: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Bounds, tolerance: float, most: int
 ) -> tuple[Floats, float, bool]:
-    """Minimise a function by `optimistix.BFGS`, between bounds by x = middle + half sin y.
+    """Minimise a function by `optimistix.BFGS`, between finite bounds by x = middle + half sin y.
 
     Args:
         at: value and gradient (p,) for (p,).
@@ -445,9 +431,8 @@ def minimise(
     unit = max(float(np.max(np.abs(last[2]))), 1.0)  # the first step is the gradient: of length 1 at most
     state = None
     for _ in range(most):
-        here, aimed, _, state = _advanced(
-            MINIMISER, last[0], np.asarray(last[1] / unit), last[2] / unit, state, best[0]
-        )
+        value = np.asarray(last[1] / unit)
+        here, aimed, _, state = _advanced(MINIMISER, last[0], value, last[2] / unit, state, best[0])
         best = last if np.array_equal(here, last[0]) else best
         if converged := bool(np.max(np.abs(best[2])) <= tolerance):
             break

@@ -26,10 +26,10 @@ CONSTANTS_OF = {"a": ("a1", "a2", "a3"), "b": ("b0", "b1", "b2", "b3", "b4"), "c
 
 @dataclass(frozen=True)
 class PerAlbedo:
-    """(7) fitted at each albedo of one mean free path, coefficients in units of the mfp.
+    """(7) fitted at each albedo (m,) of one mean free path, coefficients in units of the mfp.
 
-    alpha (m,); mfp [length]; values (m, 3) of a [1/mfp], b [-], c [mfp]; covariance (3 m, 3 m) from photon noise, or
-    None; r_trim (m,) [mfp]; results (m,) what each fit said; rms (m,) of its residuals
+    values (m, 3) of a [1/mfp], b [-], c [mfp]; covariance (3 m, 3 m) from photon noise, or None; r_trim (m,) [mfp];
+    results (m,) what each fit said; rms (m,) of its residuals
     """
 
     alpha: Floats
@@ -58,10 +58,7 @@ class CoefficientLaw:
 
 
 def trimmed(profiles: Profiles, what: str, epsilon: float, mfp: float = 1.0) -> tuple[NDArray[np.bool_], Floats]:
-    """Rings (m, n) that the trimming keeps, and the radius (m,) of the cut [mfp]; `what` is "R_d", "r R_d" or "none".
-
-    The strides of (6) are lengths: in a medium of mean free path `mfp` they are other numbers of it.
-    """
+    """Return rings (m, n) that the trimming keeps, radii (m,) of the cut [mfp]; `what` is "R_d", "r R_d" or "none"."""
     r = profiles.r
     if what == "none":
         return np.ones_like(profiles.energy, bool), np.full(profiles.alpha.size, r[-1])
@@ -104,10 +101,7 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
 
 
 def length_exponents(points: tuple[PerAlbedo, ...]) -> dict[str, float]:
-    """Return the powers of l in a, b and c, by a straight line through ln|coefficient| over ln l.
-
-    Similarity says -1, 0, 1; the strides of (6), which stay what they are, move them a little.
-    """
+    """Return the powers of l in a, b and c, by a straight line through ln|coefficient| over ln l: about -1, 0, 1."""
     ln_l = np.log([p.mfp for p in points])
     in_length = np.stack([p.values * np.array([1.0 / p.mfp, 1.0, p.mfp]) for p in points])
     slopes = np.polyfit(ln_l, np.log(np.abs(in_length)).reshape(len(points), -1), 1)[0].reshape(-1, 3)
@@ -152,8 +146,7 @@ def _rational_derivatives(parameters, radii, data, used):
         return 0.5 * jnp.sum(_rational(p, (r, d, u)) ** 2)
 
     hessian = jax.vmap(jax.hessian(cost))(parameters, data, radii, used)
-    mixed = jax.vmap(jax.jacfwd(jax.grad(cost, argnums=1)))(parameters, data, radii, used)
-    return hessian, mixed
+    return hessian, jax.vmap(jax.jacfwd(jax.grad(cost, argnums=1)))(parameters, data, radii, used)
 
 
 @filter_jit

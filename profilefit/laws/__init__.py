@@ -11,28 +11,25 @@ PROFILES = {
     "liang": "liang.Liang",
     "burley": "burley.Burley",
     "burley_diffuse_mfp": "burley.BurleyDiffuseMfp",
-    "dipole": "dipole.Dipole",
-    "better_dipole": "better_dipole.BetterDipole",
-    "beam_diffusion": "beam_diffusion.BeamDiffusion",
+    "dipole": "diffusion.Dipole",
+    "better_dipole": "diffusion.BetterDipole",
+    "beam_diffusion": "diffusion.BeamDiffusion",
     "gaussians": "gaussians.Gaussians",
     "hazard": "hazard.Hazard",
     "quantile": "quantile.Quantile",
 }
 MAPS = {
-    "liang": "liang_albedo.LiangAlbedo",
+    "liang": "printed_maps.LiangAlbedo",
     "rational": "rational.Rational",
-    "van_de_hulst": "van_de_hulst.VanDeHulst",
-    "chiang": "chiang.Chiang",
+    "van_de_hulst": "printed_maps.VanDeHulst",
+    "chiang": "printed_maps.Chiang",
 }
 # Those that have other forms of the same name, where the surface refracts and where scattering has a direction.
 REFRACTING = {
-    "hazard.Hazard": "refracting_hazard.RefractingHazard",
+    "hazard.Hazard": "two_parts.RefractingHazard",
     "rational.Rational": "refracting_rational.RefractingRational",
 }
-FORWARD = {
-    "hazard.Hazard": "forward_hazard.ForwardHazard",
-    "rational.Rational": "forward_rational.ForwardRational",
-}
+FORWARD = {"hazard.Hazard": "two_parts.ForwardHazard", "rational.Rational": "refracting_rational.ForwardRational"}
 
 
 def profile_classes() -> "dict[str, Any]":

@@ -15,8 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.entry import NEAR_CLAMPS, RATIONAL, Entry, Range, Text
+from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 
@@ -31,6 +30,56 @@ FARTHEST = 3000.0
 ENDS = ("normalized_diffusion", "wrappers")  # of both texts
 
 
+class BurleySampler(Sampler):
+    """x = 3 ln((1 + G^{-1/3} + G^{1/3}) / (4 u)) / q,  u = 1 - xi,  G = 1 + 4 u (2 u + sqrt(1 + 4 u^2))   (Golubev)."""
+
+    law: NormalizedDiffusion
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        u = 1.0 - xi
+        root = jnp.cbrt(1.0 + 4.0 * u * (2.0 * u + jnp.sqrt(1.0 + 4.0 * u**2)))
+        t = 3.0 * jnp.log((1.0 + 1.0 / root + root) / (4.0 * u))
+        return t / self.law.falloff_rate(alpha)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        rate = self.law.falloff_rate(alpha)
+        return 0.25 * rate * (jnp.exp(-rate * x) + jnp.exp(-rate * x / 3.0))
+
+
+class BurleyApproximateSampler(Sampler):
+    """x = ((2 - c) xi - 2) ln(1 - xi) / q, close to the inverse of the cdf   (Xie et al. 2020).
+
+    With tau = -ln(1 - xi) and k = c - 2 this is q x = (2 + k (1 - e^{-tau})) tau, which rises with tau; its density is
+    d xi / dx = q e^{-tau} / (2 + k (1 - e^{-tau} + tau e^{-tau})). It is not the law's: at the source q/2 as the law's,
+    far away q e^{-q x / c} / c against q e^{-q x / 3} / 4, so that an estimator of this law has weights that grow.
+
+    c  Xie et al. 2.5715 [-]
+    """
+
+    law: NormalizedDiffusion
+    c: float = eqx.field(static=True)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return ((2.0 - self.c) * xi - 2.0) * jnp.log1p(-xi) / self.law.falloff_rate(alpha)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        rate = self.law.falloff_rate(alpha)
+        tau = self._tau(rate * x)
+        return rate * jnp.exp(-tau) / self._slope(tau)
+
+    def _slope(self, tau: Array) -> Array:
+        """d(q x) / d tau."""
+        return 2.0 + (self.c - 2.0) * (1.0 - (1.0 - tau) * jnp.exp(-tau))
+
+    def _tau(self, target: Array) -> Array:
+        """Return tau with (2 + k (1 - e^{-tau})) tau = target."""
+        target = jnp.minimum(target, FARTHEST)
+        tau = target / self.c
+        for _ in range(NEWTON_STEPS):
+            tau = tau - ((self.c - (self.c - 2.0) * jnp.exp(-tau)) * tau - target) / self._slope(tau)
+        return tau
+
+
 class NormalizedDiffusion(ProfileLaw):
     """R_d = A (e^{-q x} + e^{-q x / 3}) q / (8 pi x),  cdf = 1 - e^{-q x}/4 - 3 e^{-q x / 3}/4,  x = r/l.
 
@@ -38,6 +87,7 @@ class NormalizedDiffusion(ProfileLaw):
     """
 
     albedo: eqx.AbstractVar[Normalisation]
+    sampler_class = BurleySampler
 
     @abc.abstractmethod
     def falloff_rate(self, alpha) -> Array:
@@ -59,11 +109,6 @@ class NormalizedDiffusion(ProfileLaw):
 
     def source_strength(self, alpha: Array) -> Array:
         return 0.5 * self.albedo.reflectance(alpha) * self.falloff_rate(alpha)
-
-    @property
-    def sampler(self) -> BurleySampler:
-        """The exact inverse of the cdf."""
-        return BurleySampler(self)
 
     @property
     def samplers(self) -> dict[str, Sampler]:
@@ -149,53 +194,3 @@ class BurleyDiffuseMfp(NormalizedDiffusion):
         s = self.scale(self.albedo.reflectance(alpha))
         # Kept off zero, so that a share at infinity stays 1 where the law is infinitely wide.
         return jnp.maximum(s * jnp.sqrt(3.0 * (1.0 - alpha) / (2.0 - alpha)), jnp.finfo(s.dtype).tiny)
-
-
-class BurleySampler(Sampler):
-    """x = 3 ln((1 + G^{-1/3} + G^{1/3}) / (4 u)) / q,  u = 1 - xi,  G = 1 + 4 u (2 u + sqrt(1 + 4 u^2))   (Golubev)."""
-
-    law: NormalizedDiffusion
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        u = 1.0 - xi
-        root = jnp.cbrt(1.0 + 4.0 * u * (2.0 * u + jnp.sqrt(1.0 + 4.0 * u**2)))
-        t = 3.0 * jnp.log((1.0 + 1.0 / root + root) / (4.0 * u))
-        return t / self.law.falloff_rate(alpha)
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        rate = self.law.falloff_rate(alpha)
-        return 0.25 * rate * (jnp.exp(-rate * x) + jnp.exp(-rate * x / 3.0))
-
-
-class BurleyApproximateSampler(Sampler):
-    """x = ((2 - c) xi - 2) ln(1 - xi) / q, close to the inverse of the cdf   (Xie et al. 2020).
-
-    With tau = -ln(1 - xi) and k = c - 2 this is q x = (2 + k (1 - e^{-tau})) tau, which rises with tau; its density is
-    d xi / dx = q e^{-tau} / (2 + k (1 - e^{-tau} + tau e^{-tau})). It is not the law's: at the source q/2 as the law's,
-    far away q e^{-q x / c} / c against q e^{-q x / 3} / 4, so that an estimator of this law has weights that grow.
-
-    c  Xie et al. 2.5715 [-]
-    """
-
-    law: NormalizedDiffusion
-    c: float = eqx.field(static=True)
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        return ((2.0 - self.c) * xi - 2.0) * jnp.log1p(-xi) / self.law.falloff_rate(alpha)
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        rate = self.law.falloff_rate(alpha)
-        tau = self._tau(rate * x)
-        return rate * jnp.exp(-tau) / self._slope(tau)
-
-    def _slope(self, tau: Array) -> Array:
-        """d(q x) / d tau."""
-        return 2.0 + (self.c - 2.0) * (1.0 - (1.0 - tau) * jnp.exp(-tau))
-
-    def _tau(self, target: Array) -> Array:
-        """Return tau with (2 + k (1 - e^{-tau})) tau = target."""
-        target = jnp.minimum(target, FARTHEST)
-        tau = target / self.c
-        for _ in range(NEWTON_STEPS):
-            tau = tau - ((self.c - (self.c - 2.0) * jnp.exp(-tau)) * tau - target) / self._slope(tau)
-        return tau

@@ -21,8 +21,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Text
+from profilefit.laws.base import CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.rational import Normalisation
 
 MOST, DEFAULT = 8, 6
@@ -46,11 +45,44 @@ EXTRA_STEPS = 12
 FARTHEST = 1e8  # x [mfp]: no light is left, and its square is finite in float32
 
 
+class GaussiansSampler(Sampler):
+    """x = sqrt(q) with ln sum_i w_i e^{-q / 2 v_i} = ln(1 - xi), by Newton's method from the left.
+
+    The left side falls and is convex in q, so Newton started left of the root stays there and only goes up. It starts
+    at max_i 2 v_i (ln w_i - ln(1 - xi)): no term exceeds the sum. N + 12 steps reach the last bits of xi for ratios of
+    variances up to e^10, measured on random sums.
+    """
+
+    law: GaussianSum
+
+    @eqx.filter_jit  # the steps are a loop, which would compile anew at each call
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        rates, log_weights = 0.5 / self.law.variances(alpha), self.law.log_weights(alpha)
+        target = jnp.log1p(-jnp.asarray(jnp.minimum(xi, 1.0 - jnp.finfo(jnp.result_type(xi, float)).epsneg)))
+
+        def step(_, q):
+            terms = log_weights - rates * q[..., None]
+            total = jax.nn.logsumexp(terms, axis=-1)
+            slope = jnp.sum(jnp.exp(terms - total[..., None]) * rates, axis=-1)
+            return q + jnp.maximum((total - target) / slope, 0.0)
+
+        start = jnp.max(jnp.maximum((log_weights - target[..., None]) / rates, 0.0), axis=-1)
+        q = jax.lax.fori_loop(0, self.law.count() + EXTRA_STEPS, step, start)
+        return jnp.where(xi < 1, jnp.sqrt(q), jnp.inf)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        variance = self.law.variances(alpha)
+        r = jnp.minimum(jnp.asarray(x), FARTHEST)[..., None]
+        return jnp.sum(jnp.exp(self.law.log_weights(alpha) - 0.5 * r**2 / variance) * r / variance, axis=-1)
+
+
 class GaussianSum(ProfileLaw):
     """R_d = A sum_i w_i e^{-x^2 / 2 v_i} / (2 pi v_i),  cdf = 1 - sum_i w_i e^{-x^2 / 2 v_i},  x = r/l.
 
     Weights are positive and sum to one. Finite at x = 0, where no half space is, and far away below any.
     """
+
+    sampler_class = GaussiansSampler
 
     @abc.abstractmethod
     def count(self) -> int:
@@ -79,11 +111,6 @@ class GaussianSum(ProfileLaw):
     def source_strength(self, alpha: Array) -> Array:
         """0: no Gaussian rises as 1/x, so a limit at the source cannot be fitted."""
         return jnp.zeros_like(alpha)
-
-    @property
-    def sampler(self) -> GaussiansSampler:
-        """The cdf inverted by Newton's method."""
-        return GaussiansSampler(self)
 
 
 class Gaussians(GaussianSum):
@@ -143,37 +170,6 @@ class Gaussians(GaussianSum):
         pairs = [(getattr(self, f"w{i}0"), getattr(self, f"w{i}1")) for i in range(2, self.count() + 1)]
         logits = [jnp.zeros_like(s), *(level + slope * s for level, slope in pairs)]
         return jax.nn.log_softmax(jnp.stack(logits, axis=-1), axis=-1)
-
-
-class GaussiansSampler(Sampler):
-    """x = sqrt(q) with ln sum_i w_i e^{-q / 2 v_i} = ln(1 - xi), by Newton's method from the left.
-
-    The left side falls and is convex in q, so Newton started left of the root stays there and only goes up. It starts
-    at max_i 2 v_i (ln w_i - ln(1 - xi)): no term exceeds the sum. N + 12 steps reach the last bits of xi for ratios of
-    variances up to e^10, measured on random sums.
-    """
-
-    law: GaussianSum
-
-    @eqx.filter_jit  # the steps are a loop, which would compile anew at each call
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        rates, log_weights = 0.5 / self.law.variances(alpha), self.law.log_weights(alpha)
-        target = jnp.log1p(-jnp.asarray(jnp.minimum(xi, 1.0 - jnp.finfo(jnp.result_type(xi, float)).epsneg)))
-
-        def step(_, q):
-            terms = log_weights - rates * q[..., None]
-            total = jax.nn.logsumexp(terms, axis=-1)
-            slope = jnp.sum(jnp.exp(terms - total[..., None]) * rates, axis=-1)
-            return q + jnp.maximum((total - target) / slope, 0.0)
-
-        start = jnp.max(jnp.maximum((log_weights - target[..., None]) / rates, 0.0), axis=-1)
-        q = jax.lax.fori_loop(0, self.law.count() + EXTRA_STEPS, step, start)
-        return jnp.where(xi < 1, jnp.sqrt(q), jnp.inf)
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        variance = self.law.variances(alpha)
-        r = jnp.minimum(jnp.asarray(x), FARTHEST)[..., None]
-        return jnp.sum(jnp.exp(self.law.log_weights(alpha) - 0.5 * r**2 / variance) * r / variance, axis=-1)
 
 
 class MediumGaussians(GaussianSum):

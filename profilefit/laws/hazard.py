@@ -16,8 +16,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Text
+from profilefit.laws.base import CLAMPS, Entry, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.rational import Normalisation
 
@@ -172,6 +171,28 @@ def map_density(x: Array, shape: Shape, mapped: Callable[[Array], Array]) -> Arr
 LEAST_B = 1e-4
 
 
+class HazardSampler(Sampler):
+    """x with -ln S(x) = t = -ln(1 - xi): a first guess, and `steps` steps that follow the hazard.
+
+    Guess: x = t / (kappa + (lambda_0 - kappa) / m),  m = 1 + p t + q (1 - kappa/lambda_0)^2 (xi / ((1 - xi) t) - 1)
+    where p and q are `GUESS`: right to first order at xi = 0, and x = t/kappa far away, as it must be.
+    Step: the hazard around x is taken for lambda / (1 + y), a straight line in 1/lambda, and its integral for a cubic.
+
+    Error in xi at every alpha and xi, under both lights: one step 8e-5, two steps 2e-8.
+    """
+
+    law: Hazard
+    steps: int = eqx.field(static=True, default=1)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return radius(xi, self.law.shape(alpha), self.steps)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        """Density of this very map."""
+        shape = self.law.shape(alpha)
+        return map_density(x, shape, lambda t: radius_at(t, growth(t), shape, self.steps))
+
+
 class Hazard(EscapeLaw):
     """Law of the hazard rate at which light leaves.
 
@@ -224,6 +245,7 @@ class Hazard(EscapeLaw):
         own=True,
         text=Text("hazard", ("rational", "decay", "near_zero", "survival"), clamps=CLAMPS),
     )
+    sampler_class = HazardSampler
 
     def shape(self, alpha) -> Shape:
         """Everything that depends on alpha only: once a material, or once a pixel where A is a texture."""
@@ -243,33 +265,6 @@ class Hazard(EscapeLaw):
         return jnp.where(x > 0, jnp.where(x < jnp.inf, share, 1.0), 0.0)
 
     @property
-    def sampler(self) -> HazardSampler:
-        """The inverse of the cdf, to 1e-4 in xi, in a fixed number of operations."""
-        return HazardSampler(self)
-
-    @property
     def samplers(self) -> dict[str, Sampler]:
         """One step of the inversion, or two for an error below float32's."""
         return {"one step": HazardSampler(self, 1), "two steps": HazardSampler(self, 2)}
-
-
-class HazardSampler(Sampler):
-    """x with -ln S(x) = t = -ln(1 - xi): a first guess, and `steps` steps that follow the hazard.
-
-    Guess: x = t / (kappa + (lambda_0 - kappa) / m),  m = 1 + p t + q (1 - kappa/lambda_0)^2 (xi / ((1 - xi) t) - 1)
-    where p and q are `GUESS`: right to first order at xi = 0, and x = t/kappa far away, as it must be.
-    Step: the hazard around x is taken for lambda / (1 + y), a straight line in 1/lambda, and its integral for a cubic.
-
-    Error in xi at every alpha and xi, under both lights: one step 8e-5, two steps 2e-8.
-    """
-
-    law: Hazard
-    steps: int = eqx.field(static=True, default=1)
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        return radius(xi, self.law.shape(alpha), self.steps)
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        """Density of this very map."""
-        shape = self.law.shape(alpha)
-        return map_density(x, shape, lambda t: radius_at(t, growth(t), shape, self.steps))

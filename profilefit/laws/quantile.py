@@ -13,8 +13,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Range, Text
+from profilefit.laws.base import CLAMPS, Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
@@ -40,6 +39,27 @@ class Curve(NamedTuple):
     a: Array
     b: Array
     c: Array
+
+
+class QuantileSampler(Sampler):
+    """x = t M / (kappa M + lambda_0 - kappa), t = -ln(1 - xi), with its exact density e^{-t} / (dx/dt)."""
+
+    law: Quantile
+
+    @evaluated
+    def unclipped(self, xi, alpha) -> Array:
+        """g(xi) in units of the mfp: the name that the inverse of Liang et al. has before its clip."""
+        left = jnp.maximum(1.0 - xi, jnp.finfo(jnp.result_type(xi, float)).tiny)
+        return jnp.where(xi < 1.0, radius(-jnp.log(left), self.law.curve(alpha))[0], jnp.inf)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return self.unclipped(xi, alpha)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        x, alpha = jnp.broadcast_arrays(x, alpha)
+        curve = self.law.curve(alpha)
+        t = depth(x, curve)
+        return jnp.exp(-t) / radius(t, curve)[1]
 
 
 class Quantile(EscapeLaw):
@@ -83,6 +103,7 @@ class Quantile(EscapeLaw):
         own=True,
         text=Text("quantile", ("rational", "decay", "near_zero"), clamps=CLAMPS),
     )
+    sampler_class = QuantileSampler
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -109,32 +130,6 @@ class Quantile(EscapeLaw):
         x, alpha = jnp.broadcast_arrays(x, alpha)
         share = -jnp.expm1(-depth(x, self.curve(alpha)))
         return jnp.where(x > 0, jnp.where(x < jnp.inf, share, 1.0), 0.0)
-
-    @property
-    def sampler(self) -> QuantileSampler:
-        """The law itself."""
-        return QuantileSampler(self)
-
-
-class QuantileSampler(Sampler):
-    """x = t M / (kappa M + lambda_0 - kappa), t = -ln(1 - xi), with its exact density e^{-t} / (dx/dt)."""
-
-    law: Quantile
-
-    @evaluated
-    def unclipped(self, xi, alpha) -> Array:
-        """g(xi) in units of the mfp: the name that the inverse of Liang et al. has before its clip."""
-        left = jnp.maximum(1.0 - xi, jnp.finfo(jnp.result_type(xi, float)).tiny)
-        return jnp.where(xi < 1.0, radius(-jnp.log(left), self.law.curve(alpha))[0], jnp.inf)
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        return self.unclipped(xi, alpha)
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        x, alpha = jnp.broadcast_arrays(x, alpha)
-        curve = self.law.curve(alpha)
-        t = depth(x, curve)
-        return jnp.exp(-t) / radius(t, curve)[1]
 
 
 def radius(t: Array, curve: Curve) -> tuple[Array, Array]:

@@ -9,8 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.base import AlbedoLaw, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 
 
@@ -64,7 +63,6 @@ class Rational(Normalisation):
 
     @evaluated
     def reflectance(self, alpha) -> Array:
-        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
         s = jnp.sqrt(1.0 - alpha)
         # 1 - s as alpha / (1 + s): where alpha is small, the difference has no digits.
         return alpha * (1.0 + self.b * s) / ((1.0 + s) * (1.0 + s * (self.c + self.d * s)))
@@ -77,7 +75,6 @@ class Rational(Normalisation):
 
     @evaluated
     def alpha(self, reflectance) -> Array:
-        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
         linear = 1.0 - self.b + reflectance * self.c
         quadratic = self.b + reflectance * self.d
         rest = 1.0 - reflectance

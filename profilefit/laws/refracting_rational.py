@@ -1,9 +1,10 @@
-"""The map between alpha and A under every surface that refracts: both ends exact, and the light scattered once."""
+"""Maps between alpha and A under every surface that refracts: both ends exact, and the light scattered once."""
 
 from __future__ import annotations
 
 import abc
 from dataclasses import replace
+from functools import reduce
 from typing import NamedTuple, Self
 
 import equinox as eqx
@@ -12,16 +13,15 @@ from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import CLOSED
-from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.base import CLOSED, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
-STEPS = (
-    6  # of Newton's method in the inverse: the root that they start from is right to a hundredth, a tenth where g > .9
-)
+INDICES, COSINES = Range(1.3, 1.5, open_low=True), Range(0.0, 0.95, open_low=True)  # n and g [-] of those with g
+STEPS = 6  # of Newton's method in the inverse, which starts right to a hundredth, a tenth where g > .9
+COUNTS = {"c": 5, "d": 6, "f": 2}  # constants of each at g = 0, coefficients of powers of q
 
 
 class Terms(NamedTuple):
@@ -53,7 +53,12 @@ class FoldedRational(Normalisation):
     and alpha(A > t) = 1.
     """
 
+    setting: Setting = eqx.field(static=True)
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
+
+    @classmethod
+    def at_one_index(cls) -> tuple[str, ...]:
+        return ("c0", "d0", "f0")
 
     @abc.abstractmethod
     def folded(self) -> tuple[Number, Number, Number]:
@@ -94,7 +99,6 @@ class FoldedRational(Normalisation):
 
     @evaluated
     def reflectance(self, alpha) -> Array:
-        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
         by = reduced(jnp.asarray(alpha), self.setting.g).alpha
         return by / self.albedo_over_reflectance(by)
 
@@ -115,7 +119,6 @@ class FoldedRational(Normalisation):
 
     @evaluated
     def alpha(self, reflectance) -> Array:
-        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
         here, of = self.here(), self.terms()
         share = jnp.minimum(reflectance / here.entered, 1.0)
         inside = 1.0 - here.trapped * (1.0 - share)
@@ -139,20 +142,7 @@ class RefractingRational(FoldedRational):
     c0 ... c4, d0 ... d5, f0, f1  constants [-]
     """
 
-    setting: Setting = eqx.field(static=True)
-    c0: float
-    c1: float
-    c2: float
-    c3: float
-    c4: float
-    d0: float
-    d1: float
-    d2: float
-    d3: float
-    d4: float
-    d5: float
-    f0: float
-    f1: float
+    __annotations__ = {f"{name}{i}": "float" for name, count in COUNTS.items() for i in range(count)}
     entry = Entry(
         "rational",
         "rational map",
@@ -167,20 +157,53 @@ class RefractingRational(FoldedRational):
         text=Text("refracting_rational", (), prefix="rational"),
     )
 
-    @classmethod
-    def at_one_index(cls) -> tuple[str, ...]:
-        return ("c0", "d0", "f0")
-
     def folds(self) -> dict[str, dict[str, float]]:
         q = self.here().cosine ** (2 / 3)
         return {x: {one: q ** int(one[1]) for one in self.constant_names() if one[0] == x} for x in "cdf"}
 
     def folded(self) -> tuple[Number, Number, Number]:
-        """c, d, f at its index."""
         q = self.here().cosine ** (2 / 3)
-        c = self.c0 + q * (self.c1 + q * (self.c2 + q * (self.c3 + q * self.c4)))
-        d = self.d0 + q * (self.d1 + q * (self.d2 + q * (self.d3 + q * (self.d4 + q * self.d5))))
-        return c, d, self.f0 + q * self.f1
+        each = ([getattr(self, f"{name}{i}") for i in range(count)] for name, count in COUNTS.items())
+        c, d, f = (reduce(lambda rest, own: own + q * rest, reversed(own)) for own in each)
+        return c, d, f
+
+
+class ForwardRational(FoldedRational):
+    """`FoldedRational` with g as an argument: similarity in the reduced albedo holds next to white only.
+
+    c = c0 + c2 (1 - g)^2 + c3 (1 - g)^3 + cn rho, d and f likewise: 12 constants [-] for n from 1.3 to 1.5, g up to
+    .95, under either light. A_1 is that of the phase function.
+    """
+
+    __annotations__ = {f"{name}{term}": "float" for name in COUNTS for term in "023n"}
+    entry = Entry(
+        "rational",
+        "rational map",
+        is_map=True,
+        records=("albedo-rational",),
+        start={  # within a tenth of the exact map
+            **{"c0": -0.2, "c2": 6.7, "c3": -4.6, "cn": -0.1},
+            **{"d0": -0.9, "d2": 4.5, "d3": -1.7, "dn": 1.3},
+            **{"f0": 0.8, "f2": -5.8, "f3": 5.0, "fn": -0.2},
+        },
+        n=INDICES,
+        g=COSINES,
+        own=True,
+        text=Text("refracting_rational", (), prefix="rational"),
+    )
+
+    def folds(self) -> dict[str, dict[str, float]]:
+        here = self.here()
+        forward = 1.0 - float(here.g)
+        terms = {"0": 1.0, "2": forward**2, "3": forward**3, "n": float(here.trapped)}
+        return {letter: {letter + name: value for name, value in terms.items()} for letter in "cdf"}
+
+    def folded(self) -> tuple[Number, Number, Number]:
+        here = self.here()
+        z, rho = 1.0 - here.g, here.trapped
+        each = ([getattr(self, name + term) for term in "023n"] for name in COUNTS)
+        c, d, f = (k0 + z**2 * (k2 + z * k3) + rho * kn for k0, k2, k3, kn in each)
+        return c, d, f
 
 
 def _cubic(terms: tuple[Number, Number, Number, Number], s: Array) -> Array:

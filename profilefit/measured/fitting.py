@@ -13,22 +13,23 @@ from scipy import stats
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.fitting.misfit import (
-    Misfit,
-    gaussianised,
-    lack_of_fit,
-    misfit,
-    own_degrees_of_freedom,
-    rough_waves,
-    waves,
-)
-from profilefit.fitting.solver import Solution, are_apart
+from profilefit.fitting.misfit import Misfit, gaussianised, lack_of_fit, misfit, waves
+from profilefit.fitting.solver import Solution, are_apart, lowest
 from profilefit.measured import model
 from profilefit.measured.data import Measured, require_workable, widening
 from profilefit.measured.model import Model, alpha_of
-from profilefit.measured.noise import WAVE, WITHIN, Noise, law_covariance, noise, relative_error
-from profilefit.measured.problem import FitSpec, Problem, descended, descended_from, is_at_edge, minimised
-from profilefit.measured.ranges import RangeMarginal, marginalise, slopes_by_ranges
+from profilefit.measured.noise import WAVE, WITHIN, law_covariance, noise, relative_error
+from profilefit.measured.problem import (
+    AT_BLACK,
+    AT_WHITE,
+    FitSpec,
+    Problem,
+    RangeMarginal,
+    descended,
+    descended_from,
+    marginalise,
+    slopes_by_ranges,
+)
 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
@@ -78,17 +79,13 @@ class MediumFit:
 
     @property
     def at_edge(self) -> bool:
-        """True where the best albedo is 0 or 1."""
-        return is_at_edge(self.minimum)
+        """True where the best albedo is 0 or 1: it has no standard error, only a one-sided limit."""
+        return self.minimum.result in (AT_WHITE, AT_BLACK)
 
     @property
     def has_ended(self) -> bool:
         """True at a minimum, or at an end of the albedo's range."""
         return self.minimum.converged or self.at_edge
-
-    @property
-    def rows(self) -> int:
-        return self.data.value.size
 
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
@@ -148,28 +145,25 @@ class MediumFit:
     @cached_property
     def law_rows(self) -> Floats:
         """Covariance (m, m) of the rows, in standard errors, from the law's own error; zero if that is unknown."""
-        return self._in_errors(self.problem.noise.model, self.problem.noise)
+        return self.problem.noise.in_errors(self.problem.noise.model, self.minimum.residuals.size)
 
     @cached_property
     def lack_rows(self) -> Floats:
         """Covariance (m, m) of the rows, in standard errors, from the lack of fit; zero where none is allowed for."""
-        return self._in_errors(self.problem.noise.lack, self.problem.noise)
+        return self.problem.noise.in_errors(self.problem.noise.lack, self.minimum.residuals.size)
 
     @property
     def law_size(self) -> Floats:
         """Standard deviation (n,) of the law's own error in the light of each row; zero if that is unknown."""
         model = self.problem.noise.model
-        return np.zeros(self.rows) if model is None else np.sqrt(np.diag(model))
+        return np.zeros(self.data.value.size) if model is None else np.sqrt(np.diag(model))
 
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
         """True (n,) for rows farther out than the radii that `rel` covers."""
         if isinstance(self.spec.law, ExactLight):
-            return np.zeros(self.rows, bool)
+            return np.zeros(self.data.value.size, bool)
         return self.problem.model.shares(self.point, self.data.inner) > WITHIN
-
-    def _in_errors(self, error: Floats | None, noise: Noise) -> Floats:
-        return noise.in_errors(error, self.minimum.residuals.size)
 
     @property
     def of_law(self) -> Floats:
@@ -187,21 +181,19 @@ class MediumFit:
         if self.plain is not None:
             return self.plain.misfit
         rows, jacobian, law, (smooth, uneven) = self._in_data_errors((WAVE, 0.0))
-        return misfit(rows, jacobian, law, smooth, self.rows, uneven, self.data.pooled)
+        return misfit(rows, jacobian, law, smooth, self.data.value.size, uneven, self.data.pooled)
 
     def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
         """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
 
-        Args:
-            values: those of the spec's ranges. These take up residuals as the free coordinates do, and so hide a
-                lack of fit: one that the residuals allow is then presumed.
+        values  of the spec's ranges, which take up residuals as free coordinates do: any lack allowed is presumed
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
         variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
         if likelier <= (-np.inf if values else 0.0):
             return None
         each = zip(variances, LACK_WAVES, strict=True)
-        joint = sum(variance * rough_waves(self.data.r, length) for variance, length in each)
+        joint = sum(variance * waves(self.data.r, length, rough=True) for variance, length in each)
         return np.asarray(joint * np.outer(self.light, self.light), float)
 
     def _in_data_errors(
@@ -212,19 +204,19 @@ class MediumFit:
         All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
         Derivatives are by the free coordinates and, where `values` of them are given, by the spec's ranges.
         """
-        times = np.ones(self.minimum.residuals.size)
-        times[: self.rows] = np.sqrt(self.widening)
-        own = self.problem.noise.of_data
+        own, count = self.problem.noise.of_data, self.minimum.residuals.size
+        times = np.ones(count)
+        times[: self.data.value.size] = np.sqrt(self.widening)
         problem = replace(self.problem, noise=own)
         rows, slopes = problem.residuals(self.point)
-        rows, both = times * rows, np.outer(times, times)
-        rows[: self.rows] = gaussianised(rows[: self.rows], own_degrees_of_freedom(self.data.freedom, self.data.pooled))
+        rows, both = gaussianised(times * rows, self.data.freedom, self.data.pooled), np.outer(times, times)
         size = np.outer(self.light, self.light)
-        shapes = [both * self._in_errors(size * waves(self.data.r, length), own) for length in lengths]
+        shapes = [both * own.in_errors(size * waves(self.data.r, length), count) for length in lengths]
         slopes = slopes[:, list(self.spec.free)]
         if values:
             slopes = np.column_stack([slopes, slopes_by_ranges(problem, values, self.point)])
-        return rows, times[:, None] * slopes, both * self._in_errors(self.problem.noise.model, own), np.array(shapes)
+        law = both * own.in_errors(self.problem.noise.model, count)
+        return rows, times[:, None] * slopes, law, np.array(shapes)
 
     @property
     def sigma(self) -> Floats:
@@ -242,10 +234,7 @@ class MediumFit:
 
 
 def fitted(data: Measured, spec: FitSpec) -> MediumFit:
-    """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
-
-    InputError if there are not more rows than free coordinates, or if the data are beyond `require_workable`.
-    """
+    """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`. InputError."""
     require_own_process()
     free = len(spec.free)
     if data.value.size <= free:
@@ -256,7 +245,7 @@ def fitted(data: Measured, spec: FitSpec) -> MediumFit:
     each = [relative_error(spec.law, alpha, spec.source) or 0.0 for alpha in SEARCHED]
     model = law_covariance(data, max(each), np.zeros(data.value.size, bool))
     problem = Problem(data, spec, noise(data, widening=wider, model=model))
-    minimum = first = minimised(problem)
+    minimum = first = lowest(descended(problem, start, spec.free) for start in problem.starts)
     fit = MediumFit(problem, minimum, _rel(spec, minimum), wider)
     rounds = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
     fit = _allowing_for_lack(_settled(fit, rounds), rounds)
@@ -277,10 +266,7 @@ def _settled(fit: MediumFit, rounds: int) -> MediumFit:
 
 
 def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
-    """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none.
-
-    Wider errors let the search out of a local minimum; where this leads to a better fit, all begins again from there.
-    """
+    """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none."""
     wider = fit
     for _ in range(LACK_ROUNDS):
         values = {} if fit.range_marginal is None else fit.range_marginal.mean
@@ -292,7 +278,7 @@ def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
         if not wider.has_ended:
             return fit
         back = replace(wider.problem, noise=fit.problem.noise)
-        there = descended_from(back, wider.point)
+        there = descended_from(back, wider.point)  # wider errors let the search out of a local minimum
         if not there.cost < BETTER * fit.minimum.cost:
             break
         fit = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)

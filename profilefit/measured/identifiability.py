@@ -3,12 +3,12 @@
 Intervals are those of the profile likelihood. An additional measurement with derivatives g by the coordinates and
 standard error sigma adds g g^T / sigma^2 to Fisher's information, which predicts the errors that would remain.
 
-A pencil beam, n = 1 and g = 0 are assumed where nobody states others. Whether the data know of a beam that has a width,
-and what width would matter: the fit is repeated under Gaussian beams of widths from a five-hundredth of the last radius
-to half of it. If chi-square falls by more than a pencil beam's noise explains at 5 %, one-sided since a width is not
-negative, the data know of the width. Where a pencil beam leaves a lack of fit, the noise has the lack of fit that the
-best width leaves: none if the width explains all of it. How far the answer moves under the narrowest beam that moves
-it, as w^2, says which width would move it by a standard error. Under n and g of soft tissue the fit is repeated once.
+A pencil beam, n = 1 and g = 0 are assumed where nobody states others. To see whether the data know of a beam's width,
+the fit is repeated under Gaussian beams of widths from a five-hundredth of the last radius to half of it. They know it
+if chi-square falls by more than a pencil beam's noise explains at 5 %, one-sided since a width is not negative. Where a
+pencil beam leaves a lack of fit, the noise has the one that the best width leaves. How far the answer moves under the
+narrowest beam that moves it, as w^2, says which width would move it by a standard error. Under n and g of soft tissue
+the fit is repeated once.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, covariance
 from profilefit.measured import model
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.instrument import Gaussian
 from profilefit.measured.model import NAMES, SCALE, STRENGTHS, U, alpha_of, exact_light
 from profilefit.measured.noise import WITHIN
 from profilefit.measured.problem import (
@@ -73,11 +72,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Identifiability of a fit's quantities.
-
-    intervals  of the free coordinates; loose the quantities that are not identified, with their relative errors
-    pair       the two most correlated free coordinates; correlation theirs (0 with fewer than two)
-    """
+    """Intervals of the free coordinates, relative errors of quantities not identified, the most correlated pair."""
 
     intervals: tuple[Interval, ...]
     loose: dict[str, float]
@@ -125,19 +120,14 @@ def _pair(fit: MediumFit) -> tuple[tuple[str, str] | None, float]:
 
 def _interval(fit: MediumFit, at: int) -> Interval:
     """Return both ends of the profile likelihood in coordinate `at`."""
-    ends = [_end(fit, at, side) for side in (-1.0, 1.0)]
-    values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
-    are_open = [is_open for _, is_open in ends]
-    if at == U:  # alpha falls as u rises
-        values, are_open = values[::-1], are_open[::-1]
-    return Interval(NAMES[at], values[0], values[1], are_open[0], are_open[1])
+    ends = (_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0)))  # alpha falls as u rises
+    (low, low_is_open), (high, high_is_open) = ends
+    low, high = (float(alpha_of(x)) if at == U else float(np.exp(x)) for x in (low, high))
+    return Interval(NAMES[at], low, high, low_is_open, high_is_open)
 
 
 def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
-    """Find where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does.
-
-    It never does where alpha cannot be distinguished from 0 or 1.
-    """
+    """Find where chi-square has risen by the square of the quantile, 3.84 of known errors; True where it never does."""
     best, others = fit.minimum, tuple(one for one in fit.spec.free if one != at)
     limit = side * FARTHEST_U if at == U else best.parameters[at] + side * FARTHEST_LN
     last = [best.parameters]
@@ -170,11 +160,10 @@ def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """Measurement that could be made.
+    """Measurement that could be made: a "point", "reflectance", "scale" or "repeats", with the value and error assumed.
 
-    kind      "point", "reflectance", "scale" or "repeats"; inner, outer radii of a point or ring [unit], else NaN
-    value     predicted value; error its assumed standard error
-    relative  predicted relative errors of mu_s', mu_a and a free scale with it [-]
+    inner, outer  radii of a point or ring [unit], else NaN
+    relative      predicted relative errors of mu_s', mu_a and a free scale with it [-]
     """
 
     kind: str
@@ -203,11 +192,9 @@ def rank_designs(fit: MediumFit) -> DesignRanking:
     """Rank additional measurements by the largest relative error that would remain."""
     now = relative_errors(fit, fit.total_covariance)
     name = max(now, key=lambda one: now[one])
-    best: dict[str, Candidate] = {}
-    for one in [*_points(fit), *_others(fit)]:
-        if one.kind not in best or one.worst[1] < best[one.kind].worst[1]:
-            best[one.kind] = one
-    return DesignRanking(name, now[name], tuple(sorted(best.values(), key=lambda one: one.worst[1])))
+    points = _points(fit)
+    each = [*([min(points, key=lambda one: one.worst[1])] if points else []), *_others(fit)]
+    return DesignRanking(name, now[name], tuple(sorted(each, key=lambda one: one.worst[1])))
 
 
 def _points(fit: MediumFit) -> list[Candidate]:
@@ -218,30 +205,24 @@ def _points(fit: MediumFit) -> list[Candidate]:
     r = r[model.shares(fit.point, r * (1.0 + width)) < WITHIN]
     inner, outer = r * (1.0 - width), r * (1.0 + width)
     light, slopes = model.linearised(fit.point, inner, outer)
-    errors = data.relative_error * light[:-1]
-    rows = zip(inner, outer, light[:-1], errors, slopes[:-1], strict=True)
-    return [_candidate(fit, "point", float(a), float(b), float(v), float(e), slope) for a, b, v, e, slope in rows]
+    rows = zip(inner.tolist(), outer.tolist(), light[:-1].tolist(), slopes[:-1], strict=True)
+    return [_candidate(fit, "point", a, b, value, data.relative_error * value, slope) for a, b, value, slope in rows]
 
 
 def _others(fit: MediumFit) -> list[Candidate]:
-    (*_, reflectance), slopes = fit.predicted[0], fit.predicted[1]
-    scale = fit.values["scale"]
-    four = relative_errors(fit, _repeated(fit))
-    out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
+    (*_, reflectance), (*_, slope) = fit.predicted
+    scale, nowhere = fit.values["scale"], (np.nan, np.nan)
+    stay = fit.law_rows + fit.lack_rows  # errors that repeating the profile leaves
+    rows = stay + (np.eye(len(stay)) - stay) / REPEATS
+    four = _predicted_covariance(fit, np.linalg.solve(np.linalg.cholesky(rows), fit.jacobian))
+    out = [Candidate("repeats", *nowhere, float(REPEATS), np.nan, relative_errors(fit, four))]
     if fit.spec.total is None and fit.data.medium is None:  # a simulation states it already
         error = REFERENCE_ERROR * reflectance
-        out.append(_candidate(fit, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
+        out.append(_candidate(fit, "reflectance", *nowhere, float(reflectance), error, slope))
     if SCALE in fit.spec.free and fit.spec.scale is None:
-        slope = scale * np.eye(len(NAMES))[SCALE]
-        out.append(_candidate(fit, "scale", np.nan, np.nan, scale, REFERENCE_ERROR * scale, slope))
+        by_scale = scale * np.eye(len(NAMES))[SCALE]
+        out.append(_candidate(fit, "scale", *nowhere, scale, REFERENCE_ERROR * scale, by_scale))
     return out
-
-
-def _repeated(fit: MediumFit) -> Floats:
-    """Return the covariance of the coordinates by REPEATS profiles, the errors of law and lack of fit unchanged."""
-    stay = fit.law_rows + fit.lack_rows
-    rows = stay + (np.eye(len(stay)) - stay) / REPEATS
-    return _predicted_covariance(fit, np.linalg.solve(np.linalg.cholesky(rows), fit.jacobian))
 
 
 def _candidate(
@@ -262,10 +243,8 @@ def _predicted_covariance(fit: MediumFit, jacobian: Floats) -> Floats:
 class BeamWidth:
     """Effect of a Gaussian beam on a fit that assumes a pencil beam.
 
-    w        the 1/e^2 radius that explains the data best [unit of r]; fall how much chi-square falls there, by errors
-             with the lack of fit that is left; chance how often noise lets it fall as much
-    telling  the 1/e^2 radius that moves `moved`, a quantity, by one of its standard errors [unit of r]; None if no
-             width does
+    w        the 1/e^2 radius that explains the data best [unit of r]; fall of chi-square there, chance of it by noise
+    telling  the 1/e^2 radius that moves the quantity `moved` by its standard error [unit of r]; None if no width does
     """
 
     w: float
@@ -305,15 +284,15 @@ def _under_widths(problem: Problem, pencil: Solution) -> dict[float, Solution]:
     """Fit under Gaussian beams, by 1/e^2 radius: the pencil beam, the widths that are tried, and near the best."""
     fits, start = {0.0: pencil}, pencil
     for w in _widths(problem):
-        start = _under(problem, w, start)
-        fits[w] = start
+        fits[w] = start = descended(problem.under({"beam": w}), start.parameters, problem.spec.free)
     for _ in range(FINER):
         best, tried = _best(fits), sorted(fits)
         at = tried.index(best)
         for low, high in ((best, tried[min(at + 1, len(tried) - 1)]), (tried[max(at - 1, 0)], best)):
             between = float(np.sqrt(low * high))
             if between > 0 and between not in fits:
-                fits[between] = _under(problem, between, fits[best])
+                there = problem.under({"beam": between})
+                fits[between] = descended(there, fits[best].parameters, problem.spec.free)
     return fits
 
 
@@ -331,10 +310,7 @@ def _lack(plain: MediumFit, w: float, there: Solution) -> Floats | None:
 
 @dataclass(frozen=True)
 class Tissue:
-    """Fit of the same data under n and g of soft tissue, where these are assumed.
-
-    values  of the quantities; rise  of chi-square
-    """
+    """Fit of the same data under n and g of soft tissue, where these are assumed: values, and rise of chi-square."""
 
     setting: Setting
     values: dict[str, float]
@@ -355,12 +331,6 @@ def as_tissue(fit: MediumFit) -> Tissue | None:
         return None
     values = model.quantities(end.parameters[None], np.zeros(1))
     return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - plain.minimum.cost)
-
-
-def _under(problem: Problem, w: float, start: Solution) -> Solution:
-    instrument = replace(problem.spec.instrument, beam=Gaussian(w))
-    there = replace(problem, spec=replace(problem.spec, instrument=instrument))
-    return descended(there, start.parameters, problem.spec.free)
 
 
 def _telling(fit: MediumFit, fits: dict[float, Solution]) -> tuple[float | None, str]:

@@ -19,9 +19,8 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,17 +53,6 @@ NEAR = 1000.0  # outer over inner radius, up to which a ring's nodes are straigh
 # Shared nodes: how many a polynomial goes through, their distance in t, the first t, and grains to the last of them.
 STENCIL, STEP, FIRST, GRAINS = 8, 0.2, -10.0, 120.0
 COUNT = int(np.ceil((GRAINS - FIRST) / STEP)) + STENCIL
-
-
-class Irradiance(Protocol):
-    """Irradiance about an axis."""
-
-    @property
-    def words(self) -> str:
-        """Description for messages, without a unit."""
-
-    def nodes(self, d: Floats) -> Nodes:
-        """Radii rho and weights K drho, (..., J) each, for distances d from the axis of any shape."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +110,7 @@ class Profiled:
     def nodes(self, d: Floats) -> Nodes:
         at, low = d[..., None], np.maximum(d - self.r[-1], 0.0)[..., None]
         edges = np.concatenate([low + self._edges, np.abs(at - self._edges), at + self._edges], axis=-1)
-        rho, weight = _between(np.sort(edges, axis=-1))
+        rho, weight = between(np.sort(edges, axis=-1))
         rho, weight = np.maximum(rho, LEAST * self.r[-1]), weight * self._around(at, rho)
         return rho, weight / (2.0 * np.pi * np.sum(rho * weight, axis=-1))[..., None]
 
@@ -142,17 +130,18 @@ class Profiled:
         with np.errstate(divide="ignore", invalid="ignore"):  # circles about the axis, or of no radius
             turn = 2.0 * np.arcsin(np.sqrt(np.clip((s - nearest) * (s + nearest) / across, 0.0, 1.0)))
         turn = np.where(across > 0, turn, np.linspace(0.0, np.pi, s.shape[-1]))
-        nodes, weights = _between(turn, AROUND)
+        nodes, weights = between(turn, AROUND)
         far = np.sqrt(nearest**2 + across * np.sin(0.5 * nodes) ** 2)
         return np.asarray(np.sum(weights * np.interp(far, self.r, self.value, right=0.0), axis=-1) / np.pi, float)
 
 
-def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
-    """Return the beam of a text, one of `ACCEPTED` but a range.
+# Its `nodes`: radii rho and weights K drho, (..., J) each, for distances d from the axis of any shape. `words` describe
+# it in messages, without a unit.
+Irradiance = Gaussian | TopHat | Profiled
 
-    unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.
-    folder  where the file lies, if its path is not absolute
-    """
+
+def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
+    """Return the beam of a text, one of `ACCEPTED` but a range, in the `unit` of r; a file may lie in `folder`."""
     if text.lower().endswith((".csv", ".tsv", ".txt")):
         return _read(folder / text)
     if text.lower().startswith(TOPHAT):
@@ -168,17 +157,15 @@ def gaussian(option: str, text: str, unit: str) -> Gaussian:
 
 
 def _read(path: Path) -> Profiled:
-    """Rows of a radius [unit of r] and an irradiance in any measure; a first row of names is passed over."""
+    """Read rows of a radius [unit of r] and an irradiance in any measure; a first row of names is passed over."""
     content = read_whole(path, MAX_BYTES)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a beam of at most {MAX_BYTES} bytes, got a longer file")
     text = content.decode("utf-8-sig", "replace")
     lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
-    lines = [(at, line) for at, line in lines if line]
     rows: list[list[float]] = []
-    for number, (at, line) in enumerate(lines):
-        cells = CELLS.split(line)
-        numbers = [_number(cell) for cell in cells]
+    for number, (at, line) in enumerate((at, line) for at, line in lines if line):
+        numbers = [_number(cell) for cell in CELLS.split(line)]
         if number == 0 and any(math.isnan(one) for one in numbers):
             continue
         if len(numbers) != 2 or not all(math.isfinite(one) and one >= 0 for one in numbers):
@@ -189,9 +176,8 @@ def _read(path: Path) -> Profiled:
     while len(rows) > 2 and rows[-1][1] == rows[-2][1] == 0.0:  # darkness beyond the beam
         rows.pop()
     if not 2 <= len(rows) <= MOST_ROWS or not any(value > 0 for _, value in rows[:-1]):
-        raise InputError(
-            f"{path}: expected 2 to {MOST_ROWS} rows of radius and irradiance, with light, got {len(rows)}"
-        )
+        expected = f"2 to {MOST_ROWS} rows of radius and irradiance, with light"
+        raise InputError(f"{path}: expected {expected}, got {len(rows)}")
     r, value = np.array(rows).T
     if r[0] > 0:  # a profile that begins off the axis is flat up to there
         r, value = np.append(0.0, r), np.append(value[0], value)
@@ -209,11 +195,11 @@ def _panels(low: Floats, high: Floats) -> Nodes:
     """Return nodes of PANELS equal panels, the first of them graded towards its lower end."""
     edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
     first, d_first = _graded(low, edges[..., 1])
-    rest, d_rest = _between(edges[..., 1:])
+    rest, d_rest = between(edges[..., 1:])
     return np.concatenate([first, rest], axis=-1), np.concatenate([d_first, d_rest], axis=-1)
 
 
-def _between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
+def between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
     """Return nodes of the panels between edges (..., k) that rise, some of them without width."""
     half, middle = 0.5 * np.diff(edges)[..., None], 0.5 * (edges[..., 1:] + edges[..., :-1])[..., None]
     flat = (*edges.shape[:-1], -1)
@@ -221,38 +207,27 @@ def _between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
 
 
 def _graded(low: Floats, high: Floats) -> Nodes:
-    edges, width = _grades()
-    width = (high - low)[..., None] * width
-    return low[..., None] + (high - low)[..., None] * edges, width
+    """Return nodes between two radii (...,), finer towards the first."""
+    edges, width = GRADES
+    return low[..., None] + (high - low)[..., None] * edges, (high - low)[..., None] * width
 
 
-@lru_cache(maxsize=1)
-def _grades() -> Nodes:
-    """Nodes and weights in (0, 1), finer towards 0."""
-    edges = np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5))
-    return _between(edges)
+GRADES = between(np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5)))
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """Beam and fibre that gather the light of a row.
-
-    beam   None of a pencil beam
-    fibre  radius of the fibre's core that a point is averaged over [unit of r], which may cover the axis; 0 of a point
-    """
+    """Beam, None of a pencil beam, and radius of the fibre's core that a point is averaged over [unit of r]."""
 
     beam: Irradiance | None = None
     fibre: float = 0.0
 
-    def nodes(self, inner: Floats, outer: Floats, farthest: float = 0.0) -> Nodes:
-        """Radii and weights [1/unit^2 per D drho] of rows from `inner` to `outer` (n,).
-
-        The radii (m,) are those of all rows, at least up to `farthest`, and the weights (n, m).
-        """
-        return self.gathered(*self._distances(inner, outer), farthest)
+    def nodes(self, inner: Floats, outer: Floats) -> Nodes:
+        """Return radii (m,) of all rows from `inner` to `outer` (n,), and weights (n, m) [1/unit^2 per D drho]."""
+        return self.gathered(*self._distances(inner, outer))
 
     def gathered(self, d: Floats, mean: Floats, farthest: float = 0.0) -> Nodes:
-        """Return `nodes` of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
+        """Return `nodes` of sums over distances d (n, M), weighted by `mean` (n, M); a beam's reach `farthest`."""
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
             return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)

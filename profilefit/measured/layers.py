@@ -21,7 +21,7 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting import solver
-from profilefit.fitting.misfit import DETECTED, gaussianised, own_degrees_of_freedom, scatter_chance
+from profilefit.fitting.misfit import DETECTED, gaussianised, scatter_chance
 from profilefit.measured.data import Measured, require_workable, widening
 from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.instrument import Instrument
@@ -49,8 +49,7 @@ class LayersFit:
     names     of the free quantities; scale last where it is free
     values    (p,); errors (p,) their relative standard errors, with the misfit; correlation (p, p) of their logarithms
     products  (exponents, relative error) of the products of powers that are independent of each other, best first
-    chi2, freedom, chance   by the errors of the data
-    light     (n,) of the rows
+    chi2, freedom, chance   by the errors of the data; light (n,) of the rows
     """
 
     data: Measured
@@ -81,18 +80,12 @@ class LayersFit:
 
     def product(self, at: int) -> str:
         """One of the products, in words."""
-        exponents = self.products[at][0]
-        return " ".join(
-            f"{name}^{power:.2g}" for name, power in zip(self.names, exponents, strict=True) if abs(power) > NAMED
-        )
+        pairs = zip(self.names, self.products[at][0], strict=True)
+        return " ".join(f"{name}^{power:.2g}" for name, power in pairs if abs(power) > NAMED)
 
 
 def fit_layers(
-    data: Measured,
-    medium: Medium,
-    free: Sequence[str],
-    premises: Premises,
-    scale: float | Known | None = 1.0,
+    data: Measured, medium: Medium, free: Sequence[str], premises: Premises, scale: float | Known | None = 1.0
 ) -> LayersFit:
     """Fit the free quantities of a stack, from where `medium` has them; lengths in the unit of the data. Minutes.
 
@@ -103,16 +96,16 @@ def fit_layers(
         medium: the stack, whose n and g count.
         free: names of the free quantities.
         premises: light, beam and fibre.
-        scale: as of `premises.specified`.
+        scale: as of `result.fit`.
     """
     require_workable(data)
     data = replace(data, notes=(*data.notes, *premises.notes))
-    names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
+    known = scale if isinstance(scale, Known) else None
+    held = float(scale) if isinstance(scale, float | int) else 1.0
+    names = tuple(free) + (() if isinstance(scale, float | int) else ("scale",))
     _require_free(medium, free)
     if data.value.size <= len(names):
         raise InputError(f"{data.source}: expected more than {len(names)} rows, one more than is free")
-    known = scale if isinstance(scale, Known) else None
-    held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     wider = widening(data.freedom, len(names))
     problem = _LayersProblem(data, medium, tuple(free), premises, noise(data, widening=wider), held, known)
     start = np.zeros(len(names))
@@ -149,10 +142,7 @@ def _setting(data: Measured, medium: Medium, premises: Premises) -> Setting:
 
 @dataclass(frozen=True)
 class _LayersProblem:
-    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free.
-
-    weights  the errors of the rows; held the scale if it is not free, known what is known of it
-    """
+    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free."""
 
     data: Measured
     medium: Medium
@@ -190,8 +180,8 @@ def solved_rows(medium: Medium, illumination: str, seen: Instrument, inner: byte
 
 def _judged(problem: _LayersProblem, names: tuple[str, ...], done: solver.Solution, expected: Floats) -> LayersFit:
     rows, data, count = problem.residuals(done.parameters), problem.data, problem.data.value.size
-    times = math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
-    rows[:count] = gaussianised(times * rows[:count], own_degrees_of_freedom(data.freedom, data.pooled))
+    rows[:count] *= math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
+    rows = gaussianised(rows, data.freedom, data.pooled)
     chi2, freedom = float(rows @ rows), rows.size - len(names)
     chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0

@@ -12,9 +12,8 @@ covariance of the rows, too, and so is a lack of fit; all together are whitened 
 
 A law misses the exact profile by `rel` on average (see `quality`), in waves along ln r. Its error at the radii of the
 data is taken for a Gaussian process: standard deviation RMS x rel of the light, correlation e^-1 at WAVE in ln r.
-Over seventeen pairs of law and albedo (hazard, normalized diffusion, four Gaussians, beam diffusion; alpha from .2 to
-.99) the root mean square is 1.2 to 2.5 times `rel`, the distance .1 to 2.5; tests hold the prediction against the real
-shift.
+Over seventeen pairs of law and albedo (alpha from .2 to .99) the root mean square is 1.2 to 2.5 times `rel`, the
+distance .1 to 2.5; tests hold the prediction against the real shift.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from scipy.linalg import solve_triangular
 
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.misfit import rough_waves
+from profilefit.fitting.misfit import waves
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
@@ -53,8 +52,7 @@ DARKEST, WHITEST = 0.02, 0.9995  # albedos between which a law can be held again
 class Noise:
     """Covariance of n rows: root (n,) is the diagonal S [of the values], common (n,) the vector b [-].
 
-    model (n, n) is that of the error of what the rows are held against, None where it has none; lack (n, n) that of a
-    lack of fit, None where none is allowed for.
+    model (n, n) is that of the error of what the rows are held against, lack (n, n) that of a lack of fit; None of none
     """
 
     root: Floats
@@ -100,10 +98,7 @@ class Noise:
         return scaled + growth * np.multiply.outer(self.common, self.common @ scaled)
 
     def in_errors(self, error: Floats | None, rows: int) -> Floats:
-        """Return the covariance (rows, rows), in standard errors, of an error of covariance (n, n); zero of None.
-
-        The first n rows have this noise; the others know nothing of such errors.
-        """
+        """Return the covariance (rows, rows), in standard errors, of an error (n, n) of the first rows, or None."""
         joint = np.zeros((rows, rows))
         if error is not None:
             joint[: len(error), : len(error)] = self.whitened(self.whitened(error).T)
@@ -117,14 +112,10 @@ def noise(
     model: Floats | None = None,
     lack: Floats | None = None,
 ) -> Noise:
-    """Return the errors of data.
+    """Return the errors of data; model and lack as in `Noise`.
 
-    Args:
-        data: n rows.
-        light: (n,) that a fit expects: of counts it predicts the variance better than the counts.
-        widening: factor on every variance.
-        model: (n, n) covariance of the error of the reference, as in `Noise`; None for none.
-        lack: (n, n) covariance of a lack of fit, as in `Noise`; None for none.
+    light     (n,) that a fit expects: of counts it predicts the variance better than the counts
+    widening  factor on every variance
     """
     expected = data.value if light is None or not data.counted else light
     others = data.photons - 1.0
@@ -161,10 +152,7 @@ def origin(name: str, constants: str, setting: Setting, folder: Folder) -> Origi
 
 
 def relative_error(law: Light, alpha: float, source: Origin | None) -> float | None:
-    """Return `rel` of a law at alpha [-]: its record's, or measured against the exact profile.
-
-    None where neither can be; 0 of exact light.
-    """
+    """Return `rel` of a law at alpha [-], its record's or measured; None where neither can be; 0 of exact light."""
     if isinstance(law, ExactLight):
         return 0.0
     measured = (source.quality.get("regenerated") or {}).get("rel") if source else None
@@ -178,14 +166,8 @@ def relative_error(law: Light, alpha: float, source: Origin | None) -> float | N
 
 
 def law_covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_]) -> Floats | None:
-    """Return the covariance (n, n) of the law's own error in the rows of data; None where it has none.
-
-    Args:
-        data: n rows.
-        rel: relative error of the law [-].
-        beyond: (n,) rows farther out than the radii that `rel` covers.
-    """
+    """Return the covariance (n, n) of the law's own error, `rel` but in rows `beyond` (n,); None where it has none."""
     if not rel:
         return None
     size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)
-    return rough_waves(data.r, WAVE) * np.outer(size, size)
+    return waves(data.r, WAVE, rough=True) * np.outer(size, size)

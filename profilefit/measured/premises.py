@@ -6,21 +6,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
-from profilefit.laws import profile_classes, takes_g
+from profilefit.laws import takes_g
 from profilefit.measured.data import Measured, length
 from profilefit.measured.instrument import FWHM, PENCIL, TOPHAT, Gaussian, Instrument, Irradiance, beam_of, gaussian
-from profilefit.measured.model import EXACT, Light, exact_light
-from profilefit.measured.noise import origin
-from profilefit.measured.oblique import Oblique
-from profilefit.measured.problem import MEDIUM, FitSpec, Known, held_albedo
-from profilefit.recipes import catalogue
+from profilefit.measured.model import EXACT
+from profilefit.measured.problem import MEDIUM, Ranges
 
-HOLDABLE = ("alpha", "A", "l")
 ACCEPTED = {
     "n": "a refractive index > 0, or a range such as 1.33:1.45",
     "g": "a mean cosine in (-1, 1), or a range such as 0.7:0.95",
@@ -40,7 +35,7 @@ class Premises:
 
     setting: Setting
     instrument: Instrument = PENCIL
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ranges: Ranges = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -51,15 +46,9 @@ def premises(
     options: Mapping[str, str | None] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> Premises:
-    """Return the premises of a fit from options, else from what the file states.
+    """Return the premises of a fit of `law` from options, else from what the file states.
 
-    A simulation's medium is what its file states, its g only where exact light, or the law that is fitted, has it.
-
-    Args:
-        data: the profile.
-        law: that is fitted.
-        options: texts by the names light, n, g, beam and fibre.
-        names: what messages call these.
+    options  texts by the names light, n, g, beam and fibre; names what messages call these
     """
     chosen = {name: text for name, text in (options or {}).items() if text is not None}
     labels = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
@@ -78,37 +67,33 @@ def premises(
         raise InputError(
             f"{labels['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
         )
-    ranges = {name: parsed(labels[name], given[name], name) for name in MEDIUM if name in given}
+    ranges = {name: _parsed(labels[name], given[name], name) for name in MEDIUM if name in given}
     n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
     setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
-    # Clear layers may state any g.
+    # A simulation's g counts only where exact light, or the law that is fitted, has it. Clear layers may state any g.
     forward = replace(setting, g=data.g) if "g" not in given and data.g and abs(data.g) < 1.0 else setting
     if forward.is_solved and (law == EXACT or takes_g(law)):
         setting = forward
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:
-        raise InputError(
-            f"{labels[min(ranges)]} must be a number where a law is fitted, got {shown(given[min(ranges)])}"
-        )
+        name = min(ranges)
+        raise InputError(f"{labels[name]} must be a number where a law is fitted, got {shown(given[name])}")
     if "fibre" in given and data.rings:
         raise InputError(f"{labels['fibre']} must be left out where rows are averages over annuli")
-    # What a file states lies beside it; a pipe has no place.
-    beside = "beam" not in chosen and Path(data.source).is_file()
-    folder = Path(data.source).parent if beside else Path()
-    beam, widths = _beam(labels["beam"], given.get("beam"), data.unit, folder)
-    ranges |= {} if widths is None else {"beam": widths}
+    beam: Irradiance | None = None
+    if "beam" in given:
+        # What a file states lies beside it; a pipe has no place.
+        beside = "beam" not in chosen and Path(data.source).is_file()
+        folder = Path(data.source).parent if beside else Path()
+        beam, widths = _beam(labels["beam"], given["beam"].strip(), data.unit, folder)
+        ranges |= {} if widths is None else {"beam": widths}
     fibre = length(labels["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
     assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
     return Premises(setting, Instrument(beam, fibre), ranges, assumed, notes)
 
 
-def _beam(
-    option: str, text: str | None, unit: str, folder: Path
-) -> tuple[Irradiance | None, tuple[float, float] | None]:
+def _beam(option: str, text: str, unit: str, folder: Path) -> tuple[Irradiance, tuple[float, float] | None]:
     """Return a beam, and the range of its 1/e^2 radius if it has one: LOW:HIGH, or fwhm:LOW:HIGH."""
-    if text is None:
-        return None, None
-    text = text.strip()
     kind = next((one for one in (FWHM, TOPHAT) if text.lower().startswith(one)), "")
     ends = text[len(kind) :].split(":")
     if len(ends) != 2 or kind == TOPHAT:
@@ -119,89 +104,13 @@ def _beam(
     return Gaussian(0.5 * (low + high)), (low, high)
 
 
-def parsed(option: str, text: Any, name: str) -> tuple[float, float]:
+def _parsed(option: str, text: str, name: str) -> tuple[float, float]:
     """Return both ends of a number or of a range LOW:HIGH."""
-    parts = str(text).split(":")
     try:
-        ends = [float(part) for part in parts]
+        ends = [float(part) for part in text.split(":")]
     except ValueError:
         ends = []
     least, most = (0.0, math.inf) if name == "n" else (-1.0, 1.0)
     if not (1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]):
         raise InputError(f"{option} must be {ACCEPTED[name]}, got {shown(text)}")
     return ends[0], ends[-1]
-
-
-def specified(
-    data: Measured,
-    law: str = EXACT,
-    constants: str = "regenerated",
-    setting: Setting | Premises | None = None,
-    held: Mapping[str, float] | None = None,
-    total: Known | None = None,
-    scale: float | Known | None = 1.0,
-    folder: Path | None = None,
-    oblique: Oblique | None = None,
-) -> FitSpec:
-    """Return the specification of a fit to data; InputError, SettingError or RecordError of one that cannot be.
-
-    Args:
-        data: the profile.
-        law: "exact", light solved exactly, or a law's name.
-        constants: which of the law's, as for `catalogue.load`.
-        setting: illumination, surface and scattering, or all premises; by default what the file states, else
-            "searchlight" (a pencil beam, normal, collimated), n = 1 and g = 0.
-        held: fixed quantities: alpha or A [-], l [unit of the data].
-        total: the total reflectance A [-], if that was measured too.
-        scale: the values are light times this: a number, one that is known to within an error, or None if unknown.
-        folder: of the records, by default the ones shipped.
-        oblique: the centre of a circle of the same medium's light, where a beam fell in obliquely.
-    """
-    records, held = folder or catalogue.fits_folder(), {**(held or {})}
-    where = Premises(setting) if isinstance(setting, Setting) else setting or premises(data, law)
-    illumination, n = where.setting.illumination, where.setting.n
-    if data.illumination not in (None, illumination):
-        got = f"{data.illumination} light, got {illumination} light to fit"
-        raise InputError(f"{data.source}: a simulation of {got}")
-    if oblique is not None and illumination != Setting().illumination:
-        raise InputError(f"oblique light must be a {Setting().illumination}, got {illumination} light to fit")
-    light = _light(law, constants, where.setting, records)
-    _require_held(light, held)
-    if not (scale is None or isinstance(scale, Known)):
-        held["scale"] = _positive("scale", scale)
-    known = scale if isinstance(scale, Known) else None
-    notes = where.notes
-    if data.n is not None and not math.isclose(data.n, n):
-        notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")
-    return FitSpec(
-        light, held, total, known, oblique, where.instrument, where.ranges, where.assumed,
-        origin(law, constants, light.setting, records), law, constants, notes,
-    )  # fmt: skip
-
-
-def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
-    if law == EXACT:
-        if constants != "regenerated":
-            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
-        return exact_light(setting)
-    if law not in profile_classes() and not law.startswith("gaussians:"):
-        raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")
-    return catalogue.load(law, constants, setting, folder)
-
-
-def _require_held(law: Light, held: Mapping[str, float]) -> None:
-    if unknown := [name for name in held if name not in HOLDABLE]:
-        raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
-    if {"alpha", "A"} <= set(held):
-        raise InputError("held must have one of alpha and A, which say the same, got both")
-    for name, value in held.items():
-        if name == "l":
-            _positive("held l", value)
-        else:
-            held_albedo(law, name, value)
-
-
-def _positive(name: str, value: float) -> float:
-    if not value > 0:
-        raise InputError(f"{name} must be a number > 0, got {value!r}")
-    return value

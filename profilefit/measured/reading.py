@@ -1,4 +1,4 @@
-"""Files of measured profiles: a header, then one row for each radius or annulus; errors name file, line and column.
+"""Files of profiles: measured ones are tables, simulated ones .mco and .npz; errors name file, line and column.
 
     r [mm], value [1/mm^2], sigma        a value and its standard error at a radius
     r, value1, value2, value3            three replicates or more, whose mean and standard error are used
@@ -15,7 +15,12 @@ go red, green, blue, red, ...; those of one colour are replicates. Pixels are al
 spot; values are in a measure of the instrument's own. Between records there may be lines of words. Pixels before the
 brightest one see the spot and are left out; of the others, neighbours are averaged.
 
-Simulated profiles are read by `simulated_file`.
+MCML's .mco holds no errors. A photon's weight w is at most that with which it entered, 1 - R_specular, so the mean of
+w^2 over a ring of energy E is at most E (1 - R_specular): the fit uses that bound, its errors are bounds too, and its
+chi-square is at most what it should be. The .npz that `mcml-sim run` writes has the errors. The last ring of an .mco,
+which holds all light beyond it, is left out. Rings share the photons of their run, which correlates them (see `noise`):
+their covariance -E_i E_j / (N - 1) is exact where a photon leaves once and as a whole. Leaving out far rings of few
+photons would leave out the absence of light: neighbours are merged until each holds enough, the empty tail included.
 """
 
 from __future__ import annotations
@@ -28,10 +33,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.medium import Medium
+from mcml_sim.results import mco, tally
 from profilefit.errors import InputError
 from profilefit.measured.data import (
     FEWEST,
@@ -45,7 +53,6 @@ from profilefit.measured.data import (
     factor,
     moderated_variances,
 )
-from profilefit.measured.simulated_file import SIMULATED, UNIT
 
 MAX_BYTES = 2**22  # far beyond any profile, near enough that a wrong file fails at once
 MOST_LINES = 20_000  # a fit takes five hundred rows of them
@@ -72,15 +79,7 @@ FACTS = {
     "n": ("n", "refractive index", "refractive index n", "index of refraction", "refraction index", "ior"),
     "g": ("g", "anisotropy", "anisotropy g", "anisotropy factor", "anisotropy factor g", "mean cosine", "asymmetry"),
     "beam": ("beam", "beam radius", "spot radius", "1/e^2 radius", "1/e2 radius", "1/e² radius"),
-    "fibre": (
-        "fibre",
-        "fiber",
-        "fibre radius",
-        "fiber radius",
-        "fibre core radius",
-        "fiber core radius",
-        "core radius",
-    ),
+    "fibre": ("core radius", *(one + rest for one in ("fibre", "fiber") for rest in ("", " radius", " core radius"))),
     "unit": ("unit", "units", "unit of r", "units of r", "unit of length", "length unit"),
 }
 FACT = {spelling: name for name, spellings in FACTS.items() for spelling in spellings}
@@ -100,6 +99,13 @@ CELLS = re.compile(r"[\s,;]+")
 LARGEST_VALUE = 1e12
 MOST_RECORDS = 3000
 MOST_PIXELS = 4096
+UNIT = "cm"  # of simulated profiles
+FEWEST_PHOTONS = 100.0  # of a ring, whose standard error is then known to 10 %, and near enough to a normal one
+NARROWEST = 0.03  # of a ring, relative to its radius: narrower ones add no information about a smooth profile
+FEWEST_RINGS = 3
+MOST_LAYERS = 6  # that a note names
+ENDLESS = 1e4  # cm: what users of MCML write for a half space is 1e8
+ALL_LIGHT = 1.0 + 1e-3  # files are rounded
 
 
 def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str | None = None) -> Measured:
@@ -115,65 +121,55 @@ def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str 
     """
     kind = path.suffix.lower()
     content = b"" if kind in SIMULATED else read_whole(path, TLS_BYTES)  # once: a pipe has no second reading
-    if is_tls(content):
-        return read_tls(path, content, colour, scaled)
+    words = content[:HEAD_BYTES].decode("utf-8", "replace").lower()
+    first = next((line for line in words.splitlines() if line.strip()), "")
+    if [word for word in CELLS.split(first.strip(" \ufeff")) if word][:3] == ["record", "pixel", "value"]:
+        return _read_tls(path, content, colour, scaled)
     if colour is not None:
         raise InputError(f"colour must be left out but for records of a TLS850, got {colour!r}")
     if kind not in SIMULATED:
-        return read_table(path, content, unit, scaled)
+        return _read_table(path, content, unit, scaled)
     if unit not in (None, UNIT):
-        raise InputError(
-            f"unit must be {UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}, got {unit!r}"
-        )
+        expected = f"{UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}"
+        raise InputError(f"unit must be {expected}, got {unit!r}")
     return SIMULATED[kind](path)
 
 
-def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool = False) -> Measured:
-    """Read a table from a file's first MAX_BYTES + 1 bytes or more.
-
-    unit    of r if the header has none; scaled whether the scale of the values is unknown, and they in any measure
-    """
+def _read_table(path: Path, content: bytes, unit: str | None, scaled: bool) -> Measured:
+    """Read a table from a file's first MAX_BYTES + 1 bytes or more."""
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    header, rows = _cells(path, lines)
+    table = _table(path, lines)
     stated, others = _stated(path, lines)
     named = stated.pop("unit", None)
     notes = _notes(others, named, unit)
     unit = named.text if named is not None and unit is None else unit
-    numbers = _numbers(path, header, rows)
-    inner, outer = _radii(path, header, rows, numbers)
-    length = _length_unit(path, header, unit)
-    means, errors = _values(path, header, rows, numbers)
-    _require_one_measure(path, header)
-    times = _value_factor(path, header, length, scaled)
+    numbers = _numbers(table)
+    inner, outer = _radii(table, numbers)
+    length = _length_unit(table, unit)
+    means, errors = _values(table, numbers)
+    _require_one_measure(table)
+    times = _value_factor(table, length, scaled)
     return Measured(
-        str(path),
-        hashlib.sha256(content).hexdigest(),
-        inner,
-        outer,
-        means.value * times,
-        means.sigma * times,
-        means.freedom,
-        errors,
-        length,
-        pooled=means.pooled,
-        notes=notes,
-        stated=stated,
-    )
+        str(path), hashlib.sha256(content).hexdigest(), inner, outer, means.value * times, means.sigma * times,
+        means.freedom, errors, length, pooled=means.pooled, notes=notes, stated=stated,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class _Header:
-    """Header of a table.
+class _Table:
+    """Table as text.
 
-    names, units  of the columns in their order; "" where a unit is not given. line where it stands in the file.
+    names, units  of the columns in their order; "" where a unit is not given. line where the header stands
+    rows          the line and the cells of each
     """
 
+    path: Path
     names: tuple[str, ...]
     units: tuple[str, ...]
     line: int
-    delimiter: str
+    rows: list[tuple[int, tuple[str, ...]]]
 
     @property
     def replicates(self) -> tuple[str, ...]:
@@ -186,11 +182,13 @@ class _Header:
     def unit(self, name: str) -> str:
         return self.units[self.names.index(name)]
 
+    def bad(self, line: int, name: str, expected: str, got: str) -> InputError:
+        """Return the error of a cell, or of a column's head."""
+        return _bad(self.path, line, f"column {name}: expected {expected}", got)
 
-@dataclass(frozen=True)
-class _Row:
-    line: int
-    cells: tuple[str, ...]
+
+def _bad(path: Path, line: int, expected: str, got: object) -> InputError:
+    return InputError(f"{path}:{line}: {expected}, got {got}")
 
 
 def _text(path: Path, content: bytes) -> str:
@@ -198,10 +196,9 @@ def _text(path: Path, content: bytes) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte {content[error.start]:#04x}") from None
+        raise _bad(path, line, "expected text in UTF-8", f"the byte {content[error.start]:#04x}") from None
     if "\x00" in text:
-        line = text[: text.index("\x00")].count("\n") + 1
-        raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte 0x00")
+        raise _bad(path, text[: text.index("\x00")].count("\n") + 1, "expected text in UTF-8", "the byte 0x00")
     return text
 
 
@@ -216,15 +213,14 @@ def _stated(path: Path, lines: list[str]) -> tuple[dict[str, Fact], list[Fact]]:
         words = re.sub(r"[\s_-]+", " ", BRACKETED.sub(" ", spelled)).strip().lower()
         name = FACT.get(words)
         if name is None:
-            is_sentence = (
-                len(words.split()) > LONGEST_NAME or value.startswith("//") or not re.search(r"[^\W\d]", words)
-            )
+            is_long = len(words.split()) > LONGEST_NAME
+            is_sentence = is_long or value.startswith("//") or not re.search(r"[^\W\d]", words)
             others += [] if is_sentence or not value else [Fact(spelled, at)]
             continue
         if name in facts:
-            raise InputError(f"{path}:{at}: expected {name} once, got it again")
+            raise _bad(path, at, f"expected {name} once", "it again")
         if not value:
-            raise InputError(f"{path}:{at}: expected a value of {name}, got none")
+            raise _bad(path, at, f"expected a value of {name}", "none")
         unit = next((word for word in BRACKETED.findall(spelled) for word in word if word in UNITS), "")
         facts[name] = Fact(f"{value} {unit}" if unit and value[-1:].isdigit() else value, at)
     return facts, others
@@ -242,7 +238,7 @@ def _notes(others: list[Fact], named: Fact | None, unit: str | None) -> tuple[st
     return tuple(notes)
 
 
-def _cells(path: Path, lines: list[str]) -> tuple[_Header, list[_Row]]:
+def _table(path: Path, lines: list[str]) -> _Table:
     if len(lines) > MOST_LINES:
         raise InputError(f"{path}: expected a profile of at most {MOST_LINES} lines, got {len(lines)}")
     kept = [(at, line.partition("#")[0]) for at, line in enumerate(lines, start=1)]
@@ -251,28 +247,25 @@ def _cells(path: Path, lines: list[str]) -> tuple[_Header, list[_Row]]:
         raise InputError(f"{path}: expected a header and rows ({ACCEPTED}), got an empty file")
     at, first = kept[0]
     delimiter = next((one for one in DELIMITERS if one in first.strip()), ",")
-    names = tuple(WORD.findall(first)) if delimiter == " " else _split(path, at, first, delimiter)
+    heads = tuple(WORD.findall(first)) if delimiter == " " else _split(path, at, first, delimiter)
     # The columns after the last one with a name are those that spreadsheets leave empty.
-    header = _header(path, at, names[: max((i for i, name in enumerate(names, 1) if name), default=0)], delimiter)
-    rows = [_row(path, header, line, text) for line, text in kept[1:]]
+    names, units = _header(path, at, heads[: max((i for i, head in enumerate(heads, 1) if head), default=0)])
+    rows = [(line, _row(path, len(names), delimiter, line, text)) for line, text in kept[1:]]
     if len(rows) < FEWEST_ROWS:
         raise InputError(f"{path}: expected at least {FEWEST_ROWS} rows under the header, got {len(rows)}")
-    return header, rows
+    return _Table(path, names, units, at, rows)
 
 
-def _row(path: Path, header: _Header, at: int, line: str) -> _Row:
-    cells = _split(path, at, line, header.delimiter)
-    wanted = len(header.names)
-    if not any(cells[wanted:]):
-        cells = cells[:wanted]
-    if len(cells) != wanted:
-        expected = f"{wanted} cells between {DELIMITERS[header.delimiter]}s, as the header has"
-        pairs = (
-            header.delimiter == "," and wanted < len(cells) <= 2 * wanted and all(_is_number(cell) for cell in cells)
-        )
+def _row(path: Path, count: int, delimiter: str, at: int, line: str) -> tuple[str, ...]:
+    cells = _split(path, at, line, delimiter)
+    if not any(cells[count:]):
+        cells = cells[:count]
+    if len(cells) != count:
+        pairs = delimiter == "," and count < len(cells) <= 2 * count and all(_is_number(cell) for cell in cells)
         hint = ": if its numbers have decimal commas, write 0.5 for 0,5" if pairs else ""
-        raise InputError(f"{path}:{at}: expected {expected}, got {len(cells)}{hint}")
-    return _Row(at, cells)
+        expected = f"expected {count} cells between {DELIMITERS[delimiter]}s, as the header has"
+        raise _bad(path, at, expected, f"{len(cells)}{hint}")
+    return cells
 
 
 def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
@@ -284,26 +277,24 @@ def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
         raise InputError(f"{path}:{at}: expected cells between {DELIMITERS[delimiter]}s, got: {error}") from None
 
 
-def _header(path: Path, at: int, cells: tuple[str, ...], delimiter: str) -> _Header:
+def _header(path: Path, at: int, cells: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units of the columns."""
     if len(cells) > MOST_COLUMNS:
-        raise InputError(f"{path}:{at}: expected at most {MOST_COLUMNS} columns, got {len(cells)}")
+        raise _bad(path, at, f"expected at most {MOST_COLUMNS} columns", len(cells))
     cells = tuple(" ".join(cell.split()) for cell in cells)
     are_shown = [len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells]  # as they are, in messages
     matches = [HEADING.fullmatch(cell) if shown else None for cell, shown in zip(cells, are_shown, strict=True)]
     words = [match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True)]
     names = tuple(NAMES.get(word, word) for word in words)
-    units = tuple(_unit(match) for match in matches)
-    header = _Header(names, units, at, delimiter)
     for word, name in zip(words, names, strict=True):
         if names.count(name) > 1:
-            raise InputError(f"{path}:{at}: expected each column once, got {_shown(name)} {names.count(name)} times")
+            raise _bad(path, at, "expected each column once", f"{_shown(name)} {names.count(name)} times")
         if name not in NAMES and not REPLICATE.fullmatch(name):
             hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
-            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got the column {_shown(word)}{hint}")
-    missing = next(_missing(header), None)
-    if missing:
-        raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {missing}")
-    return header
+            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {_shown(word)}{hint}")
+    if missing := next(_missing(names), None):
+        raise _bad(path, at, f"expected a header of {ACCEPTED}", missing)
+    return names, tuple(_unit(match) for match in matches)
 
 
 def _unit(match: re.Match[str] | None) -> str:
@@ -311,44 +302,41 @@ def _unit(match: re.Match[str] | None) -> str:
     return unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit  # value / (1/mm^2)
 
 
-def _missing(header: _Header) -> Iterator[str]:
+def _missing(names: tuple[str, ...]) -> Iterator[str]:
     """Yield what a header lacks, or has too much of."""
-    names, replicates = header.names, header.replicates
+    replicates = sum(1 for name in names if REPLICATE.fullmatch(name))
     if ("r_in" in names) != ("r_out" in names):
         yield "one of r_in and r_out without the other"
-    if ("r" in names) == header.rings:
-        yield "both r and r_in" if header.rings else "no column r"
+    if ("r" in names) == ("r_in" in names):
+        yield "both r and r_in" if "r" in names else "no column r"
     if replicates and ("value" in names or "sigma" in names):
         yield "replicates beside value or sigma"
-    if replicates and len(replicates) < FEWEST:
-        yield f"{len(replicates)} replicates: fewer than {FEWEST} give no useful standard error"
+    if replicates and replicates < FEWEST:
+        yield f"{replicates} replicates: fewer than {FEWEST} give no useful standard error"
     if not replicates and "value" not in names:
         yield "no column value"
     if not replicates and "sigma" not in names:
         yield "no column sigma: a fit needs the standard errors of its data"
 
 
-def _numbers(path: Path, header: _Header, rows: list[_Row]) -> dict[str, Floats]:
+def _numbers(table: _Table) -> dict[str, Floats]:
     """Return every column as numbers (n,), all of them finite."""
-    table = np.empty((len(rows), len(header.names)))
-    for i, row in enumerate(rows):
-        for j, (name, cell) in enumerate(zip(header.names, row.cells, strict=True)):
-            table[i, j] = _number(path, row.line, name, cell)
-    return dict(zip(header.names, table.T, strict=True))
+    cells = [[_number(table, line, *each) for each in zip(table.names, row, strict=True)] for line, row in table.rows]
+    return dict(zip(table.names, np.array(cells).T, strict=True))
 
 
-def _number(path: Path, line: int, name: str, cell: str) -> float:
+def _number(table: _Table, line: int, name: str, cell: str) -> float:
     if _is_number(cell):
         return float(cell)
-    place, expected = f"{path}:{line}: column {name}", "a finite number"
     if DECIMAL_COMMA.fullmatch(cell):
-        raise InputError(f"{place}: expected a decimal point, as in 0.5 for 0,5, got the decimal comma {_shown(cell)}")
+        raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {_shown(cell)}")
+    expected = "a finite number"
     with contextlib.suppress(ValueError):
         if math.isfinite(float(cell)) and "_" not in cell:
             expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
     if not cell and REPLICATE.fullmatch(name):
         expected += ", since every row has all replicates"
-    raise InputError(f"{place}: expected {expected}, got {_shown(cell)}")
+    raise table.bad(line, name, expected, _shown(cell))
 
 
 def _is_number(cell: str) -> bool:
@@ -359,98 +347,85 @@ def _is_number(cell: str) -> bool:
     return (size == 0 or SMALLEST <= size <= LARGEST) and "_" not in cell
 
 
-def _radii(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Floats]) -> tuple[Floats, Floats]:
+def _radii(table: _Table, numbers: dict[str, Floats]) -> tuple[Floats, Floats]:
     """Return inner and outer radii (n,), rising."""
-    inner = numbers["r_in"] if header.rings else numbers["r"]
-    outer = numbers["r_out"] if header.rings else numbers["r"]
-    first = "r_in" if header.rings else "r"
-    for i, row in enumerate(rows):
-        place = f"{path}:{row.line}: column {first}"
-        if inner[i] < 0 or (inner[i] == 0 and not header.rings):
-            least = ">= 0" if header.rings else "> 0, since the profile is infinite at 0"
-            raise InputError(f"{place}: expected a radius {least}, got {inner[i]:g}")
-        if outer[i] <= inner[i] and header.rings:
-            raise InputError(f"{path}:{row.line}: column r_out: expected more than r_in {inner[i]:g}, got {outer[i]:g}")
-        if i and (inner[i] < outer[i - 1] or (inner[i] == outer[i - 1] and not header.rings)):
-            expected = (
-                f"at least the r_out {outer[i - 1]:g} before" if header.rings else f"r to rise above {outer[i - 1]:g}"
-            )
+    first, last = ("r_in", "r_out") if table.rings else ("r", "r")
+    inner, outer = numbers[first], numbers[last]
+    for i, (line, _) in enumerate(table.rows):
+        if inner[i] < 0 or (inner[i] == 0 and not table.rings):
+            least = ">= 0" if table.rings else "> 0, since the profile is infinite at 0"
+            raise table.bad(line, first, f"a radius {least}", f"{inner[i]:g}")
+        if outer[i] <= inner[i] and table.rings:
+            raise table.bad(line, last, f"more than r_in {inner[i]:g}", f"{outer[i]:g}")
+        if i and (inner[i] < outer[i - 1] or (inner[i] == outer[i - 1] and not table.rings)):
+            before = f"{outer[i - 1]:g}"
+            expected = f"at least the r_out {before} before" if table.rings else f"r to rise above {before}"
             again = ": replicates stand in one row, as value1, value2, value3" if inner[i] == inner[i - 1] else ""
-            raise InputError(f"{place}: expected {expected}, got {inner[i]:g}{again}")
+            raise table.bad(line, first, expected, f"{inner[i]:g}{again}")
     return inner, outer
 
 
-def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Floats]) -> tuple[ModeratedVariance, str]:
+def _values(table: _Table, numbers: dict[str, Floats]) -> tuple[ModeratedVariance, str]:
     """Return values with their standard errors, and the kind of the errors in words."""
-    if header.replicates:
-        samples = np.stack([numbers[name] for name in header.replicates], axis=1)
-        _require_light(path, samples.mean(axis=1))
-        means = moderated_variances(samples)
-        errors = f"standard errors of the means of {samples.shape[1]} replicates, variances moderated by their trend"
-        named = header.replicates[0]
+    if table.replicates:
+        samples = np.stack([numbers[name] for name in table.replicates], axis=1)
+        value, named = samples.mean(axis=1), table.replicates[0]
     else:
-        _require_light(path, numbers["value"])
-        means = ModeratedVariance(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
-        named, errors = "sigma", "as given"
-    for row, one in zip(rows, means.sigma, strict=True):
-        if not 0 < one < np.inf and header.replicates:
+        samples, value, named = None, numbers["value"], "sigma"
+    if not np.any(value > 0):
+        raise InputError(f"{table.path}: expected a value above 0, got none")
+    if samples is None:
+        means, errors = ModeratedVariance(value, numbers["sigma"], np.full(value.size, np.inf), np.inf), "as given"
+    else:
+        means, errors = moderated_variances(samples), _moderated(f"{samples.shape[1]} replicates")
+    for (line, _), one in zip(table.rows, means.sigma, strict=True):
+        if not 0 < one < np.inf and samples is not None:
             expected = f"replicates that differ, here or in {FEWEST} other rows, to know their standard error"
-            raise InputError(f"{path}:{row.line}: column {named}: expected {expected}, got the same value in all")
+            raise table.bad(line, named, expected, "the same value in all")
         if not one > 0:
-            raise InputError(f"{path}:{row.line}: column {named}: expected a standard error > 0, got {one:g}")
+            raise table.bad(line, named, "a standard error > 0", f"{one:g}")
     return means, errors
 
 
-def _require_light(path: Path, value: Floats) -> None:
-    if not np.any(value > 0):
-        raise InputError(f"{path}: expected a value above 0, got none")
+def _moderated(samples: str) -> str:
+    return f"standard errors of the means of {samples}, variances moderated by their trend"
 
 
-def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
-    names = ("r_in", "r_out") if header.rings else ("r",)
-    written = {header.unit(name) for name in names} - {""}
+def _length_unit(table: _Table, unit: str | None) -> str:
+    names = ("r_in", "r_out") if table.rings else ("r",)
+    written = {table.unit(name) for name in names} - {""}
     for one in written:
         if one not in UNITS:
-            raise InputError(
-                f"{path}:{header.line}: column {names[0]}: expected a unit of {', '.join(UNITS)}, got {_shown(one)}"
-            )
-    if len({UNITS.get(one) for one in written | ({unit} if unit else set())}) > 1:
-        units = ", ".join(sorted(written | ({unit} if unit else set())))
-        raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in `unit`, got {units}")
+            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", _shown(one))
+    units = written | ({unit} if unit else set())
+    if len({UNITS.get(one) for one in units}) > 1:
+        raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
     return written.pop() if written else checked_unit("unit", unit) if unit else ""
 
 
-def _require_one_measure(path: Path, header: _Header) -> None:
+def _require_one_measure(table: _Table) -> None:
     """InputError where an error, or another replicate, has a unit that is not the first value's."""
-    first, *others = header.replicates or ("value", "sigma")
+    first, *others = table.replicates or ("value", "sigma")
+    own = table.unit(first)
     for name in others:
-        if not _equal_measures(header.unit(name) or header.unit(first), header.unit(first)):
-            expected = f"the unit of {first}, [{header.unit(first)}], or none"
-            raise InputError(f"{path}:{header.line}: column {name}: expected {expected}, got [{header.unit(name)}]")
+        unit = table.unit(name) or own
+        areas = area_unit(unit), area_unit(own)  # one measure may be spelled in several ways
+        if unit != own and (None in areas or UNITS[str(areas[0])] != UNITS[str(areas[1])]):
+            raise table.bad(table.line, name, f"the unit of {first}, [{own}], or none", f"[{table.unit(name)}]")
 
 
-def _equal_measures(one: str, other: str) -> bool:
-    """Return whether two texts are one measure, however spelled."""
-    areas = area_unit(one), area_unit(other)
-    return one == other or (None not in areas and UNITS[str(areas[0])] == UNITS[str(areas[1])])
-
-
-def _value_factor(path: Path, header: _Header, length: str, scaled: bool) -> float:
+def _value_factor(table: _Table, length: str, scaled: bool) -> float:
     """Return the factor to values per area in the unit of r; 1 where they are in any other measure."""
-    name = header.replicates[0] if header.replicates else "value"
-    text = header.unit(name)
-    if not text:
-        return 1.0
+    name = table.replicates[0] if table.replicates else "value"
+    text = table.unit(name)
     unit = area_unit(text)
-    if scaled and (unit is None or not length):
+    if not text or (scaled and (unit is None or not length)):
         return 1.0
     if unit is None:
-        raise InputError(
-            f"{path}:{header.line}: column {name}: expected light per area such as [1/mm^2], or `scaled` for any "
-            f"other measure, got [{text}]"
-        )
+        expected = "light per area such as [1/mm^2], or `scaled` for any other measure"
+        raise table.bad(table.line, name, expected, f"[{text}]")
     if not length:
-        raise InputError(f"{path}:{header.line}: column r: expected a unit, as {name} has one ([{text}]), got none")
+        raise table.bad(table.line, "r", f"a unit, as {name} has one ([{text}])", "none")
     return factor(unit, length) ** -2
 
 
@@ -458,14 +433,7 @@ def _shown(cell: str) -> str:
     return repr(cell if len(cell) <= LONGEST_SHOWN else f"{cell[: LONGEST_SHOWN - 3]}...")
 
 
-def is_tls(content: bytes) -> bool:
-    """Return whether the first words of a text file are those of a TLS850."""
-    words = content[:HEAD_BYTES].decode("utf-8", "replace").lower()
-    first = next((line for line in words.splitlines() if line.strip()), "")
-    return [word for word in CELLS.split(first.strip(" \ufeff")) if word][:3] == ["record", "pixel", "value"]
-
-
-def read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
+def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
     """Read the records of one colour from a file's first TLS_BYTES + 1; InputError names the line of what is wrong."""
     if colour not in COLOURS:
         raise InputError(f"{path}: `colour` must be one of {', '.join(COLOURS)}, got {colour!r}")
@@ -473,8 +441,7 @@ def read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Me
         raise InputError(f"{path}: expected `scaled`, since the instrument's values are in a measure of its own")
     if len(content) > TLS_BYTES:
         raise InputError(f"{path}: expected records of at most {TLS_BYTES} bytes, got a longer file")
-    whole = _records(path, content.decode("utf-8", "replace"))
-    samples = whole[COLOURS.index(colour) :: len(COLOURS)]
+    samples = _records(path, content.decode("utf-8", "replace"))[COLOURS.index(colour) :: len(COLOURS)]
     if len(samples) < FEWEST:
         raise InputError(f"{path}: expected {FEWEST} records of a colour or more, got {len(samples)}")
     r = np.linspace(0.0, LENGTH, samples.shape[1])
@@ -486,14 +453,11 @@ def read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Me
     means = samples[:, kept].reshape(len(samples), groups, AVERAGED).mean(axis=2)
     middle = r[kept].reshape(groups, AVERAGED).mean(axis=1)
     moderated = moderated_variances(means.T)
-    notes = (
-        f"{colour}: {len(samples)} records; {start} pixels up to the brightest one left out, the others "
-        f"averaged by {AVERAGED}",
-    )
-    errors = f"standard errors of the means of {len(samples)} records, variances moderated by their trend"
+    left = f"{start} pixels up to the brightest one left out, the others averaged by {AVERAGED}"
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), middle, middle, moderated.value, moderated.sigma,
-        moderated.freedom, errors, "mm", pooled=moderated.pooled, notes=notes,
+        moderated.freedom, _moderated(f"{len(samples)} records"), "mm", pooled=moderated.pooled,
+        notes=(f"{colour}: {len(samples)} records; {left}",),
     )  # fmt: skip
 
 
@@ -504,22 +468,119 @@ def _records(path: Path, text: str) -> Floats:
         cells = [cell for cell in CELLS.split(line.strip(" \ufeff\t")) if cell]
         if not cells or not cells[0].isdigit():
             continue  # words between records
-        record, pixel, value = _tls_row(path, at, cells)
+        try:
+            record, pixel, value = int(cells[0]), int(cells[1]), float(cells[2])
+        except (ValueError, IndexError):
+            value = math.nan
+        if len(cells) != 3 or not abs(value) < LARGEST_VALUE:
+            raise _bad(path, at, "expected a record, a pixel and a value", repr(" ".join(cells)[:40]))
         if record == len(records) + 1 and pixel == 1 and record <= MOST_RECORDS:
             records.append([])
         if record != len(records) or pixel != len(records[-1]) + 1 or pixel > MOST_PIXELS:
-            raise InputError(f"{path}:{at}: expected records and pixels that count from 1, got {record} and {pixel}")
+            raise _bad(path, at, "expected records and pixels that count from 1", f"{record} and {pixel}")
         records[-1].append(value)
     if not records or len({len(one) for one in records}) != 1:
         raise InputError(f"{path}: expected records of as many pixels each, got {len(records)} that differ, or none")
     return np.array(records)
 
 
-def _tls_row(path: Path, at: int, cells: list[str]) -> tuple[int, int, float]:
-    try:
-        record, pixel, value = int(cells[0]), int(cells[1]), float(cells[2])
-    except (ValueError, IndexError):
-        raise InputError(f"{path}:{at}: expected a record, a pixel and a value, got {' '.join(cells)[:40]!r}") from None
-    if len(cells) != 3 or not abs(value) < LARGEST_VALUE:
-        raise InputError(f"{path}:{at}: expected a record, a pixel and a value, got {' '.join(cells)[:40]!r}")
-    return record, pixel, value
+def _read_mco(path: Path) -> Measured:
+    """Read Rd_r of an .mco file, lengths in cm."""
+    content = read_whole(path, mco.MAX_BYTES)
+    result = mco.parse_mco(content, str(path))
+    grid, photons = result.run.grid, result.run.photons
+    entered = 1.0 - result.specular_reflectance
+    if not entered > 0:
+        raise InputError(f"{path}: expected a specular reflectance below 1, got {result.specular_reflectance:g}")
+    energy = (result.reflectance_r * grid.r_areas)[:-1]
+    each = entered / photons
+    return _counted(
+        path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
+        errors="bounds: no photon weighs more than it entered with", bounded=True, medium=result.run.medium,
+        illumination="searchlight",
+        notes=(f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",),
+    )  # fmt: skip
+
+
+def _read_npz(path: Path) -> Measured:
+    """Read reflectance_r of the results of `mcml-sim run`, with its own errors, lengths in cm."""
+    content = read_whole(path, tally.MAX_BYTES)
+    result = tally.parse_results(content, str(path))
+    if result.photons < 2:
+        raise InputError(f"{path}: expected two photons or more, since one has no standard error, got 1")
+    estimate, areas = result.estimates["reflectance_r"], result.grid.r_areas
+    with np.errstate(over="ignore"):  # impossible reflectances are refused below
+        energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
+    if not np.all(error <= ALL_LIGHT):
+        raise InputError(f"{path}: expected standard errors of no more than all of the light")
+    _require_light(path, energy)
+    return _counted(
+        path, content, result.grid.r_edges, energy, error**2 + energy**2 / (result.photons - 1.0),
+        np.asarray(estimate.effective_samples), float(result.photons), errors="standard errors of the simulation",
+        medium=result.medium, illumination=result.illumination, notes=(),
+    )  # fmt: skip
+
+
+def _counted(
+    path: Path, content: bytes, edges: Floats, energy: Floats, squares: Floats, seen: Floats, photons: float, **run: Any
+) -> Measured:
+    """Return rings merged until each holds enough of the run's N photons, from (n,) rings; `run` as of `Measured`.
+
+    energy  E of each; squares the sum of w^2 of its photons over N (N - 1), whose excess over E^2 / (N - 1) is the
+            variance of E; seen the photons that it is estimated from
+    """
+    _require_light(path, energy)
+    starts = merged(edges, seen)
+    if starts.size < FEWEST_RINGS:
+        expected = f"at least {FEWEST_RINGS} annuli of {FEWEST_PHOTONS:.0f} photons each"
+        raise InputError(f"{path}: expected {expected}, got {float(seen.sum()):.0f} in all")
+    inner, outer = edges[starts], np.append(edges[starts[1:]], edges[-1])
+    areas = np.pi * (outer - inner) * (outer + inner)
+    whole = np.add.reduceat(energy, starts)
+    variance = np.add.reduceat(squares, starts) - whole**2 / (photons - 1.0)
+    if not np.all(variance > 0):
+        at = int(np.argmin(variance > 0))
+        raise InputError(f"{path}: expected a standard error > 0 of the light from r = {inner[at]:g} to {outer[at]:g}")
+    notes = [*run.pop("notes"), *_layers(run["medium"])]
+    if starts.size < energy.size:
+        notes.append(f"{energy.size} annuli merged into {starts.size}, of at least {FEWEST_PHOTONS:.0f} photons each")
+    return Measured(
+        str(path), hashlib.sha256(content).hexdigest(), inner, outer, whole / areas, np.sqrt(variance) / areas,
+        np.full(whole.size, np.inf), unit=UNIT, counted=True, photons=photons, notes=tuple(notes), **run,
+    )  # fmt: skip
+
+
+def _layers(medium: Medium) -> Iterator[str]:
+    """Yield notes on what a medium has that no half space has."""
+    if len(medium.layers) > 1:
+        each = (
+            f"n {one.n:g}, mu_a {one.mu_a:g}, mu_s' {one.similar.mu_s:g} 1/cm, "
+            + ("endless" if math.isinf(one.thickness) else f"{one.thickness:g} cm")
+            for one in medium.layers[:MOST_LAYERS]
+        )
+        more = f"; and {len(medium.layers) - MOST_LAYERS} more" if len(medium.layers) > MOST_LAYERS else ""
+        yield f"the file's {len(medium.layers)} layers, from above: {'; '.join(each)}{more}"
+    if not (medium.is_half_space or medium.z_edges[-1] > ENDLESS):
+        yield (
+            f"the file's medium is a slab {medium.z_edges[-1]:g} cm thick, fitted as a half space: light that leaves "
+            "below reads as absorbed"
+        )
+
+
+def _require_light(path: Path, energy: Floats) -> None:
+    if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
+        raise InputError(f"{path}: expected annuli of reflectance >= 0 that add up to at most 1")
+
+
+def merged(edges: Floats, photons: Floats) -> np.ndarray:
+    """Return where the merged rings start (m,), from the innermost out; what is left at the end joins the last one."""
+    starts, held, begin = [], 0.0, 0
+    for at, one in enumerate(photons):
+        held += one
+        if held >= FEWEST_PHOTONS and edges[at + 1] - edges[begin] >= NARROWEST * edges[at + 1]:
+            starts.append(begin)
+            held, begin = 0.0, at + 1
+    return np.array(starts, int)
+
+
+SIMULATED = {".mco": _read_mco, ".npz": _read_npz}

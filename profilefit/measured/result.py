@@ -1,11 +1,12 @@
 """The posterior of a fit: values, intervals, identifiability, the best additional measurement; and its JSON content.
 
-Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k: nothing is known of the units, and alpha may be 1. Errors
-estimated from replicates share a scale that is itself an estimate: with that unknown the likelihood is Student's t.
+Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k. Errors estimated from replicates share a scale that is
+itself an estimate: with that unknown the likelihood is Student's t.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
 from profilefit.fitting.chains import Node, Ridge, Walk, sample
 from profilefit.fitting.misfit import likelihood
 from profilefit.fitting.solver import Solution
+from profilefit.laws import profile_classes
 from profilefit.measured import model
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit, fitted
@@ -33,16 +36,17 @@ from profilefit.measured.identifiability import (
     identifiability,
     rank_designs,
 )
-from profilefit.measured.model import EXACT, FLOCK, NAMES, U, u_of
-from profilefit.measured.oblique import Oblique
-from profilefit.measured.premises import Premises, specified
-from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, Known, descended, log_prior
+from profilefit.measured.model import EXACT, FLOCK, NAMES, Light, Oblique, U, exact_light, u_of
+from profilefit.measured.noise import origin
+from profilefit.measured.premises import Premises, premises
+from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, FitSpec, Known, descended, held_albedo, log_prior
 from profilefit.measured.reading import read
-from profilefit.recipes import record
+from profilefit.recipes import catalogue, record
 
 Floats = NDArray[np.float64]
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
+HOLDABLE = ("alpha", "A", "l")
 GREY = 0.9  # albedo assumed for the advice where the data do not bound it at all
 KEPT = 4000  # draws
 WALKERS = 2 * FLOCK  # which move by halves
@@ -60,10 +64,9 @@ class MediumPosterior:
     Where the data do not exclude the end of a coordinate's range (alpha = 1, say: chi-square there is within the
     square of the 95 % quantile, 3.84 of known errors, of the minimum), the optimum is no estimate and the derivatives
     there give no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
-    no value; the others keep their interval, and a value if it lies inside. No value lies outside its own interval.
-    The limit is a quantile of the posterior, whose prior is flat in sqrt(1 - alpha) >= 0: it covers at 95 % or more.
-    Without a chain it is the end of the two-sided interval of the profile likelihood: 97.5 %. At an end no interval
-    includes the law's own error.
+    no value; the others keep their interval, and a value if it lies inside. The limit is a quantile of the posterior,
+    without a chain the end of the two-sided interval of the profile likelihood (97.5 %); neither includes the law's own
+    error.
     """
 
     fit: MediumFit
@@ -77,8 +80,7 @@ class MediumPosterior:
     def draws(self) -> dict[str, Floats]:
         """Posterior draws (k,) of every quantity by the errors of data and law; empty without a chain.
 
-        Draws by all errors are drawn towards the fit, in the coordinates, as far as the lack of fit widens their
-        covariance. At an end, where derivatives give no errors, they stay as they are.
+        They are draws by all errors, nearer to the fit by as much as the lack of fit widens their covariance.
         """
         if self.walk is None:
             return {}
@@ -93,10 +95,7 @@ class MediumPosterior:
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """Posterior draws (k,) of every quantity by all errors, with the lack of fit that is allowed for.
-
-        Empty at an end, and where neither the law's error nor a lack of fit is known.
-        """
+        """Posterior draws (k,) of every quantity by all errors; empty at an end, or if only the data's are known."""
         if self.walk is None or not self.identified or (self.fit.plain is None and self.fit.rel is None):
             return {}
         return self.draws if self.fit.plain is None else quantities_at(self.fit, self._sampled)
@@ -148,7 +147,7 @@ class MediumPosterior:
         return value if inside else None
 
     def interval(self, name: str) -> Ends | None:
-        """Return 95 % by the errors of data and law: of posterior draws; without a chain, of the profile likelihood.
+        """Return 95 % by the errors of data and law, of posterior draws; without a chain, of the profile likelihood.
 
         Both ends, or one and None: a one-sided limit. That limit, and the profile likelihood, are by all errors.
         """
@@ -187,9 +186,7 @@ def fit(
     folder: Path | None = None,
     oblique: Oblique | None = None,
 ) -> MediumPosterior:
-    """Fit a medium to a measured or simulated profile, and judge the fit.
-
-    A fit that fails is returned and says so.
+    """Fit a medium to a measured or simulated profile, and judge the fit; one that fails is returned and says so.
 
     Args:
         data: a file (see `reading.read`), or what was read from one, for example `within` some radii.
@@ -210,16 +207,60 @@ def fit(
         SettingError: the law does not cover the setting.
         RecordError: a record is missing or damaged.
     """
-    measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
-    spec = specified(measured, law, constants, setting, held, total, scale, folder, oblique)
-    return judged(fitted(measured, spec), seed, walk)
+    data = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
+    records, held = folder or catalogue.fits_folder(), {**(held or {})}
+    where = Premises(setting) if isinstance(setting, Setting) else setting or premises(data, law)
+    illumination, n = where.setting.illumination, where.setting.n
+    if data.illumination not in (None, illumination):
+        got = f"{data.illumination} light, got {illumination} light to fit"
+        raise InputError(f"{data.source}: a simulation of {got}")
+    if oblique is not None and illumination != Setting().illumination:
+        raise InputError(f"oblique light must be a {Setting().illumination}, got {illumination} light to fit")
+    light = _light(law, constants, where.setting, records)
+    _require_held(light, held)
+    known = scale if isinstance(scale, Known) else None
+    if not (scale is None or isinstance(scale, Known)):
+        held["scale"] = _positive("scale", scale)
+    notes = where.notes
+    if data.n is not None and not math.isclose(data.n, n):
+        notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")
+    spec = FitSpec(
+        light, held, total, known, oblique, where.instrument, where.ranges, where.assumed,
+        origin(law, constants, light.setting, records), law, constants, notes,
+    )  # fmt: skip
+    return judged(fitted(data, spec), seed, walk)
+
+
+def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
+    if law == EXACT:
+        if constants != "regenerated":
+            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
+        return exact_light(setting)
+    if law not in profile_classes() and not law.startswith("gaussians:"):
+        raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")
+    return catalogue.load(law, constants, setting, folder)
+
+
+def _require_held(law: Light, held: Mapping[str, float]) -> None:
+    if unknown := [name for name in held if name not in HOLDABLE]:
+        raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
+    if {"alpha", "A"} <= set(held):
+        raise InputError("held must have one of alpha and A, which say the same, got both")
+    for name, value in held.items():
+        if name == "l":
+            _positive("held l", value)
+        else:
+            held_albedo(law, name, value)
+
+
+def _positive(name: str, value: float) -> float:
+    if not value > 0:
+        raise InputError(f"{name} must be a number > 0, got {value!r}")
+    return value
 
 
 def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:
-    """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate.
-
-    Where an intermediate number is not finite, that is the fit's result, and nothing else is reported.
-    """
+    """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate."""
     if not fit.has_ended:
         return MediumPosterior(fit, None, None, None)
     try:
@@ -323,12 +364,9 @@ def rival_values(fit: MediumFit, rival: Solution) -> dict[str, float]:
 
 
 def content(result: MediumPosterior) -> dict[str, Any]:
-    """Return everything as JSON content; model errors are null where they are not known.
-
-    Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
-    """
+    """Return everything as JSON content; null are errors that are not known, and values and ends at an edge."""
     fit = result.fit
-    data, spec, names = fit.data, fit.spec, result.identified
+    data, spec, names, ranges = fit.data, fit.spec, result.identified, fit.range_marginal
     joint = model.correlation(fit.gradients, fit.statistical, names) if names else None
     body = {
         "data": {
@@ -359,9 +397,7 @@ def content(result: MediumPosterior) -> dict[str, Any]:
         "beam": None if spec.instrument.beam is None else spec.instrument.beam.words,
         "fibre": spec.instrument.fibre,
         "ranges": spec.ranges,
-        "of_ranges": None
-        if fit.range_marginal is None
-        else {"mean": fit.range_marginal.mean, "error": fit.range_marginal.error},
+        "of_ranges": ranges and {"mean": ranges.mean, "error": ranges.error},
         "free": [NAMES[at] for at in spec.free],
         "held": spec.held,
         "known": {"A": spec.total, "scale": spec.scale, "oblique": spec.oblique},

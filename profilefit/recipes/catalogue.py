@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from mcml_sim.media.setting import Setting
 from profilefit import laws
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.laws.entry import Entry
+from profilefit.laws.base import AlbedoLaw, Constants, Entry, ProfileLaw
 from profilefit.laws.rational import Normalisation, Rational
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SEARCHLIGHT, Folder, Records, covers, record_setting
@@ -52,9 +51,8 @@ def load(
     if kind is None:
         raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
     values, where = _constants(kind, constants, setting, records)
-    at = laws.at(kind, where)
     given = {} if kind.own_reflectance else {"albedo": normalisation(where, records)}
-    return _made(at, values, constants, setting=where, **given)
+    return _made(laws.at(kind, where), values, constants, setting=where, **given)
 
 
 def albedo_law(
@@ -92,7 +90,7 @@ def _constants(
     if requested is not None and not isinstance(requested, Setting):
         raise InputError(f"setting must be a mcml_sim.Setting, got {requested!r}")
     entry = kind.entry
-    if which == "regenerated" or (which == "published" and not kind.constant_names()):
+    if which == REGENERATED or (which == "published" and not kind.constant_names()):
         where = requested or SEARCHLIGHT
         return _all_regenerated(kind, where, records), where
     if which.endswith(".json"):
@@ -175,8 +173,7 @@ class LoadedLaw:
 
     @property
     def setting(self) -> Setting:
-        setting: Setting = self.law.setting
-        return setting
+        return cast(Setting, self.law.setting)
 
 
 def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
@@ -207,10 +204,8 @@ def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> li
     """List maps between alpha and A; arguments as for `profile_laws`."""
     records = Records.of(folder)
     entries = _entries(_classes(laws.MAPS, records, names))
-    return [
-        *(_printed_laws(entries, records) if names is None else ()),
-        *_regenerated(records, entries, names, matched),
-    ]
+    printed = _printed_laws(entries, records) if names is None else []
+    return [*printed, *_regenerated(records, entries, names, matched)]
 
 
 def find(
@@ -256,7 +251,7 @@ def _found(
         found = next((law for each in lists for law in each(records, (name,), False)), None)
     elif kind is not None:
         which = constants or _default(kind.entry, bool(kind.constant_names()))
-        found = _named(kind.entry, which, _load(kind.entry, which, None, records), records)
+        found = _named(kind.entry, which, None, records)
     else:
         return None
     given = {key: value for key, value in of.items() if value is not None}
@@ -264,7 +259,7 @@ def _found(
         return found
     entry = found.law.entry
     which = constants or (REGENERATED if found.records or not found.constants else found.constants)
-    return _named(entry, which, _load(entry, which, setting, records), records)
+    return _named(entry, which, setting, records)
 
 
 def not_found(name: str, folder: Folder, constants: str | None = None) -> InputError:
@@ -293,15 +288,10 @@ def _entries(classes: Mapping[str, Any]) -> list[Entry]:
     return list({kind: kind.entry for kind in classes.values()}.values())
 
 
-def _load(entry: Entry, which: str, setting: Setting | None, records: Records) -> Any:
-    return (albedo_law if entry.is_map else load)(entry.name, which, setting, records)
-
-
-def _named(entry: Entry, which: str, law: Any, records: Records) -> LoadedLaw:
-    if which == "regenerated":
-        files = _files(entry, law.setting, records)
-    else:
-        files = (Path(which),) if which.endswith(".json") else ()
+def _named(entry: Entry, which: str, setting: Setting | None, records: Records) -> LoadedLaw:
+    law: Any = (albedo_law if entry.is_map else load)(entry.name, which, setting, records)
+    files = (Path(which),) if which.endswith(".json") else ()
+    files = _files(entry, law.setting, records) if which == REGENERATED else files
     constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
     return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files, records.folder)
 
@@ -313,20 +303,16 @@ def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]
 def _default(entry: Entry, has_constants: bool) -> str:
     """Return the regenerated constants, or the only ones printed where none were regenerated."""
     if entry.records or not has_constants:
-        return "regenerated"
-    printed = [s.name for s in published.SETS if s.law == entry.printed]
-    if len(printed) == 1:
+        return REGENERATED
+    if len(printed := [s.name for s in published.SETS if s.law == entry.printed]) == 1:
         return printed[0]
-    several = "one of " if printed else ""
-    raise InputError(
-        f"constants must be {several}{_accepted(entry.printed)}: {entry.key} was not regenerated, got none"
-    )
+    accepted = ("one of " if printed else "") + _accepted(entry.printed)
+    raise InputError(f"constants must be {accepted}: {entry.key} was not regenerated, got none")
 
 
 def _printed_laws(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
     known = {entry.printed: entry for entry in entries}
-    sets = [(known[s.law], s.name) for s in published.SETS if s.law in known]
-    return [_named(entry, which, _load(entry, which, None, records), records) for entry, which in sets]
+    return [_named(known[s.law], s.name, None, records) for s in published.SETS if s.law in known]
 
 
 def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
@@ -350,7 +336,7 @@ def _regenerated(records: Records, entries: Sequence[Entry], names: Names, match
         for setting in settings if entry.records else ():
             parts = [path.stem for path in _files(entry, setting, records)]
             if set(parts) & set(there) and len(_usable(records.named(parts), matched)) == len(parts):
-                found.append(_named(entry, "regenerated", _load(entry, "regenerated", setting, records), records))
+                found.append(_named(entry, REGENERATED, setting, records))
     return found
 
 

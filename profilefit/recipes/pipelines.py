@@ -13,21 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Orders, Setting, exact
+from profilefit.fitting.chains import LEVELS, Posterior, posterior
+from profilefit.fitting.discrepancy import LawWithErrors, discrepancy
+from profilefit.fitting.discrepancy import summary as quantities
 from profilefit.fitting.estimate import Fit, fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws import published
 from profilefit.laws.base import Constants
-from profilefit.recipes import catalogue, record, starts
 from profilefit.recipes import recipe as recipe_file
-from profilefit.recipes.crosscheck import crosscheck
+from profilefit.recipes import record
+from profilefit.recipes.checks import OWN_IS_BEATEN, crosscheck, discretisation_error, random_starts
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import Albedos, Recipe
 from profilefit.recipes.run import COMPARISONS, LAWS, MAPS, RecipeRun, RecordContent, Work
-from profilefit.recipes.summary import described
-from profilefit.recipes.targets import albedo_values, truth_of
+from profilefit.recipes.targets import albedo_values, free, law_class, require_known, starting_law, truth_of
 
 Floats = NDArray[np.float64]
+Arrays = dict[str, np.ndarray]
 Pipeline = Callable[[Recipe, RecipeRun, Orders | None], RecordContent]
 QUALITY_ALBEDOS = Albedos(low=0.05, high=0.995, count=24)
 # Indices that a law which spans them is judged at, fitted or not: from next to none to glass. And mean cosines.
@@ -42,7 +45,7 @@ def request(name: str, pipelines: Mapping[str, Pipeline]) -> Recipe | None:
     found = recipe_file.find(name, fits_folder())
     if found.pipeline not in pipelines:
         return None
-    starts.require_known(found)
+    require_known(found)
     return found
 
 
@@ -150,17 +153,15 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
     return np.array(errors)
 
 
-def described_fit(
-    recipe: Recipe, run: RecipeRun, light: Orders | None
-) -> tuple[Fit, Profiles, dict[str, Any], dict[str, Any]]:
+def described_fit(recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple[Fit, Profiles, dict[str, Any], Arrays]:
     """Fit a recipe's law, and check the fit: it, what it was fitted to, and what every record says, with its arrays."""
-    profiles, start, checks = truth_of(recipe, light), starts.starting_law(recipe, run.out), dict[str, Any]()
+    profiles, start, checks = truth_of(recipe, light), starting_law(recipe, run.out), dict[str, Any]()
     result = fit_from(recipe, profiles, start)
     if recipe.random_starts:
-        tried = starts.random_starts(result, start, recipe.random_starts, run.seed)
-        checks["starts"] = tried.content()
-        if tried.beats_own:  # rounding decides which of them find it: constants must not depend on that
-            run.say(f"{recipe.name}: {tried.result}")
+        checks["starts"] = tried = random_starts(result, start, recipe.random_starts, run.seed)
+        if tried["result"] == OWN_IS_BEATEN:
+            # Rounding decides which of them find it: constants must not depend on that.
+            run.say(f"{recipe.name}: {tried['result']}")
     if recipe.check and light is not None:
         own, seen = result, profiles
         if recipe.indices:
@@ -169,7 +170,7 @@ def described_fit(
             at_one = recipe.changed(indices=(), weighting={"rising": 0.0})
             seen = truth_of(at_one, None)
             own = fit_from(at_one, seen, result.law)
-        checks["crosscheck"] = crosscheck(own, seen, light).content()
+        checks["crosscheck"] = crosscheck(own, seen, light)
     content, arrays = description(recipe, run, profiles, result)
     return result, profiles, content | checks, arrays
 
@@ -179,28 +180,100 @@ def fit_from(recipe: Recipe, profiles: Profiles, start: Constants, used: NDArray
     weighting = recipe.weighting
     shares = (np.arange(weighting.shares) + 0.5) / max(weighting.shares, 1) * weighting.last_share
     limits = (weighting.energy_limit, weighting.source_limit, weighting.rising)
-    return fit(profiles, start, weighting.objective, starts.free(recipe, start), used, limits, tuple(shares))
+    return fit(profiles, start, weighting.objective, free(recipe, start), used, limits, tuple(shares))
 
 
-def description(
-    recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit
-) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def description(recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit) -> tuple[dict[str, Any], Arrays]:
     """Return what every record of a fit says, and its arrays."""
-    printed = next(iter(printed_sets(recipe).values()), {})
-    return described(result, profiles, printed, run.seed, run.max_chain)
+    printed, chains = next(iter(printed_sets(recipe).values()), {}), []
+    if result.solution.converged:  # elsewhere the curvature describes no optimum, and the record says why
+        chains = [
+            posterior(result, kind, run.seed, run.max_chain)
+            for kind in ("statistical", "misfit")
+            if getattr(result, kind) is not None
+        ]
+    off, width = discrepancy(result, profiles), discretisation_error(result)
+    errors = {"model_error": np.sqrt(np.diag(off.covariance)), "discretisation_error": width}
+    covariances = {"statistical": result.statistical, "misfit": result.misfit, "model": off.covariance}
+    content = {
+        "constants": _constants(result, printed, chains, errors),
+        "covariance": {"names": result.free, **covariances},
+        "discrepancy": off.content(),
+        "fit": {
+            "result": result.result,
+            "steps": result.solution.steps,
+            "condition_number": result.solution.condition_number,
+            "residuals": result.structure,
+        },
+        "posterior": {
+            c.kind: {
+                **{key: getattr(c, key) for key in ("tau", "acceptance", "walkers", "steps", "result")},
+                "standard_deviation": dict(zip(c.names, c.standard_deviation, strict=True)),
+            }
+            for c in chains
+        },
+        "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
+    }
+    if result.solution.converged:
+        known = LawWithErrors(result.law, result.free, result.objective, result.statistical, off)
+        content["derived"] = quantities(known, profiles)
+    if profiles.covariance is not None:
+        content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
+        # Of what rests on too few effective photons: rings, where the objective sees rings, and whole albedos.
+        sees_rings = result.objective in ("energy", "radial")
+        content["left_out"] = {
+            "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
+            "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
+        }
+    samples = {f"samples_{c.kind}": c.samples.astype(np.float32) for c in chains}
+    samples |= {f"log_density_{c.kind}": c.log_density.astype(np.float32) for c in chains}
+    return content, samples | off.arrays()
+
+
+def curves(profiles: Profiles) -> Arrays:
+    """Return what the figures draw: the data with its errors; of a fit to several settings, those of its own."""
+    own = [one == profiles.setting for one in profiles.settings] if profiles.settings else slice(None)
+    return {
+        "alpha": profiles.alpha[own],
+        "r_edges": profiles.r_edges,
+        "energy": profiles.energy[own],
+        "energy_error": profiles.standard_error[own],
+        "beyond": profiles.beyond[own],
+    }
+
+
+def errors_by_name(names: tuple[str, ...], covariance: Floats | None) -> dict[str, float]:
+    """Return standard errors from a covariance; none where there is none."""
+    return {} if covariance is None else dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+
+def _constants(
+    result: Fit, printed: dict[str, float], chains: list[Posterior], errors: dict[str, Floats]
+) -> dict[str, dict[str, Any]]:
+    fitted = result.law.constants()
+    constants: dict[str, dict[str, Any]] = {
+        name: {"published": printed.get(name), "regenerated": fitted[name], "free": name in result.free}
+        for name in result.law.seen_by(result.objective)
+    }
+    for i, name in enumerate(result.free):
+        constants[name] |= {
+            "statistical_error": None if result.statistical is None else float(np.sqrt(result.statistical[i, i])),
+            "misfit_error": float(np.sqrt(result.misfit[i, i])),
+            "jackknife_error": float(result.jackknife[i]),
+            **{name: float(error[i]) for name, error in errors.items()},
+            "intervals": {c.kind: {f"{level:.0%}": c.interval(level)[i] for level in LEVELS} for c in chains},
+        }
+    return constants
 
 
 def printed_sets(recipe: Recipe) -> dict[str, dict[str, float]]:
     """Return the printed constants of a recipe's law and setting by name; the first counts as the published one."""
-    printed = starts.law_class(recipe).entry.printed
+    printed = law_class(recipe).entry.printed
     sets = [s for s in published.SETS if (s.law, s.setting) == (printed, recipe.setting)]
     return {s.name if i else "published": dict(s.constants) for i, s in enumerate(sets)}
 
 
 def printed_laws(recipe: Recipe, run: RecipeRun) -> dict[str, Any]:
     """Return the laws that the printed constants make."""
-    kind: Any = starts.law_class(recipe)
-    given: dict[str, Any] = {"setting": recipe.setting}
-    if recipe.pipeline != "albedo":
-        given["albedo"] = catalogue.normalisation(recipe.setting, run.out)
-    return {name: kind(**given, **values) for name, values in printed_sets(recipe).items()}
+    law = starting_law(recipe, run.out)
+    return {name: replace(law, **values) for name, values in printed_sets(recipe).items()}

@@ -161,11 +161,3 @@ def _done(part: Callable[[], Any]) -> tuple[Any, float]:
     if next(_PARTS) % CLEARED == 0:
         jax.clear_caches()
     return result, time.perf_counter() - begin
-
-
-def alone(work: Work, out: Path, processes: int = 1, say: Say = silent) -> Path:
-    """Write one record, and return its path."""
-    with Workers(min(processes, len(work.parts))) as workers:
-        (step,) = written([work], out, workers, say)
-    assert step.path is not None
-    return step.path

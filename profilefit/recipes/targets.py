@@ -1,16 +1,26 @@
-"""Albedos, rings and truth that a recipe is fitted to."""
+"""Law, start and data of a fit that a recipe names: constants to begin at, albedos, rings and truth."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Orders, Setting, exact
+from profilefit import laws
 from profilefit.errors import RecipeError, SettingError
 from profilefit.fitting.profiles import Profiles
+from profilefit.laws import published
+from profilefit.laws.base import Constants, Entry
+from profilefit.recipes import catalogue
 from profilefit.recipes.recipe import Albedos, Recipe, RingLayout
 
 Floats = NDArray[np.float64]
+# Where a law with published constants begins at those of its entry: one without such constants always does.
+OWN_START = "none"
 SEARCHLIGHT = Setting()
 # Even rings for the paper's protocol, log-spaced ones beyond it; every recipe's rings are unions of these [mfp].
 RUN_EDGES = np.concatenate(
@@ -57,3 +67,75 @@ def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles
     if light.setting != recipe.setting:
         raise SettingError(f"recipe {recipe.name} belongs to {recipe.setting}, its photons to {light.setting}")
     return Profiles.from_orders(light.merged(edges), alpha, correlated=mfp == 1.0)
+
+
+def law_class(recipe: Recipe) -> type[Constants]:
+    """Return the class that a recipe's law names; RecipeError if there is none."""
+    known = _laws(recipe)
+    if recipe.law not in known:
+        raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
+    kind: type[Constants] = laws.at(known[recipe.law], recipe.setting)
+    return kind
+
+
+def require_known(recipe: Recipe) -> None:
+    """Raise RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
+    kind, objective = law_class(recipe), recipe.weighting.objective
+    if objective and not kind.seen_by(objective):
+        seeing = [name for name, one in _laws(recipe).items() if one.seen_by(objective) and ":" not in name]
+        got = f"must be {' or '.join(seeing)}, got {recipe.law!r}"
+        raise RecipeError(f"{recipe.path}: law of pipeline {recipe.pipeline!r} {got}")
+    if not _start_constants(recipe) and recipe.pipeline != "evidence":
+        accepted = [*_published_names(kind.entry), *([OWN_START] if kind.entry.start else [])]
+        raise RecipeError(
+            f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
+        )
+    if recipe.pipeline == "evidence" and recipe.truth != "exact":
+        raise RecipeError(f"{recipe.path}: truth of pipeline 'evidence' must be 'exact', got {recipe.truth!r}")
+    spans = kind.at_one_index() != kind.constant_names()
+    if recipe.indices and not spans:
+        raise RecipeError(
+            f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}"
+        )
+    if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
+        raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
+    if recipe.cosines and not kind.entry.g.holds(recipe.setting.g):
+        raise RecipeError(f"{recipe.path}: cosines are for a law with g, got {recipe.law!r}")
+    if objective and not free(recipe, kind):
+        raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
+    unknown = [name for name in recipe.held if name not in kind.constant_names()]
+    if unknown:
+        raise RecipeError(f"{recipe.path}: held must name constants of {recipe.law}, got {', '.join(unknown)}")
+
+
+def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
+    """Return the constants that a recipe moves; of a law that spans indices, at one index those that it tells apart."""
+    seen = kind.seen_by(recipe.weighting.objective)
+    told = seen if recipe.indices else kind.at_one_index()
+    return tuple(name for name in seen if name in told and name not in recipe.held)
+
+
+def starting_law(recipe: Recipe, folder: Path) -> Any:
+    """Return the law that a fit starts from, in the recipe's setting; constants named in `held` keep their values.
+
+    Constants of another setting are numbers to start from like any others. `folder` holds the records of A.
+    """
+    given: dict[str, Any] = {"setting": recipe.setting, **_start_constants(recipe)}
+    if recipe.pipeline != "albedo":
+        given["albedo"] = catalogue.normalisation(recipe.setting, folder)
+    return law_class(recipe)(**given)
+
+
+def _laws(recipe: Recipe) -> Mapping[str, type[Constants]]:
+    return laws.map_classes() if recipe.pipeline == "albedo" else laws.profile_classes()
+
+
+def _published_names(entry: Entry) -> list[str]:
+    return [s.name for s in published.SETS if s.law == entry.printed]
+
+
+def _start_constants(recipe: Recipe) -> dict[str, float]:
+    entry = law_class(recipe).entry
+    if recipe.start == OWN_START or not _published_names(entry):
+        return dict(entry.start)
+    return published.constants(entry.printed, recipe.start)

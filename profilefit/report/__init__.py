@@ -8,9 +8,8 @@ if TYPE_CHECKING:
     from profilefit.report.figures.record_figures import draw_all
     from profilefit.report.records import unscaled
     from profilefit.report.tables.fit_tables import fit_lines, fit_tables
-    from profilefit.report.tables.law_tables import every_law, markdown_sections
-    from profilefit.report.tables.markdown import fill, markdown_constants, markdown_quality, sections
-    from profilefit.report.tables.record_tables import record_tables, summary
+    from profilefit.report.tables.law_tables import every_law
+    from profilefit.report.tables.markdown import fill, sections
 else:
     __getattr__ = attributes(
         __name__,
@@ -19,9 +18,8 @@ else:
             "draw_all": "figures.record_figures",
             "unscaled": "records",
             **dict.fromkeys(("fit_lines", "fit_tables"), "tables.fit_tables"),
-            **dict.fromkeys(("every_law", "markdown_sections"), "tables.law_tables"),
-            **dict.fromkeys(("fill", "markdown_constants", "markdown_quality", "sections"), "tables.markdown"),
-            **dict.fromkeys(("record_tables", "summary"), "tables.record_tables"),
+            "every_law": "tables.law_tables",
+            **dict.fromkeys(("fill", "sections"), "tables.markdown"),
         },
     )
 
@@ -31,13 +29,8 @@ __all__ = [
     "fill",
     "fit_lines",
     "fit_tables",
-    "markdown_constants",
-    "markdown_quality",
-    "markdown_sections",
     "posterior_figure",
-    "record_tables",
     "residual_figure",
     "sections",
-    "summary",
     "unscaled",
 ]

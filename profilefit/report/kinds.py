@@ -2,27 +2,314 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from profilefit.recipes.kinds import Kind, gaussians
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.laws.gaussians import DEFAULT
+from profilefit.laws.phases import FORMS
+from profilefit.laws.stack import StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.recipes import record
+from profilefit.recipes.folder import PHASES, STACKS
+from profilefit.recipes.kinds import Kind, gaussians, phase, stack
+from profilefit.recipes.phases import BANDS
 from profilefit.recipes.pipelines import read
-from profilefit.report.records import Content
+from profilefit.recipes.stack.gaussians import constant_names, quality
+from profilefit.report.records import Content, known_errors, largest_error
+from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.law_tables import markdown_sections
-from profilefit.report.tables.markdown import sections
-from profilefit.report.tables.phase_table import phase_sections, phase_table, phase_tables, premise_lines
-from profilefit.report.tables.record_tables import record_tables, summary
-from profilefit.report.tables.stack_table import stack_sections, stack_table
-from profilefit.report.tables.sum_table import sum_sections, sum_tables
+from profilefit.report.tables.markdown import markdown_table, sections
+from profilefit.report.tables.record_tables import MEANING_OF_ERROR, record_tables, spaced, summary, title_of
+from profilefit.scenes.skin.law import D_EON
 
 Parts = Sequence[RenderableType]
 Sections = dict[str, Callable[[], str]]
 Paths = Mapping[str, Path]
+Row = tuple[str, ...]
+Rows = tuple[Row, list[Row]]  # headers, the first that of the record's name, and what is below
+
+
+def _value_and_errors(one: Content, known: Iterable[str]) -> Row:
+    return to_error(one["regenerated"], largest_error(one)), *(significant(one.get(key)) for key in known)
+
+
+def _meaning(known: Mapping[str, str], meaning: Mapping[str, str]) -> str:
+    return "; ".join(f"{word}: {meaning[word]}" for word in known.values())
+
+
+# Stacks: their layers, the errors of their laws, and each one with all its constants.
+
+MEASURES = "rel: mean relative error of R_d over radii, ks: error of the cdf, A: relative error of the reflectance"
+CAPTION = f"{MEASURES}, each the worst of three colours and of the thicknesses between those that were fitted"
+OF_THICKNESS = f"{MEASURES}; those of a deeper interface are of the stack from its upper layer down"
+OF_STACK = MEANING_OF_ERROR | {
+    "dr": "exact light of fewer nodes",
+    "model": "the law's misfit, as a random function",
+    "jackknife": "leaving out one thickness after the other",
+}
+OF_FIT = "Constants that trade against each other do not converge, and may be good all the same: see their errors above"
+LEFT = ("layer", "channel", "interface", "constant", "result")
+
+
+def stack_table(folder: Path) -> RenderableType | None:
+    """Return the records of stacks that lie in a folder of records; None where there are none."""
+    paths = record.available(folder / STACKS).values()
+    stacks = [stack.read(path) for path in paths if record.read(path)["pipeline"] == stack.PIPELINE]
+    if not stacks:
+        return None
+    worst = [one["quality"]["regenerated"] for one in stacks]
+    columns = {
+        "stack": [str(one["name"]) for one in stacks],
+        "layers": [str(len(one["layers"])) for one in stacks],
+        "light": [str(one["setting"]["illumination"]) for one in stacks],
+        "n": [f"{one['setting']['n']:g}" for one in stacks],
+        "g": [", ".join(f"{g:g}" for g in sorted({layer["g"] for layer in one["layers"]})) for one in stacks],
+        "rel": [significant(max(one["rel"])) for one in worst],
+        "ks": [significant(max(one["ks"])) for one in worst],
+        "A": [significant(one["delta_A"]) for one in worst],
+    }
+    return column_table("Stacks of layers", columns, CAPTION, left=("stack", "light"))
+
+
+def stack_tables(content: Content) -> list[RenderableType]:
+    """Return the tables of a record, as `read` gives it: layers, errors by thickness, constants, how fits ended."""
+    unit, layers, of = content["unit"], content["layers"], {content["name"]: content}
+    columns = {
+        "layer": [one["name"] for one in layers],
+        "thickness": ["infinite" if one["thickness"] is None else f"{one['thickness']:g} {unit}" for one in layers],
+        **{key: [f"{one[key]:g}" for one in layers] for key in ("n", "g")},
+    }
+    for key in ("mu_a", "mu_s"):
+        columns[f"{key} [1/{unit}]"] = [" ".join(f"{each:g}" for each in one[key]) for one in layers]
+    meaning = _meaning(known_errors(content["constants"].values(), numbered=True), OF_STACK)
+    tables = {
+        "Errors at thicknesses of an interface's upper layer that were not fitted": (_stack_errors(of), OF_THICKNESS),
+        "Constants of each colour and interface, none with a unit": (_stack_constants(of), meaning),
+        "Fits": (_stack_fits(content), OF_FIT),
+    }
+    parts = [column_table("Layers, from the surface down; red, green, blue", columns, left=LEFT, fold=("layer",))]
+    for title, ((header, rows), caption) in tables.items():  # without the name of the stack, which stands above
+        aligned = [name for name in header if name not in LEFT]
+        parts.append(row_table(title, header[1:], [row[1:] for row in rows], caption, LEFT, aligned=aligned))
+    return list(parts)
+
+
+def _stack_errors(stacks: Mapping[str, Content]) -> Rows:
+    rows: list[Row] = []
+    for name, content in stacks.items():
+        for channel, number in stack.interfaces(content):
+            quality = content["interfaces"][channel]["quality"][number - 1]
+            for d, *values in zip(*(quality[key] for key in stack.BY_THICKNESS), strict=True):
+                thickness = f"{significant(d, 3)} {content['unit']}"
+                rows.append((name, channel, str(number), thickness, *map(significant, values)))
+        worst = content["quality"]["regenerated"]
+        of_all = (max(worst["rel"]), max(worst["ks"]), worst["delta_A"])
+        rows.append((name, "worst", "", "", *map(significant, of_all)))
+    return ("stack", "channel", "interface", "thickness", "rel", "ks", "A"), rows
+
+
+def _stack_constants(stacks: Mapping[str, Content]) -> Rows:
+    known = known_errors((one for of in stacks.values() for one in of["constants"].values()), numbered=True)
+    rows = [
+        (name, channel, str(number), constant, *_value_and_errors(of[f"{channel}.{number}.{constant}"], known))
+        for name, content in stacks.items()
+        for of in [content["constants"]]
+        for channel, number in stack.interfaces(content)
+        for constant in StackLaw.constant_names()
+    ]
+    errors = (f"± {word}" for word in known.values())
+    return ("stack", "channel", "interface", "constant", "regenerated", *errors), rows
+
+
+def _stack_fits(content: Content) -> Rows:
+    rows: list[Row] = []
+    for channel, number in stack.interfaces(content):
+        fit, starts = (content["interfaces"][channel][key][number - 1] for key in ("fit", "starts"))
+        steps, condition = str(fit["steps"]), significant(fit["condition_number"], 3)
+        as_good = f"{starts['as_good']} of {starts['count']}"
+        rows.append(("", channel, str(number), fit["result"], steps, condition, as_good))
+    return ("stack", "channel", "interface", "result", "steps", "condition number", "starts as good"), rows
+
+
+def stack_sections(paths: Paths) -> Sections:
+    """Return the tables of these records of stacks for Markdown, by the names of their marks; none without records."""
+    tables = {"stack-errors": _stack_errors, "stack-constants": _stack_constants} if paths else {}
+
+    def section(rows_of: Callable[[Mapping[str, Content]], Rows]) -> str:
+        return markdown_table(*rows_of({name: stack.read(path) for name, path in paths.items()}))
+
+    return {name: partial(section, rows_of) for name, rows_of in tables.items()}
+
+
+# Sums of Gaussians of a stack: their errors over their number, and the constants of six of them.
+
+OF_NUMBER = (
+    "red, green, blue: mean relative error of R_d, in rings even in ln r from 0.01 mean free paths to 99.5 % of the "
+    "light; the worst of the three: rms: its root mean square, ks: error of the cdf, alone: the first again where each "
+    "colour has variances of its own"
+)
+PUBLISHED = "; published: the six Gaussians of d'Eon and Luebke (GPU Gems 3, ch. 14), in mm, of a skin"
+OF_SUM = OF_STACK | {"model": "the misfit as a random function", "jackknife": "leaving out a sixth of the rings"}
+
+
+def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
+    """Return the errors of 1 to 8 Gaussians in both lights, and the constants of six in the light of the stack."""
+    rows: list[Row] = []
+    others = published(sums)
+    for light in ILLUMINATIONS:
+        for count, one in zip(gaussians.COUNTS, sums.content["sums"][light]["by_count"], strict=True):
+            worst = (max(one[key]) for key in ("rms", "ks", "alone"))
+            rows.append((light, str(count), *map(significant, one["rel"]), *map(significant, worst)))
+        if light in others:
+            rel, rms, ks = ([one[key] for one in others[light]] for key in ("rel", "rms", "ks"))
+            rows.append((light, "published", *map(significant, (*rel, max(rms), max(ks))), ""))
+    header, caption = ("light", "N", *CHANNELS, "rms", "ks", "alone"), OF_NUMBER + (PUBLISHED if others else "")
+    light, unit = sums.content["setting"]["illumination"], sums.content["unit"]
+    of = {name: sums.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
+    known = known_errors(of.values(), numbered=True)
+    constants = [
+        (name if "." in name else f"{name} [{unit}^2]", *_value_and_errors(one, known)) for name, one in of.items()
+    ]
+    names = ("constant", "regenerated", *(f"± {word}" for word in known.values()))
+    note = f"{_meaning(known, OF_SUM)}. --json has those of every number, in both lights. {sums.content['note']}"
+    return [
+        row_table("Sums of N Gaussians, whose variances the colours share", header, rows, caption, ("light",)),
+        row_table(f"Six of them, in {light} light", names, constants, note, ("constant",), aligned=names[1:]),
+    ]
+
+
+def sum_sections(paths: Paths) -> Sections:
+    """Return the table of these records of sums for Markdown, by the name of its mark; none where there is none."""
+
+    def section() -> str:
+        rows: list[Row] = []
+        for name, path in paths.items():
+            sums = gaussians.load(path).content["sums"]
+            for light, by_count in ((light, sums[light]["by_count"]) for light in ILLUMINATIONS):
+                worst = (*(max(one["rel"]) for one in by_count), max(by_count[DEFAULT - 1]["alone"]))
+                rows.append((name, light, *map(significant, worst)))
+        return markdown_table(("stack", "light", *map(str, gaussians.COUNTS), f"{DEFAULT} each its own"), rows)
+
+    return {"stack-gaussians": section} if paths else {}
+
+
+def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
+    """Return `quality` of the published Gaussians of skin at a stack of that name, by light and colour; else none."""
+    if sums.path.stem != "skin" or sums.stack.unit != "mm":
+        return {}
+    variances, weights = np.array(D_EON.variances), np.transpose(D_EON.weights)
+    return {
+        light: [quality(one, variances, own) for one, own in zip(sums.lights(light), weights, strict=True)]
+        for light in ILLUMINATIONS
+    }
+
+
+# Phase functions fitted to a table: the error of each form, and the constants with their errors.
+
+MOMENT_DIGITS = 4
+OF_FORMS = (
+    "rms: root mean square of ln(form / table), over all angles and between those given; cosine: mean cosine; back: "
+    "share turned by more than 90 degrees"
+)
+OF_PHASE = MEANING_OF_ERROR | {
+    "photons": "the table's sigma",
+    "model": "the misfit as a random function of ln angle",
+    "jackknife": "leaving out a sixth of the rows",
+}
+OF_BANDS = tuple(f"{low:g} to {high:.3g}" for low, high in pairwise(BANDS))
+
+
+def phase_tables(content: Content) -> list[RenderableType]:
+    """Return the tables of a record, or of a result of `profilefit fit --kind phase`."""
+    data, left = content["data"], ("form", "moments", "constant", "result")
+    own = f"{data['source']}: {data['rows']} angles, {data['angles'][0]:g} to {data['angles'][1]:g} degrees"
+    title = f"{own}; mean cosine {data['mean_cosine']:.4f}, backscattered {data['backscattered']:.5f}"
+    header = ("form", "moments", "rms", *OF_BANDS, "cosine", "back", "result")
+    rows = [(*_measures(form, how, one), one["result"]) for form, how, one in _each(content)]
+    known = known_errors(content["constants"].values(), numbered=True)
+    constants = [(*place, *_value_and_errors(one, known)) for place, one in _phase_constants(content)]
+    names = ("form", "moments", "constant", "value", *known.values())
+    meaning = _meaning(known, OF_PHASE)
+    return [
+        row_table(title, header, rows, OF_FORMS, left, ("form",)),
+        row_table("Constants, none with a unit", names, constants, meaning, left, ("form",), ("value",)),
+    ]
+
+
+def premise_lines(content: Content) -> list[str]:
+    """Return the scale of the table, its angles without rows, and whether it is as Haltrin's form takes it to be."""
+    data, haltrin = content["data"], content["phases"]["haltrin"][phase.FREE]
+    best = min((one["rms"], FORMS[form].title) for form, _, one in _each(content))
+    own, second = (f"{data[name]:.3f}" for name in ("mean_cosine", "second"))
+    return [
+        *phase.table_lines(data),
+        f"Haltrin's form is off by a factor of e^{haltrin['rms']:.2f} (rms), {best[1]} by e^{best[0]:.2f}. "
+        f"Its premises: the mean of P_2 is the mean cosine (here {second} and {own}), "
+        f"and that follows from the backscattered share by a regression (here {data['regression']:.3f} for {own}).",
+    ]
+
+
+def phase_table(folder: Path) -> RenderableType | None:
+    """Return the records of phase functions that lie in a folder of records; None where there are none."""
+    contents = [phase.load(path).content for path in record.available(folder / PHASES).values()]
+    if not contents:
+        return None
+    columns = {
+        "table": [str(one["name"]) for one in contents],
+        "rows": [str(one["data"]["rows"]) for one in contents],
+        **{form: [significant(one["phases"][form][phase.HELD]["rms"]) for one in contents] for form in FORMS},
+    }
+    caption = "root mean square of ln(form / table), mean cosine and backscattered share those of the table"
+    return column_table("Phase functions", columns, f"{caption} where a form has numbers for it", ("table",))
+
+
+def phase_sections(folder: Path) -> Sections:
+    """Return the tables of the records of phase functions for Markdown, by the names of their marks."""
+    paths = record.available(folder / PHASES)
+
+    def contents() -> Iterable[tuple[str, Content]]:
+        return ((name, phase.load(path).content) for name, path in paths.items())
+
+    def fits() -> str:
+        rows = [(name, *_measures(*one)) for name, content in contents() for one in _each(content)]
+        return markdown_table(("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows)
+
+    def constants() -> str:
+        rows = [
+            (name, *place, *_value_and_errors(one, ()), significant(largest_error(one)))
+            for name, content in contents()
+            for place, one in _phase_constants(content)
+        ]
+        return markdown_table(("table", "form", "moments", "constant", "value", "error"), rows)
+
+    return {"phase-fits": fits, "phase-constants": constants} if paths else {}
+
+
+def _each(content: Content) -> list[tuple[str, str, Content]]:
+    return [(form, how, content["phases"][form][how]) for form in FORMS for how in (phase.FREE, phase.HELD)]
+
+
+def _measures(form: str, how: str, content: Content) -> Row:
+    """Return a form, its moments, its distance from the table, its mean cosine and backscattered share."""
+    moments = (significant(content[name], MOMENT_DIGITS) for name in ("mean_cosine", "backscattered"))
+    return (FORMS[form].title, how, *map(significant, (content["rms"], *content["bands"])), *moments)
+
+
+def _phase_constants(content: Content) -> list[tuple[Row, Content]]:
+    """Return form, moments and name of each constant, and what the record has of it."""
+    return [
+        ((FORMS[form].title, how, name), content["constants"][f"{form}.{how}.{name}"])
+        for form, how, _ in _each(content)
+        for name in FORMS[form].names
+    ]
 
 
 class KindTables(NamedTuple):
@@ -50,19 +337,18 @@ def _phase_parts(content: Content, path: Path) -> Parts:
     return [*tables, *map(Text, premise_lines(content))]
 
 
-def _of_records(content: Content, path: Path) -> Parts:
-    return record_tables(content)
-
-
 TABLES: Mapping[str, KindTables] = {
     "law": KindTables(
         "records",
-        _of_records,
+        lambda content, _: record_tables(content),
         lambda paths, folder: summary({name: read(path) for name, path in paths.items()}) if paths else None,
         _law_sections,
     ),
     "stack": KindTables(
-        "records", _of_records, lambda _, folder: stack_table(folder), lambda paths, _: stack_sections(paths)
+        "records",
+        lambda content, _: spaced([title_of(content), *stack_tables(content)]),
+        lambda _, folder: stack_table(folder),
+        lambda paths, _: stack_sections(paths),
     ),
     "gaussians": KindTables(
         "gaussians", lambda _, path: sum_tables(gaussians.load(path)), sections=lambda paths, _: sum_sections(paths)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache, cached_property
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import jax
@@ -16,7 +16,7 @@ from mcml_sim import exact
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
@@ -53,15 +53,14 @@ def z_score(constant: Content) -> float | None:
     return (published - constant["regenerated"]) / error if error and published is not None else None
 
 
-def known_errors(constants: Content) -> dict[str, str]:
-    """Return those of `ERRORS` that a record's constants, by name, have."""
-    return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
-
-
-def numbered_errors(constants: Iterable[Content]) -> dict[str, str]:
-    """Return those of `ERRORS` that any constant has a number for: exact light has none of photons."""
+def known_errors(constants: Iterable[Content], numbered: bool = False) -> dict[str, str]:
+    """Return those of `ERRORS` that any constant has, or `numbered`, has a number for: exact light has no photons."""
     every = list(constants)
-    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in every)}
+    return {
+        key: word
+        for key, word in ERRORS.items()
+        if any(one.get(key) is not None if numbered else key in one for one in every)
+    }
 
 
 def measured_sets(content: Content) -> list[str]:
@@ -74,22 +73,16 @@ def measures(content: Content, measure: str) -> bool:
     return measure in (content.get("quality") or {}).get("regenerated", {})
 
 
-def index_words(content: Content) -> str:
-    """Return the refractive index that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
-    span = content.get("indices")
-    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['n']:g}"
+def index_words(content: Content, name: str = "n") -> str:
+    """Return the n, or g, that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
+    span = content.get(SPANS[name])
+    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting'][name]:g}"
 
 
 def at_index(content: Content) -> str:
     """Return for a title the index, and g, at which a record that spans several is reported; nothing for others."""
     spanned = [name for name, span in SPANS.items() if content.get(span)]
     return "".join(f", {name} = {content['setting'][name]:g}" for name in spanned)
-
-
-def cosine_words(content: Content) -> str:
-    """Return the mean cosine that a record is of, or those that its constants span: "0", "(0, 0.95]"."""
-    span = content.get("cosines")
-    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['g']:g}"
 
 
 def by_index(content: Content) -> Mapping[str, list[float]]:
@@ -143,17 +136,17 @@ class Fitted:
 class Source(Records):
     """Records with their arrays and the laws that they make."""
 
-    @cached_property
-    def _fitted(self) -> dict[str, Fitted]:
-        return {}
+    _fitted: dict[str, Fitted] = field(default_factory=dict, repr=False, compare=False)
 
     def fitted(self, name: str) -> Fitted | None:
         """Return a record and its law; None if the folder has none of that name. RecordError if it is damaged."""
         if name not in self.paths:
             return None
         if name not in self._fitted:
-            content = self.content(name)
-            self._fitted[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
+            content, path = self.content(name), self.paths[name]
+            load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
+            of = content["law"], str(path), record_setting(content), self
+            self._fitted[name] = Fitted(content, record.read_arrays(path), load(*of))
         return self._fitted[name]
 
     def needed(self, name: str) -> Fitted:
@@ -172,11 +165,6 @@ class Source(Records):
         """Return a profile law with printed constants, normalised as the records here are."""
         return catalogue.load(law, constants, setting, self)
 
-    def _law(self, name: str, content: dict[str, Any]) -> ProfileLaw | AlbedoLaw:
-        setting, path = record_setting(content), str(self.paths[name])
-        load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
-        return load(content["law"], path, setting, self)
-
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Return a [1/mfp], b [-], c [mfp] of (7) in double precision."""
@@ -192,11 +180,7 @@ def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
 
 
 @cache
-def _exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int) -> tuple[Floats, Floats]:
-    r = np.geomspace(low, high, count)
-    return r, np.asarray(exact.profile(r, alpha, setting=setting))
-
-
 def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
     """Return radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
-    return _exact_profile(float(alpha), setting, float(low), float(high), count)
+    r = np.geomspace(low, high, count)
+    return r, np.asarray(exact.profile(r, alpha, setting=setting))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from statistics import median
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps, image
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
 from profilefit.scenes.stage.picture import ChartPoint, RenderResult
@@ -21,17 +19,16 @@ NOWHERE = "#BBBBBB"  # where no error is measured
 
 def scene_figures(drawn: RenderResult, device: str) -> dict[str, bytes]:
     """Return PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart"."""
-    files = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
+    pictures = {"": drawn.picture, "-truth": drawn.truth}
+    files = {end: _png(image.imsave, picture) for end, picture in pictures.items()} | {"-error": _error_map(drawn)}
     if len(drawn.chart) > 1:
         files["-chart"] = _chart(drawn.chart, device)
     return files
 
 
-def _png(picture: NDArray[np.uint8]) -> bytes:
-    """Return the picture as PNG, a pixel for a pixel."""
-    written = io.BytesIO()
-    image.imsave(written, picture, format="png")
-    return written.getvalue()
+def _png(write: Callable[..., Any], *arguments: Any, **options: Any) -> bytes:
+    write(file := io.BytesIO(), *arguments, format="png", **options)
+    return file.getvalue()
 
 
 @styled
@@ -48,7 +45,7 @@ def _error_map(drawn: RenderResult) -> bytes:
     bar.set_label(f"error of {drawn.of} over its mean [-]")
     point = drawn.point
     ax.set_title(f"{point.label}, {point.samples} samples: root mean square {point.rmse:.3g}")
-    return _written(figure)
+    return _png(figure.savefig, dpi=DPI)
 
 
 @styled
@@ -72,13 +69,7 @@ def _chart(points: Sequence[ChartPoint], device: str) -> bytes:
     by_samples.minorticks_off()
     by_time.set_xlabel("least time of its passes, and up to the most [ms]")
     figure.suptitle(f"{points[0].label}, on {device}", fontsize=9.0)
-    return _written(figure)
-
-
-def _written(figure: Figure) -> bytes:
-    written = io.BytesIO()
-    figure.savefig(written, format="png", dpi=DPI)
-    return written.getvalue()
+    return _png(figure.savefig, dpi=DPI)
 
 
 def scene_lines(drawn: RenderResult, device: str) -> Iterator[str]:
@@ -109,12 +100,8 @@ def content(drawn: RenderResult, device: str) -> dict[str, Any]:
 
 
 def _point(point: ChartPoint) -> dict[str, Any]:
-    return {
-        "technique": point.label,
-        "samples": point.samples,
-        "rmse": point.rmse,
-        "milliseconds": _spread(point.milliseconds),
-    }
+    times = _spread(point.milliseconds)
+    return {"technique": point.label, "samples": point.samples, "rmse": point.rmse, "milliseconds": times}
 
 
 def _spread(times: Sequence[float]) -> dict[str, float]:

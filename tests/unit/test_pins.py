@@ -32,17 +32,7 @@ PINS = Path(__file__).parent / "data" / "pins.json"
 HELP = Path(__file__).parent / "data" / "help.txt"
 LANGUAGES = ("glsl", "glsl-es", "hlsl", "python", "json")
 SUBCOMMANDS = (
-    "fit",
-    "photo",
-    "choose",
-    "convert",
-    "scene",
-    "export",
-    "examples",
-    "regenerate",
-    "report",
-    "check",
-    "stability",
+    *("fit", "photo", "choose", "convert", "scene", "export", "examples", "regenerate", "report", "check", "stability"),
     "tradeoff",
 )
 SLAB = mcml_sim.Medium(
@@ -177,9 +167,7 @@ def test_bits_are_those_of_before(name, quick_bits):
     assert (quick_bits | of_a_process(name) if name == "record" else quick_bits)[name] == pins[here][name]
 
 
-@pytest.mark.parametrize(
-    "language", [LANGUAGES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in LANGUAGES[1:])]
-)
+@pytest.mark.parametrize("language", [LANGUAGES[0], *slow(*LANGUAGES[1:])])
 def test_texts_of_every_law_are_those_of_before(language):
     pins = {name: pin for name, pin in json.loads(PINS.read_text())["exports"].items() if name.split()[1] == language}
     now = exports(language)

@@ -3,7 +3,7 @@
 import ast
 import graphlib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -25,8 +25,6 @@ ROOMS = {
 
 PACKAGES = ("mcml_sim", "profilefit")
 
-# A command imports what takes long in its body, under this guard of Ctrl-C: help and completion need none of it.
-GUARD = "interruptible"
 # Packages that a function may import where it needs them, because not every installation has them.
 OPTIONAL = frozenset({"dask", "distributed", "numba", "arviz_base"})
 
@@ -41,9 +39,9 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def modules(root: Path, package: str) -> dict[str, Path]:
+def modules(root: Path, *packages: str) -> dict[str, Path]:
     """Dotted name -> file; a folder goes by its own name."""
-    paths = sorted((root / package).rglob("*.py"))
+    paths = [path for package in packages for path in sorted((root / package).rglob("*.py"))]
     return {".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
 
 
@@ -59,6 +57,10 @@ def imported_names(tree: ast.AST, module: str, is_package: bool) -> Iterator[str
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
+def names_in(path: Path, module: str) -> set[str]:
+    return set(imported_names(parsed(path), module, path.name == "__init__.py"))
+
+
 @cache
 def import_graph(root: Path, package: str) -> Imports:
     """Module -> the modules of the same package that it names, each the deepest that exists."""
@@ -71,8 +73,7 @@ def import_graph(root: Path, package: str) -> Imports:
 
     graph: Imports = {}
     for module, path in files.items():
-        tree = parsed(path)
-        targets = {deepest(name) for name in imported_names(tree, module, path.name == "__init__.py")}
+        targets = {deepest(name) for name in names_in(path, module)}
         graph[module] = {target for target in targets if target} - {module}
     return graph
 
@@ -99,21 +100,10 @@ def upward(graph: Imports, package: str, order: Sequence[str]) -> list[str]:
     return [f"{edge[0]} imports {edge[1]}" for edge, end in zip(edges, ends, strict=True) if end[1] > end[0]]
 
 
-def _is_guard(node: ast.AST) -> bool:
-    calls = [item.context_expr for item in node.items] if isinstance(node, ast.With) else []
-    return any(isinstance(one, ast.Call) and isinstance(one.func, ast.Name) and one.func.id == GUARD for one in calls)
-
-
-def _imports(nodes: Iterable[ast.AST]) -> set[ast.Import | ast.ImportFrom]:
-    return {one for node in nodes for one in ast.walk(node) if isinstance(one, ast.Import | ast.ImportFrom)}
-
-
 def inner_imports(path: Path) -> list[str]:
-    """Imports inside functions of what is not optional, as file:line; of commands only those without the guard."""
-    tree = parsed(path)
-    nodes = _imports(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
-    if path.parent.name == "cli":
-        nodes -= _imports(node for node in ast.walk(tree) if _is_guard(node))
+    """Imports inside functions of what is not optional, as file:line."""
+    functions = [node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    nodes = {one for node in functions for one in ast.walk(node) if isinstance(one, ast.Import | ast.ImportFrom)}
     return [
         f"{path}:{node.lineno}"
         for node in sorted(nodes, key=lambda node: node.lineno)
@@ -123,8 +113,7 @@ def inner_imports(path: Path) -> list[str]:
 
 def test_simulator_knows_nothing_of_the_fits():
     for module, path in modules(ROOT, "mcml_sim").items():
-        names = imported_names(parsed(path), module, path.name == "__init__.py")
-        assert not [name for name in names if name.split(".")[0] == "profilefit"], path
+        assert not [name for name in names_in(path, module) if name.split(".")[0] == "profilefit"], path
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -134,7 +123,8 @@ def test_no_import_cycle(package):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_import_inside_a_function(package):
-    files = [path for path in modules(ROOT, package).values() if path != ROOT / "profilefit" / "cli" / "scene.py"]
+    """A command imports what takes long in its body: help and completion need none of it."""
+    files = [path for path in modules(ROOT, package).values() if path.parent.name != "cli"]
     assert [place for path in files for place in inner_imports(path)] == []
 
 
@@ -196,41 +186,37 @@ def test_a_command_that_knows_a_kind_is_seen(tmp_path):
 def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
     """Module -> the modules of all packages that import it or from it."""
     found: dict[str, set[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            tree = parsed(path)
-            for name in imported_names(tree, module, path.name == "__init__.py"):
-                for home in (name, name.rpartition(".")[0]):
-                    found.setdefault(home, set()).add(module)
+    for module, path in modules(root, *packages).items():
+        for name in names_in(path, module):
+            for home in (name, name.rpartition(".")[0]):
+                found.setdefault(home, set()).add(module)
     return found
 
 
 def test_a_file_is_one_noun():
     """Neither a crumb of one other file nor two; subcommands and kinds of records are one file each, however short."""
-    known, wrong = importers(ROOT, list(PACKAGES)), set()
-    for package in PACKAGES:
-        for module, path in modules(ROOT, package).items():
-            lines = len(path.read_text(encoding="utf-8").splitlines())
-            if path.stem in ("__init__", "__main__") or any(shelf in module for shelf in (".cli.", ".recipes.kinds.")):
-                continue
-            if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
-                wrong.add(module)
+    known, wrong = importers(ROOT, PACKAGES), set()
+    for module, path in modules(ROOT, *PACKAGES).items():
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if path.stem in ("__init__", "__main__") or any(shelf in module for shelf in (".cli.", ".recipes.kinds.")):
+            continue
+        if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
+            wrong.add(module)
     assert wrong == set()
 
 
 def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:
     """Class name -> the modules that define one."""
     found: dict[str, list[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            for node in ast.walk(parsed(path)):
-                if isinstance(node, ast.ClassDef):
-                    found.setdefault(node.name, []).append(module)
+    for module, path in modules(root, *packages).items():
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(module)
     return found
 
 
 def test_no_two_classes_have_one_name():
-    homes = class_homes(ROOT, list(PACKAGES))
+    homes = class_homes(ROOT, PACKAGES)
     assert {name for name, modules in homes.items() if len(modules) > 1} == SHARED_NAMES
 
 
@@ -261,16 +247,6 @@ def test_checks_see_what_they_look_for(tmp_path):
     assert inner_imports(package / "sub" / "leaf.py") == [f"{package / 'sub' / 'leaf.py'}:2"]
 
 
-@pytest.mark.parametrize(("folder", "refused"), [("cli", [5]), ("sub", [3, 5])])
-def test_a_command_imports_under_its_guard_and_nothing_else_does(tmp_path, folder, refused):
-    path = tmp_path / folder / "leaf.py"
-    path.parent.mkdir()
-    path.write_text(
-        "def f():\n    with interruptible(__name__):\n        import jax\n    if f:\n        import scipy\n"
-    )
-    assert inner_imports(path) == [f"{path}:{line}" for line in refused]
-
-
 # Beginnings that say nothing without a neighbour.
 ELLIPTICAL = re.compile(r"(What|Of|That|The same|Where|By|How|Those|As|Which|Who|Its|Their|Them|They|It)\b")
 HELD = ("mcml_sim", "profilefit", "benchmarks")
@@ -299,64 +275,31 @@ def test_elliptical_docstrings_are_seen(tmp_path):
     assert sorted(elliptical(path)) == [f"{path}:{line}" for line in (1, 3, 5)]
 
 
-# Pools of processes are the executor's, in one place; benchmarks have some of their own.
-POOLS = {"multiprocessing", "concurrent.futures.process"}
-POOL_HOME = "profilefit.recipes.workers"
-
-
-def makes_processes(tree: ast.AST, module: str, is_package: bool) -> bool:
-    """Return whether a module imports what starts or pools processes."""
-    names = set(imported_names(tree, module, is_package))
-    return "concurrent.futures.ProcessPoolExecutor" in names or any(
-        name == pool or name.startswith(f"{pool}.") for name in names for pool in POOLS
-    )
-
-
-def test_one_pool_of_processes():
-    homes = {
-        module
-        for package in PACKAGES
-        for module, path in modules(ROOT, package).items()
-        if makes_processes(parsed(path), module, path.name == "__init__.py")
-    }
-    assert homes == {POOL_HOME}
-
-
-@pytest.mark.parametrize(
-    ("text", "makes"),
-    [
-        ("from concurrent.futures import ThreadPoolExecutor", False),
-        ("from concurrent.futures import ProcessPoolExecutor", True),
-        ("import multiprocessing.pool", True),
-        ("from multiprocessing import Process", True),
-    ],
-)
-def test_pools_of_processes_are_seen(text, makes):
-    assert makes_processes(ast.parse(text), "bad", False) == makes
-
-
-# One machine each: the only modules that may import a library, and all that may be imported of scipy's optimisers.
-HOMES = {"optimistix": {"profilefit.fitting.solver"}, "emcee": {"profilefit.fitting.chains"}}
-SOLVED_BY_SCIPY = {
-    "scipy.optimize.brentq",
-    "scipy.optimize.nnls",
-}  # a root in an interval; least squares of weights >= 0
+# One machine each: the only modules that may import a library, and all that may be imported of scipy's optimisers:
+# a root in an interval, and least squares of weights >= 0. Benchmarks have pools of processes of their own.
+HOMES = {
+    "optimistix": "profilefit.fitting.solver",
+    "emcee": "profilefit.fitting.chains",
+    "multiprocessing": "profilefit.recipes.workers",
+    "concurrent.futures.process": "profilefit.recipes.workers",
+    "concurrent.futures.ProcessPoolExecutor": "profilefit.recipes.workers",
+}
+SOLVED_BY_SCIPY = {"scipy.optimize.brentq", "scipy.optimize.nnls"}
 
 
 def imports_of(root: Path, packages: Sequence[str], library: str) -> dict[str, set[str]]:
     """Module -> what it imports of a library, by dotted names."""
-    each: dict[str, set[str]] = {}
-    for package in packages:
-        for module, path in modules(root, package).items():
-            names = imported_names(parsed(path), module, path.name == "__init__.py")
-            if own := {name for name in names if f"{name}.".startswith(f"{library}.")}:
-                each[module] = own
-    return each
+    inside = f"{library}."
+    each = {
+        module: {name for name in names_in(path, module) if f"{name}.".startswith(inside)}
+        for module, path in modules(root, *packages).items()
+    }
+    return {module: names for module, names in each.items() if names}
 
 
 @pytest.mark.parametrize("library", HOMES)
 def test_a_library_has_one_home(library):
-    assert set(imports_of(ROOT, PACKAGES, library)) == HOMES[library]
+    assert set(imports_of(ROOT, PACKAGES, library)) == {HOMES[library]}
 
 
 # How a file is read is the machine of `declared`; others only annotate the fields of their models.
@@ -384,10 +327,17 @@ def test_scipy_minimises_nothing():
 def test_second_homes_are_seen(tmp_path):
     """Negative control: two modules with a sampler and a minimiser of their own, one under another name."""
     (tmp_path / "bad").mkdir()
-    (tmp_path / "bad" / "walks.py").write_text("from emcee.moves import DEMove\nimport emceeish\n")
+    (tmp_path / "bad" / "walks.py").write_text(
+        "from emcee.moves import DEMove\nimport emceeish\nfrom concurrent.futures import ThreadPoolExecutor\n"
+    )
     (tmp_path / "bad" / "fits.py").write_text("def f():\n    from scipy import optimize as o\n    import emcee as e\n")
+    (tmp_path / "bad" / "pools.py").write_text(
+        "from concurrent.futures import ProcessPoolExecutor\nimport multiprocessing.pool\nimport multiprocessing as m\n"
+    )
     assert imports_of(tmp_path, ["bad"], "emcee") == {"bad.fits": {"emcee"}, "bad.walks": {"emcee.moves.DEMove"}}
     assert imports_of(tmp_path, ["bad"], "scipy.optimize") == {"bad.fits": {"scipy.optimize"}}
+    for library in ("concurrent.futures.ProcessPoolExecutor", "multiprocessing"):
+        assert set(imports_of(tmp_path, ["bad"], library)) == {"bad.pools"}
 
 
 # A scene is a folder with these files, its GLSL beside them, and the physics they need, a noun a file.
@@ -464,7 +414,6 @@ def test_a_scene_with_a_renderer_of_its_own_is_seen(tmp_path):
 NAMELESS = frozenset(
     "found one made told taken again alike off lit begun wanted need".split()  # noqa: SIM905 - as it is read
 )
-RECORDED = {"HalvesCheck"}  # a class whose attributes are keys of shipped records
 
 
 def nameless(path: Path) -> list[str]:
@@ -476,7 +425,7 @@ def nameless(path: Path) -> list[str]:
             names.append(node.name)
             if isinstance(node, ast.FunctionDef):
                 names += [each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
-            elif node.name not in RECORDED:
+            else:
                 names += [each.target.id for each in node.body if isinstance(each, ast.AnnAssign)]
         found += [f"{path}:{node.lineno}" for name in names if name.lower() in NAMELESS]
     return found

@@ -1,1 +1,1 @@
-"""Stacks of layers: `solution` has what users call, `fluence` the equation, on `depths` and `slants`."""
+"""Stacks of layers: `solution` has what users call, `fluence` the equation, on the nodes of `quadrature`."""

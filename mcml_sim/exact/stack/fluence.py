@@ -15,9 +15,9 @@ T = Z = 0. What comes out above of a source at z is
     X(z) = (1/2) int_0^1 <(1 - a) (E(z) + b E(2d - z)) / D> dmu
 
 which without surfaces is e^{-L}/2 - T K (Case & Zweifel, Linear Transport Theory, 1967). Nystroem's method solves it:
-K is integrated from each node of `depths` over near panels by a double-exponential rule. Where a surface reflects, the
+K is integrated from each node over near panels by a double-exponential rule. Where a surface reflects, the
 mirror image K(z + z') holds all that is singular; what G has beside, light that gets out and light that crosses the
-stack, is smooth, and is summed over the directions of `slants`.
+stack, is smooth, and is summed over the directions of `quadrature`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.stack.depths import DARK, Depths, Nodes, gauss, near_end, near_node, slowest
-from mcml_sim.exact.stack.slants import Complexes, Slants, cones, deepest, directions, reflectance, steepest
+from mcml_sim.exact.stack.quadrature import (
+    DARK,
+    Complexes,
+    Depths,
+    Nodes,
+    Slants,
+    cones,
+    deepest,
+    directions,
+    gauss,
+    near_end,
+    near_node,
+    reflectance,
+    slowest,
+    steepest,
+)
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
@@ -41,16 +56,11 @@ DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen b
 class Field(NamedTuple):
     """Light at one wave number; arrays (N,)."""
 
-    phi: dict[str, Floats]
-    """Fluence over the light that arrives, under each illumination [-]."""
-    unscattered: dict[str, Floats]
-    """Fluence phi_0 of unscattered light [-]."""
-    up: Floats
-    """Response X of the light that comes out above."""
-    up_at_once: Floats
-    """Part of X without the light that the upper surface had reflected before."""
-    down: Floats
-    """Response X of the light that comes out below."""
+    phi: dict[str, Floats]  # fluence over the light that arrives, under each illumination [-]
+    unscattered: dict[str, Floats]  # fluence phi_0 of unscattered light [-]
+    up: Floats  # response X of the light that comes out above
+    up_at_once: Floats  # part of X without the light that the upper surface had reflected before
+    down: Floats  # response X of the light that comes out below
 
 
 def direct(optical: Floats, height: Floats, k: float) -> Floats:
@@ -117,8 +127,7 @@ def beam(here: Depths, tau: Floats) -> Floats:
 
 def normal_reflectances(here: Depths) -> tuple[float, float]:
     """Return the reflectances of the two surfaces at normal incidence [-]."""
-    a, b = (((ratio - 1) / (ratio + 1)) ** 2 for ratio in (here.above, here.below))
-    return a, b
+    return normal_reflectance(here.above, 1.0), normal_reflectance(here.below, 1.0)
 
 
 def _scattered(here: Depths, slants: Slants, k: float) -> Floats:

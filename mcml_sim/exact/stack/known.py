@@ -20,9 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcml_sim.exact.stack import depths, fluence
-from mcml_sim.exact.stack.depths import Depths, Nodes
-from mcml_sim.exact.stack.slants import critical_slope, reflectance
+from mcml_sim.exact.stack import fluence
+from mcml_sim.exact.stack.quadrature import Depths, Nodes, critical_slope, double_exponential, reflectance, stack
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Layer, Medium
 
@@ -34,12 +33,9 @@ MOST_TURNS = 10_000
 class _Piece(NamedTuple):
     """Layer, or its image in the lower surface, as the light flies."""
 
-    near: float
-    """Height at its nearer end [length]."""
-    far: float
-    """Height at its farther end [length]."""
-    optical: float
-    """Optical thickness up to the nearer end [-]."""
+    near: float  # height at its nearer end [length]
+    far: float  # height at its farther end [length]
+    optical: float  # optical thickness up to the nearer end [-]
     layer: Layer
     image: bool
 
@@ -72,11 +68,11 @@ class _Piece(NamedTuple):
 
 def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
     """Return R_d of that light [1/length^2] at radii r > 0 of shape (n,)."""
-    here = depths.stack(medium, 0.0, SURFACES)
+    here = stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back(here, r)
     value = np.zeros_like(r)
-    share, weight = depths.double_exponential()
+    share, weight = double_exponential()
     for piece, low, high in _ranges(here, medium, r, ends=True):
         theta = low + (high - low) * share
         height, cosine = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far), np.cos(theta)
@@ -88,11 +84,11 @@ def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
 
 def within(medium: Medium, illumination: str, r: Floats) -> Floats:
     """Return the light that leaves within radii r > 0 of shape (n,), and the beam that comes straight back [-]."""
-    here = depths.stack(medium, 0.0, SURFACES)
+    here = stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back_within(here, r)
     value = np.full_like(r, fluence.thrown_back(here, 0.0, illumination, SURFACES))
-    share, weight = depths.double_exponential()
+    share, weight = double_exponential()
     for piece, low, high in _ranges(here, medium, r, ends=False):
         theta = low + (high - low) * share
         farthest = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far)
@@ -153,7 +149,7 @@ def _thrown_back(here: Depths, r: Floats) -> Floats:
 def _thrown_back_within(here: Depths, r: Floats) -> Floats:
     """Return 2 n^2 int mu ... dmu as far as the slope that leaves at r, from sin(theta)^2."""
     value = np.zeros_like(r)
-    share, weight = depths.double_exponential()
+    share, weight = double_exponential()
     for turn in _turns(here):
         light = np.zeros_like(r)
         for start, stop in itertools.pairwise(_breaks(here)):

@@ -16,10 +16,10 @@ transform of what it gives, of which first is taken apart what k would have to g
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -31,12 +31,12 @@ from threadpoolctl import threadpool_limits
 from mcml_sim.errors import InputError
 from mcml_sim.exact import cone, half_space
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.stack import depths, fluence, known
-from mcml_sim.exact.stack.depths import Depths, Nodes
+from mcml_sim.exact.stack import fluence, known
 from mcml_sim.exact.stack.fluence import Field
+from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, stack
 from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, shown
+from mcml_sim.media.arrays import Floats, scalar_or_array
+from mcml_sim.media.checks import checked_range, require
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting, require_illumination
 
@@ -85,22 +85,20 @@ class Solution:
 
     def transform(self, k: ArrayLike) -> float | Floats:
         """Return 2 pi int_0^inf r R_d(r) J0(k r) dr at wave numbers k >= 0 [1/length], of any shape [-]; A at 0."""
-        waves = _checked("k", k, "a finite wave number >= 0")
-        if np.any(np.isinf(waves)):
-            raise InputError("k must be a finite wave number >= 0, got inf")
-        return _scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination, self.nodes), waves))
+        waves = checked_range("k", k, "a finite wave number >= 0", 0.0, sys.float_info.max)
+        return scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination, self.nodes), waves))
 
     def profile(self, r: ArrayLike) -> float | Floats:
         """Return R_d(r) [1/length^2] at radii r >= 0 of any shape; 2 pi r R_d integrates to what is not at r = 0."""
-        radius = _checked("r", r, "a radius >= 0")
-        return _scalar_or_array(self._difference.profile(radius.ravel()).reshape(radius.shape))
+        radius = checked_range("r", r, "a radius >= 0", 0.0)
+        return scalar_or_array(self._difference.profile(radius.ravel()).reshape(radius.shape))
 
     def cdf(self, r: ArrayLike) -> float | Floats:
         """Return the share of `reflectance` that leaves within radius r >= 0 of any shape [-]; 1 at infinity."""
-        radius = _checked("r", r, "a radius >= 0")
+        radius = checked_range("r", r, "a radius >= 0", 0.0)
         within = self._difference.within(radius.ravel()).reshape(radius.shape)
         all_of_it = np.isinf(radius) | (self.reflectance == 0)
-        return _scalar_or_array(np.where(all_of_it, 1.0, within / (self.reflectance or 1.0)))
+        return scalar_or_array(np.where(all_of_it, 1.0, within / (self.reflectance or 1.0)))
 
     @cached_property
     def _difference(self) -> _Difference:
@@ -130,8 +128,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
     radii cost little.
     """
     _require_solved(medium, illumination)
-    if not isinstance(nodes, Nodes):
-        raise InputError(f"nodes must be a mcml_sim.exact.Nodes, got {shown(nodes)}")
+    require(isinstance(nodes, Nodes), "nodes", "a mcml_sim.exact.Nodes", nodes)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
     (fine, down, absorbed), (coarse, _, other) = (_shares(medium, illumination, rule) for rule in (nodes, nodes.fewer))
     waves = np.array([first.mu_t])
@@ -152,8 +149,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
 
 
 def _require_solved(medium: Medium, illumination: str) -> None:
-    if not isinstance(medium, Medium):
-        raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
+    require(isinstance(medium, Medium), "medium", "a mcml_sim.Medium", medium)
     require_illumination(illumination)
     layers = medium.layers
     if len(layers) > MAX_LAYERS:
@@ -172,7 +168,7 @@ def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> floa
 
 
 def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, Field]:
-    here = depths.stack(medium, k, rule)
+    here = stack(medium, k, rule)
     return here, fluence.solve(here, k, rule)
 
 
@@ -214,14 +210,10 @@ class _Difference:
 
     medium: Medium
     illumination: str
-    base: Medium | None
-    """Half space whose profile, without what is known of it, is taken away; None where nothing is."""
-    share: float
-    """Share of that profile [-]."""
-    edges: Floats
-    """Edges of panels of k, (panels + 1,) [1/length]."""
-    rest: Floats
-    """Transform of the rest, (panels, nodes) [-]."""
+    base: Medium | None  # half space whose profile, without what is known of it, is taken away; None where nothing is
+    share: float  # of that profile [-]
+    edges: Floats  # edges of panels of k, (panels + 1,) [1/length]
+    rest: Floats  # transform of the rest, (panels, nodes) [-]
 
     def profile(self, r: Floats) -> Floats:
         """Return R_d [1/length^2] at radii of shape (n,)."""
@@ -262,22 +254,14 @@ def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order:
     """Return the part of the integral between two wave numbers, in steps of a few periods of J."""
     stop = min(high, last)
     steps = int(np.ceil((stop - low) * r.max() / PHASE_STEP)) or 1
-    x, weight = depths.gauss(PHASE_NODES)
+    x, weight = gauss(PHASE_NODES)
     k = low + (stop - low) * ((np.arange(steps)[:, None] + x) / steps).ravel()
     # Ended softly, what is left at the last k blurs the light over a few times its wavelength, and that is all.
     soft = 0.5 * erfc(9.0 * (k / last - 0.52))
-    through = _interpolation((k - low) / (high - low), rest.size)
+    through = interpolation(2 * ((k - low) / (high - low)) - 1, rest.size)
     values = soft * (through @ rest) * np.tile(weight, steps) * ((stop - low) / steps)
     waves = np.multiply.outer(r, k)
     return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
-
-
-def _interpolation(at: Floats, nodes: int) -> Floats:
-    """Return the interpolation from so many Gauss nodes on (0, 1) to places there, (places, nodes)."""
-    x, weight = depths.gauss(nodes)
-    degree = np.arange(nodes)
-    basis = np.polynomial.legendre.legvander(2 * x - 1, nodes - 1) * (2 * degree + 1) * weight[:, None]
-    return np.polynomial.legendre.legvander(2 * at - 1, nodes - 1) @ basis.T
 
 
 def _unit(medium: Medium) -> float:
@@ -288,7 +272,7 @@ def _unit(medium: Medium) -> float:
 def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
-    waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(rule.wave)[0]
+    waves = edges[:-1, None] + np.diff(edges)[:, None] * gauss(rule.wave)[0]
     rest, share = _each(lambda k: _rests(medium, k, rule)[illumination], waves), 0.0
     if base is not None:
         deep = _rest_of_half_space(base, medium, waves, illumination, rule)
@@ -365,14 +349,3 @@ def _wave_edges(medium: Medium, last: float) -> Floats:
     slowest = min(layer.mu_t * max(float(half_space.decay_rate(layer.alpha)), FIRST_WAVE) for layer in scatter)
     first = min(0.5 * slowest, 0.5 * last)
     return np.append(0.0, np.geomspace(first, last, int(np.ceil(np.log2(last / first))) + 1))
-
-
-def _checked(name: str, value: Any, accepted: str) -> Floats:
-    numbers = checked_numbers(name, value, accepted)
-    if not np.all(numbers >= 0):
-        raise InputError(f"{name} must be {accepted}, got {float(numbers[~(numbers >= 0)].flat[0])}")
-    return numbers
-
-
-def _scalar_or_array(values: Floats) -> float | Floats:
-    return float(values) if values.ndim == 0 else values

@@ -5,8 +5,7 @@ from importlib import import_module
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
     from mcml_sim.media.phase.fournier_forand import FournierForand
-    from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
-    from mcml_sim.media.phase.isotropic import Isotropic
+    from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein, Isotropic
     from mcml_sim.media.phase.kinds import as_table, from_table, settle
     from mcml_sim.media.phase.mixture import Mixture
     from mcml_sim.media.phase.phase import Phase
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 HOMES = {
     "FournierForand": "fournier_forand",
     "HenyeyGreenstein": "henyey_greenstein",
-    "Isotropic": "isotropic",
+    "Isotropic": "henyey_greenstein",
     "Mixture": "mixture",
     "Phase": "phase",
     "Tabulated": "tabulated",

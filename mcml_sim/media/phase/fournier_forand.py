@@ -13,8 +13,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
 from mcml_sim.media.checks import is_number, shown
 from mcml_sim.media.phase.phase import Phase
-from mcml_sim.media.phase.pieces import Pieces
-from mcml_sim.media.phase.tabulated import STRAIGHT, Tabulated
+from mcml_sim.media.phase.tabulated import STRAIGHT, Pieces, Tabulated
 
 INDICES, SLOPES = (1.0, 2.0), (3.0, 5.0)
 SMALL = 0.05  # ln delta below which a difference of second order is a series
@@ -46,11 +45,9 @@ class FournierForand(Phase):
                 raise InputError(f"{name} must be in ({low:g}, {high:g}), got {shown(value)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]; straight on, that of the nearest cosine below 1."""
         return self._density(namespace(self.n, self.mu, cosine).maximum(1 - cosine, STRAIGHT))
 
     def invert(self, cosine: Any) -> Any:
-        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return 1 - self._below(1 - cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
@@ -59,7 +56,6 @@ class FournierForand(Phase):
         return below_one, 2 - below_one
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """Return the Legendre moment of order l [-], by quadrature over the table."""
         return _pieces(self).moment(l)
 
     def for_kernel(self) -> Tabulated:
@@ -118,7 +114,6 @@ def _second_order(xp: Any, nu: Any, log: Any) -> Any:
 
 @lru_cache(maxsize=64)
 def _pieces(phase: FournierForand) -> Pieces:
-    """Return the table that draws."""
     u = np.geomspace(LEAST, 2.0, ROWS)
     u[-1] = 2.0
     return Pieces.of(u, 2 * np.pi * phase._density(u), phase._below(u))

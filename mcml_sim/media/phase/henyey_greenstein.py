@@ -1,4 +1,4 @@
-"""Henyey and Greenstein's phase function, the one of tissue optics."""
+"""Henyey and Greenstein's phase function, the one of tissue optics; and scattering that forgets the direction."""
 
 from __future__ import annotations
 
@@ -34,13 +34,11 @@ class HenyeyGreenstein(Phase):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]."""
         xp = namespace(self.g, cosine)
         square = self._square(cosine)
         return (1 - self.g * self.g) / (2 * square * xp.sqrt(square)) / (2 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """Return the `xi` whose sample is `cosine` [-], the integral of the density from -1 on."""
         xp, g = namespace(self.g, cosine), self.g
         distance = xp.sqrt(self._square(cosine))
         return 0.5 + 0.5 * (2 * cosine - 3 * g + g * g * g) / (distance * (1 - g * g + distance))
@@ -55,10 +53,31 @@ class HenyeyGreenstein(Phase):
         return below_one, above_minus_one
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Return the Legendre moment g^l [-]."""
         return self.g**l
 
     def _square(self, cosine: Any) -> Any:
         """Return 1 + g^2 - 2 g c, without cancellation at c = 1."""
         g = self.g
         return (1 - g) * (1 - g) + 2 * g * (1 - cosine)
+
+
+@dataclass(frozen=True)
+class Isotropic(Phase):
+    """Uniform density in all directions: p(c) = 1 / (4 pi) [1/sr].
+
+    Henyey and Greenstein's phase function of g = 0, to the last bit of `deflection`: the cosine is v itself, which is
+    what the kernels of the matched half space draw.
+    """
+
+    def pdf(self, cosine: Any) -> Any:
+        return 0.0 * cosine + 1 / (4 * np.pi)
+
+    def invert(self, cosine: Any) -> Any:
+        return 0.5 * (1 + cosine)
+
+    def deflection(self, v: Any) -> tuple[Any, Any]:
+        """Return 1 - v and 1 + v [-]."""
+        return 1 - v, 1 + v
+
+    def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
+        return 1.0 * (l == 0)

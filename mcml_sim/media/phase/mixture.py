@@ -12,7 +12,7 @@ import numpy as np
 
 from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require
 from mcml_sim.media.phase.phase import Phase
 
 MOST_TERMS = 64
@@ -38,8 +38,7 @@ class Mixture(Phase):
     def __post_init__(self) -> None:
         for name in ("weights", "phases"):
             value = getattr(self, name)
-            if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str):
-                raise InputError(f"{name} must be a list, got {shown(value)}")
+            require(isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str), name, "a list", value)
             object.__setattr__(self, name, tuple(value))
         if not 1 <= len(self.weights) == len(self.phases) <= MOST_TERMS:
             raise InputError(
@@ -47,20 +46,16 @@ class Mixture(Phase):
                 f"got {len(self.weights)} weights and {len(self.phases)} phases"
             )
         for phase in self.phases:
-            if not isinstance(phase, Phase):
-                raise InputError(f"phases must be phase functions, got {shown(phase)}")
+            require(isinstance(phase, Phase), "phases", "phase functions", phase)
         for weight in self.weights:
-            if not (is_number(weight) and 0 <= weight <= 1):
-                raise InputError(f"weights must be shares in [0, 1], got {shown(weight)}")
+            require(is_number(weight) and 0 <= weight <= 1, "weights", "shares in [0, 1]", weight)
         if abs(math.fsum(self.weights) - 1) > ROUNDING:
             raise InputError(f"weights must sum to 1, got {math.fsum(self.weights):.12g}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Return the density of the direction [1/sr]."""
         return self._mean([phase.pdf(cosine) for phase in self.phases])
 
     def invert(self, cosine: Any) -> Any:
-        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return self._mean([phase.invert(cosine) for phase in self.phases])
 
     def sample(self, xi: Any) -> Any:
@@ -89,7 +84,6 @@ class Mixture(Phase):
         return sample
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Return the mean of the terms' Legendre moments of order l [-]."""
         return self._mean([phase.moment(l) for phase in self.phases])
 
     @property

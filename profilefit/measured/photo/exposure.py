@@ -1,10 +1,14 @@
-"""One photograph as the sensor counted: Bayer planes apart, black taken off, nothing interpolated, no curve.
+"""Photographs as the sensor counted, and a bracket of them as one picture, by Bayer plane, with variances.
 
 Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG, by Pillow,
-is not, is taken for sRGB, and the answer says so. What is read is bounded before it is read.
+is not and is taken for sRGB. Files that state no white level have it where more pixels share the largest value than
+lie just below it; else it is that of sixteen bits, and of floats more than the largest.
 
-Files that state no white level have it where more pixels share the largest value than lie just below it; else it is
-that of sixteen bits, and of floats more than the largest.
+An exposure of relative time t records y = t x + noise of variance y / gain + read^2 [steps^2] (photon transfer). Times
+are fitted, not believed: of each pair of neighbours the ratio is that of the sums over pixels that both record well.
+Gain and read noise are fitted to the scatter of those pixels about it. The picture is the mean of y / t by inverse
+variance, at a light that neighbouring pixels share: by its own noise, a pixel that is dark by chance would count for
+more. Clipped pixels and their neighbours do not count, nor does what spills along a column of them.
 """
 
 from __future__ import annotations
@@ -17,15 +21,18 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
+from scipy.ndimage import binary_dilation, uniform_filter
 
 from profilefit.errors import InputError
 
+Floats = NDArray[np.float64]
 Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
@@ -37,6 +44,14 @@ STEPS, BEYOND = 65535.0, 1.2  # of sixteen bits, which floats become; over the l
 LARGEST = 1e30  # of a float
 DAMAGED = (ValueError, OSError, LookupError, TypeError, RuntimeError, struct.error, zlib.error)  # of libraries' readers
 PACKAGES = {"cv2": "opencv-python-headless", "OpenEXR": "OpenEXR", "rawpy": "rawpy", "tifffile": "tifffile"}
+FULL = 0.9  # of the range between black and white, from where a pixel counts as clipped
+REACH = 2  # pixels of a plane about a clipped one that are left out, too
+SHARED = 5  # pixels across, over which light is shared for the weights
+DIM, UNCLIPPED = 0.02, 0.7  # of the range, between which a pixel says something of ratios
+LEAST_PAIRS = 50  # pixels, for a ratio or a bin
+BINS = 24  # of light, for photon transfer
+BRIGHTER = 1.2  # times the light of another exposure, that one of a shorter time, or of the same, may have
+ROUNDED = 1.0 / 12.0  # steps^2, variance of a count that has no other
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +96,7 @@ def read(path: Path) -> Exposure:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     if not 0 < size <= MOST_BYTES:
         raise InputError(f"{path}: expected a photograph of 1 byte to {MOST_BYTES >> 20} MiB, got {size} bytes")
-    with _without_words():
+    with _silent():
         return _raw(path) if kind in RAW else _plain(path, kind)
 
 
@@ -99,15 +114,14 @@ def _raw(path: Path) -> Exposure:
             black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
             seconds = float(raw.other.shutter_speed)
             exposure = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
-            exposure = replace(exposure, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
+            return replace(exposure, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
     except rawpy.LibRawError as error:
         raise _refused(path, "a raw file", error) from None
-    return exposure
 
 
 @contextmanager
-def _without_words() -> Iterator[None]:
-    """Libraries write to standard error by themselves what their errors say again."""
+def _silent() -> Iterator[None]:
+    """Silence standard error, to which libraries write what their errors say again."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
@@ -171,10 +185,7 @@ def _plain(path: Path, kind: str) -> Exposure:
 
 
 def _range(counts: Plane, most: float | None, brightest: float) -> float:
-    """White of a plane (rows, columns) of a file that does not state it.
-
-    most  of its integers, None of floats; brightest the largest count of any plane
-    """
+    """Return the white of a plane; `most` is that of its integers, `brightest` the largest count of any plane."""
     largest = float(counts.max())
     shared = int(np.count_nonzero(counts == largest))
     near = int(np.count_nonzero(counts > BELOW * largest)) - shared
@@ -219,13 +230,11 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
 
 
 def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
-    """Before it is read: not more than MOST_PIXELS, of three values each."""
     if columns * rows > MOST_PIXELS:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got {columns} x {rows}")
     if columns * rows * values > 3 * MOST_PIXELS:
-        raise InputError(
-            f"{path}: expected at most {3 * MOST_PIXELS} values, got {columns} x {rows} pixels of {values} each"
-        )
+        got = f"{columns} x {rows} pixels of {values} each"
+        raise InputError(f"{path}: expected at most {3 * MOST_PIXELS} values, got {got}")
 
 
 def library(name: str) -> Any:
@@ -245,3 +254,145 @@ def _refused(path: Path, kind: str, error: Exception) -> InputError:
     text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words)
     first = (text.splitlines() or [type(error).__name__])[0][:100]
     return InputError(f"{path}: cannot be read as {kind}: {first}")
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Gain [electrons a step] and read noise [steps] of a sensor."""
+
+    gain: float
+    read: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One Bayer plane of a bracket: light [steps a unit of time] and its variance, nan where no exposure has it.
+
+    offset  (row, column) of the plane's first pixel in the whole picture, step between its pixels
+    """
+
+    light: Plane
+    variance: Plane
+    offset: tuple[int, int]
+    step: int
+
+
+class Times(NamedTuple):
+    """Times of exposures (m,), relative to the longest, and the covariance (m, m) of their logarithms."""
+
+    value: Floats
+    covariance: Floats
+
+
+def times(shots: Sequence[Exposure]) -> Times:
+    """Estimate times from what the exposures record; InputError where neighbours share no pixels."""
+    stated = [one.seconds or 0.0 for one in shots]
+    light = [sum(float(each.counts.mean()) for each in one.planes) for one in shots]
+    order = np.lexsort((light, stated)) if all(stated) else np.argsort(light)
+    value, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
+    for at in range(len(shots) - 2, -1, -1):
+        shorter, longer = order[at], order[at + 1]
+        ratio, error = _ratio(shots[shorter], shots[longer])
+        value[shorter] = value[longer] * ratio
+        covariance[np.ix_(order[: at + 1], order[: at + 1])] += error**2
+    return Times(value, covariance)
+
+
+def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
+    """Return the ratio of two exposures' times, the shorter one's first, and its relative error."""
+    above = below = pairs = 0.0
+    chosen = []
+    for one, other in zip(shorter.planes, longer.planes, strict=True):
+        level = uniform_filter(
+            other.counts, SHARED, mode="nearest"
+        )  # by their own, pixels bright by chance would count
+        good = (level < UNCLIPPED * other.range) & (level > DIM * other.range) & _unclipped(other, REACH)
+        chosen.append((one.counts[good].astype(float), other.counts[good].astype(float)))
+        above += float(chosen[-1][0].sum())
+        below += float(chosen[-1][1].sum())
+        pairs += int(good.sum())
+    longer_is_stated = shorter.seconds and longer.seconds and shorter.seconds < longer.seconds
+    if pairs >= LEAST_PAIRS and above > BRIGHTER * below:
+        raise InputError(
+            f"{shorter.source}: expected less light than {longer.source} has, which "
+            f"{'states a longer time' if longer_is_stated else 'is brighter on the whole'}, got "
+            f"{above / below:.3g} times as much"
+        )
+    if pairs < LEAST_PAIRS or not above > 0:
+        raise InputError(
+            f"{shorter.source}: expected a scene that {longer.source} shares with it, neither dark nor clipped, in "
+            f"{LEAST_PAIRS} pixels, got {pairs if above > 0 else 0:.0f}; take exposures in steps of a factor of eight "
+            "or less"
+        )
+    ratio = above / below
+    scatter = sum(float(np.sum((one - ratio * other) ** 2)) for one, other in chosen)
+    return ratio, float(np.sqrt(scatter)) / above
+
+
+def shares(light: Floats, relative: Floats, own: Sensor, most: Floats) -> Floats:
+    """Return shares (n, m) of exposures (m,) in a picture of light (n,), where more than `most` steps (m,) clip."""
+    steps = np.maximum(np.multiply.outer(light, relative), 0.0)
+    weight = np.where(steps < most, relative**2 / (steps / own.gain + own.read**2), 0.0)
+    total = weight.sum(axis=1, keepdims=True)
+    return np.asarray(np.divide(weight, total, out=np.zeros_like(weight), where=total > 0), float)
+
+
+def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
+    """Photon transfer: the variance of y_a - (t_a / t_b) y_b over bins of light, against what electrons would have."""
+    rows, squares, weights = [], [], []
+    order = np.argsort(relative)
+    for a, b in pairwise(order):
+        ratio = relative[a] / relative[b]
+        for one, other in zip(shots[a].planes, shots[b].planes, strict=True):
+            good = (other.counts < FULL * other.range) & (other.counts > 0)
+            if np.count_nonzero(good) < LEAST_PAIRS:
+                continue
+            light, residual = other.counts[good], one.counts[good] - ratio * other.counts[good]
+            edges = np.unique(np.quantile(light, np.linspace(0.0, 1.0, BINS + 1)))
+            at = np.clip(np.searchsorted(edges, light, side="right") - 1, 0, edges.size - 2)
+            for each in range(edges.size - 1):
+                inside = residual[at == each]
+                if inside.size < LEAST_PAIRS:
+                    continue
+                middle = float(light[at == each].mean())
+                rows.append((ratio * middle + ratio**2 * middle, 1.0 + ratio**2))
+                squares.append(max(float(np.mean((inside - inside.mean()) ** 2)), ROUNDED * (1.0 + ratio**2)))
+                weights.append(np.sqrt(inside.size) / squares[-1])
+    if len(rows) < 2:
+        return Sensor(1.0, 1.0)
+    matrix, weight = np.array(rows), np.array(weights)
+    best, *_ = np.linalg.lstsq(matrix * weight[:, None], np.array(squares) * weight, rcond=None)
+    return Sensor(1.0 / max(float(best[0]), 1e-9), float(np.sqrt(max(best[1], ROUNDED))))
+
+
+def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Picture]:
+    """Return the planes of a bracket, light in steps of the longest exposure."""
+    pictures = []
+    for at, plane in enumerate(shots[0].planes):
+        total = np.zeros(plane.counts.shape, np.float32)
+        precision = np.zeros(plane.counts.shape, np.float32)
+        light = _rough(shots, relative, at)
+        for shot, time in zip(shots, relative, strict=True):
+            one = shot.planes[at]
+            variance = np.maximum(light * time, 0.0) / own.gain + own.read**2
+            weight = np.where(_unclipped(one, REACH), time**2 / variance, 0.0).astype(np.float32)
+            total += weight * one.counts / np.float32(time)
+            precision += weight
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pictures.append(Picture(total / precision, 1.0 / precision, plane.offset, plane.step))
+    return pictures
+
+
+def _unclipped(plane: BayerPlane, reach: int) -> NDArray[np.bool_]:
+    """Pixels so far from those that clip."""
+    return ~binary_dilation(plane.counts >= FULL * plane.range, iterations=reach)
+
+
+def _rough(shots: Sequence[Exposure], relative: Floats, at: int) -> Plane:
+    """Light that neighbouring pixels share, of the longest exposure that has it."""
+    rough: Plane = np.full(shots[0].planes[at].counts.shape, np.nan, np.float32)
+    for shot, time in sorted(zip(shots, relative, strict=True), key=lambda pair: pair[1]):
+        one = shot.planes[at]
+        smooth = uniform_filter(one.counts, SHARED, mode="nearest") / np.float32(time)
+        rough = np.where(_unclipped(one, REACH + SHARED // 2) | np.isnan(rough), smooth, rough)
+    return rough

@@ -1,35 +1,49 @@
 """The medium behind a spot: exact light under beam, lens and surface, fitted to rings, and to those of cards.
 
+A point is spread over a core, a Gaussian of standard deviation sigma (the beam, its 1/e^2 radius being 2 sigma, and
+what a lens blurs), and over halos, h_a(r) = 3 a^3 / (2 pi (r^2 + a^2)^{5/2}), whose transform is (1 + ka) e^{-ka}:
+glare that falls outwards more slowly is a mixture of them. Of light of profile R_d under a beam of power one, and a
+share S of it that never enters the medium but is scattered by its surface, a picture shows
+
+    I = k sum_c share_c (R_d + S delta) * spread_c + dark,     sum_c share_c = 1,
+
+as means over rings. The mean of h_a over a circle of radius rho, at a distance d from its centre, is
+2 a^3 (E(m) / (A - B) + (2 E(m) - K(m)) / (2 (A + B))) / (pi^2 (A - B) sqrt(A + B)), A = d^2 + rho^2 + a^2, B = 2 d rho,
+m = 2 B / (A + B), E and K the complete elliptic integrals. The core blurs a halo, too: by sigma^2 / 2 times its
+Laplacian, which is -d^2 h_a / da^2 + (2 / a) dh_a / da.
+
 Coordinates: those of `model` (alpha, l*, scale), ln of the core's sigma, the surface's share, the share of each halo,
 the dark level, what a lens darkens; and ln of each card's scale. What is known of them beforehand is normal. A card
 that light does not enter shows beam and lens alone; of a known reflectance, and exposed alike, it gives the scale.
-
 Errors are those of the normal approximation at the best fit; the same of a truth is the Fisher bound of a setup.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, solve_triangular
+from scipy.special import ellipe, ellipk
 
 from mcml_sim.exact.light import ExactLight
 from profilefit.fitting.misfit import DETECTED, waves
 from profilefit.fitting.solver import CONVERGED, Solution, best_apart, covariance, lowest, solve
 from profilefit.measured import model
+from profilefit.measured.instrument import Gaussian, Instrument
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.noise import WAVE
-from profilefit.measured.photo.glare import ring_means, ring_weights
-from profilefit.measured.photo.rings import SpotRings
+from profilefit.measured.photo.rings import SpotRings, over_rings
 from profilefit.measured.problem import ALBEDOS, BLACK, FARTHEST_LN, FARTHEST_U, LENGTHS, WHITE, Known
 
 Floats = NDArray[np.float64]
+Hashable = tuple[bytes, tuple[int, ...]]
 MEDIUM = ("mu_s'", "mu_a")
 HALO, ALIKE = 0.5, np.log(2.0)  # error of a halo's share over that of all glare; ln a within which shares are alike
 NARROWEST, WIDEST, RATIO = 1.0, 32.0, np.sqrt(2.0)  # widths of halos [mm], and of one over the next narrower
@@ -50,6 +64,74 @@ UNENDED = "the search did not end at a minimum: photograph cards, or expose long
 RIVALLED = "media that differ fit the rings, too: photograph a grey card, or a spot of a narrower beam"
 RIVAL = float(stats.chi2.isf(DETECTED, 1))  # of chi-square above the best, up to which another minimum is a rival
 LARGEST = 100.0  # of a logarithm, where an interval ends that tells nothing
+FARTHER = 5.0  # of the last ring, from where halos still bring light
+NEAR = 0.1  # of a, between halos whose difference is a derivative
+APART = 0.05  # in ln sigma, of cores whose weights are known
+POLYNOMIALS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True)).T  # (4, 4) Lagrange's, lowest power first
+
+
+def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> tuple[Floats, Floats, Floats]:
+    """Return radii (m,) and weights (1 + halos, n, m) of 2 pi rho R_d in the mean over each ring, of core and halos.
+
+    Third the derivative (n, m) of the core's by ln sigma. The core's lie on cubics between those of sigmas APART.
+    """
+    place = float(np.log(sigma)) / APART
+    first = int(np.floor(place)) - 1
+    share = POLYNOMIALS @ (place - first) ** np.arange(4.0)
+    slope = POLYNOMIALS[:, 1:] @ (np.arange(1.0, 4.0) * (place - first) ** np.arange(3.0)) / APART
+    gathered = [(one.tobytes(), one.shape) for one in rings.gathered]
+    cores = [_core(float(np.exp(APART * (first + at))), *gathered) for at in range(4)]
+    rho, near = cores[0][0], np.stack([one for _, one in cores])
+    core, widening = np.tensordot([share, slope], near, axes=1)
+    sharp, bend = _halos(tuple(halos), rho.tobytes(), rings.inner.tobytes(), rings.outer.tobytes())
+    blurred = sharp - 0.5 * _blur(sigma, halos)[:, None, None] ** 2 * bend
+    return rho, np.concatenate([core[None], blurred]), widening
+
+
+def _blur(sigma: float, halos: Sequence[float]) -> Floats:
+    """Return the blur of each halo by the core; where that is no small part of it, what the second order gives."""
+    return np.minimum(sigma, 0.5 * np.array(halos))
+
+
+@lru_cache(maxsize=24)
+def _core(sigma: float, distances: Hashable, shares: Hashable) -> tuple[Floats, Floats]:
+    d, share = (np.frombuffer(content).reshape(shape) for content, shape in (distances, shares))
+    return Instrument(Gaussian(2.0 * sigma)).gathered(d, share, FARTHER * float(d.max()))
+
+
+@lru_cache(maxsize=8)
+def _halos(halos: tuple[float, ...], radii: bytes, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
+    """Weights (halos, n, m) of halos that no core blurs, and minus their Laplacians; even over the rings' areas."""
+    rho = np.frombuffer(radii)
+    steps = CubicSpline(np.arange(rho.size), rho)(np.arange(rho.size), 1)  # a sum is a trapezoidal integral
+    d, share = over_rings(np.frombuffer(inner), np.frombuffer(outer))
+
+    def weights(by: float) -> Floats:
+        return np.stack([np.einsum("q,nqm->nm", share, halo(by * a, d[..., None], rho)) * steps for a in halos])
+
+    less, own, more = weights(1.0 - NEAR), weights(1.0), weights(1.0 + NEAR)
+    slope, bend = 0.5 * (more - less) / NEAR, (more + less - 2.0 * own) / NEAR**2  # times a, a^2
+    return own, (bend - 2.0 * slope) / np.array(halos)[:, None, None] ** 2
+
+
+def ring_means(sigma: float, halos: Sequence[float], rings: SpotRings) -> tuple[Floats, Floats]:
+    """Each spread's own mean over rings (1 + halos, n) [1/area], and the core's derivative (n,) by ln sigma."""
+    (inner, outer), (d, share) = (rings.inner, rings.outer), rings.gathered
+    areas = np.pi * (outer - inner) * (outer + inner)
+    square = (d / sigma) ** 2
+    core = share * np.exp(-0.5 * square) / (2.0 * np.pi * sigma**2)
+    # (1 + ka) e^{-ka} cos(k sigma), as much blurred to third order, is (1 - a d/da) of e^{-kz} at z = a + i sigma.
+    a, z = np.array(halos)[:, None], (np.array(halos) + 1j * _blur(sigma, halos))[:, None]
+    near, far = (z / np.sqrt(r**2 + z**2) - a * r**2 / (r**2 + z**2) ** 1.5 for r in (inner, outer))
+    return np.concatenate([core.sum(axis=1)[None], (near - far).real / areas]), np.sum(core * (square - 2.0), axis=1)
+
+
+def halo(a: float, d: Floats, rho: Floats) -> Floats:
+    """Mean of h_a over a circle of radius rho about a point at the distance d."""
+    whole, cross = d * d + rho * rho + a * a, 2.0 * d * rho
+    m, less, more = 2.0 * cross / (whole + cross), whole - cross, whole + cross
+    e, k = ellipe(m), ellipk(m)
+    return np.asarray(2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more)), float)
 
 
 @dataclass(frozen=True)
@@ -57,9 +139,8 @@ class Beliefs:
     """Prior knowledge, as values with errors; lengths in the unit of the rings. None: nothing is known.
 
     beam     1/e^2 radius that beam and lens make together; surface and glare shares of light
-    scale    of the counts, per light that falls on the medium
+    scale    of the counts, per light on the medium; halos widths of those that glare is a mixture of
     corner   share of light that a lens loses at `border`, growing as r^2
-    halos    widths of the halos that glare is a mixture of
     """
 
     beam: Known | None = None
@@ -73,8 +154,7 @@ class Beliefs:
     def over(self, sides: tuple[int, int], pixel: float, reach: float) -> Beliefs:
         """Return beliefs for a picture of so many columns and rows, of `pixel` each, with rings out to `reach` [unit].
 
-        Halos reach as far as the rings, since a wider one falls as a narrower one does there. None is narrower than the
-        core, from which rings would not tell it apart.
+        A halo wider than the rings falls as a narrower one there; rings do not tell one from a core wider than it.
         """
         near = NARROWEST if self.beam is None else max(NARROWEST, 0.5 * self.beam.value)
         far = max(WIDEST, reach, 2.0 * near)
@@ -94,9 +174,8 @@ class Card:
 class SpotLight(NamedTuple):
     """Light of the medium's rings as beam and lens spread it, by spread (c of them), for a scale of 1.
 
-    light      (c + 1, n) light of the medium, and last the core's derivative by ln sigma
-    by_medium  (c, n, 2) derivatives of the former by the first two coordinates
-    own        (c, n) light that the surface scatters, and `wider` (n,) the core's derivative by ln sigma
+    light  (c + 1, n) of the medium, last the core's derivative by ln sigma; by_medium (c, n, 2) by coordinates
+    own    (c, n) light that the surface scatters; wider (n,) the core's derivative by ln sigma
     """
 
     light: Floats
@@ -122,7 +201,6 @@ class Shot:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
         halos = tuple(f"glare {a:g}" for a in self.beliefs.halos)
         own = ("alpha", "l", "scale", "core", "surface", *halos, "dark", "corner")
         return own + tuple(f"card {at + 1}" for at in range(len(self.cards)))
@@ -132,16 +210,12 @@ class Shot:
         """Size of the counts: the largest number beside logarithms and shares."""
         return float(np.max(self.medium.value))
 
-    def rows(self, x: Floats) -> tuple[Floats, Floats]:
-        """Light of all rings (n,), and its derivatives (n, p)."""
-        return self._rows(x, self._spread(float(np.exp(x[3])), *self._profile(x)))
-
-    def _rows(self, x: Floats, spread: SpotLight) -> tuple[Floats, Floats]:
-        """Return `rows` for the light of the medium as beam and lens spread it."""
+    def rows(self, x: Floats, spread: SpotLight | None = None) -> tuple[Floats, Floats]:
+        """Light of all rings (n,), and its derivatives (n, p); `spread` is that of the medium's where it is known."""
         halos = len(self.beliefs.halos)
         sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
         scale, share, corner = np.exp(x[2]), np.append(1.0 - glare.sum(), glare), x[6 + halos]
-        light, by_medium, own, wider = spread
+        light, by_medium, own, wider = spread or self._spread(x)
         seen = light[:-1] + surface * own
         value = scale * share @ seen + dark * self.size
         slopes = np.zeros((value.size, x.size))
@@ -175,18 +249,14 @@ class Shot:
     @cached_property
     def radii(self) -> Floats:
         """Radii (m,) at which the medium's profile is needed, whatever the core."""
-        return ring_weights(float(self.medium.outer[0]), self.beliefs.halos, self.medium).rho
+        return ring_weights(float(self.medium.outer[0]), self.beliefs.halos, self.medium)[0]
 
-    def _profile(self, x: Floats) -> tuple[Floats, Floats]:
-        """2 pi rho R_d of the medium (m,), and its derivatives (m, 2) by the first two coordinates."""
-        density, slopes = Model(self.light).density(np.array([x[0], x[1], 0.0]), self.radii)
-        return density[:-1], slopes[:-1, :2]
-
-    def _spread(self, sigma: float, density: Floats, slopes: Floats) -> SpotLight:
-        """Light of the medium's rings from its profile (m,) at `radii` and the profile's derivatives (m, 2)."""
-        _, weights, widening = ring_weights(sigma, self.beliefs.halos, self.medium)
+    def _spread(self, x: Floats) -> SpotLight:
+        density, slopes = (one[:-1] for one in Model(self.light).density(np.array([x[0], x[1], 0.0]), self.radii))
+        core = float(np.exp(x[3])), self.beliefs.halos, self.medium
+        _, weights, widening = ring_weights(*core)
         light = np.concatenate([weights @ density, (widening @ density)[None]])
-        return SpotLight(light, weights @ slopes, *ring_means(sigma, self.beliefs.halos, self.medium))
+        return SpotLight(light, weights @ slopes[:, :2], *ring_means(*core))
 
     @property
     def middle(self) -> Floats:
@@ -225,21 +295,17 @@ class Shot:
     @cached_property
     def whitening(self) -> Floats:
         """Matrix that turns errors of the rows into independent ones of size 1: the inverse of their lower root."""
-        blocks = [self._covariance(one) for one in (self.medium, *(card.rings for card in self.cards))]
+        blocks = []
+        for one in (self.medium, *(card.rings for card in self.cards)):
+            size = UNEVEN * one.value
+            smooth = waves(one.r, WAVE) * np.outer(size, size)
+            blocks.append(one.covariance + smooth + np.diag((1e-4 * one.value) ** 2 + (1e-9 * self.size) ** 2))
         root = np.linalg.cholesky(block_diag(*blocks))
         return np.asarray(solve_triangular(root, np.eye(len(root)), lower=True), float)
 
-    def _covariance(self, one: SpotRings) -> Floats:
-        size = UNEVEN * one.value
-        smooth = waves(one.r, WAVE) * np.outer(size, size)
-        return one.covariance + smooth + np.diag((1e-4 * one.value) ** 2 + (1e-9 * self.size) ** 2)
-
-    def residuals(self, x: Floats) -> tuple[Floats, Floats]:
+    def residuals(self, x: Floats, spread: SpotLight | None = None) -> tuple[Floats, Floats]:
         """Return residuals in standard errors (m,), those of prior knowledge last, and their derivatives (m, p)."""
-        return self._residuals(x, *self.rows(x))
-
-    def _residuals(self, x: Floats, value: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-        """Return `residuals` for the light of all rings (n,) and its derivatives (n, p)."""
+        value, slopes = self.rows(x, spread)
         data = np.concatenate([self.medium.value, *(card.rings.value for card in self.cards)])
         ways, thought = self.knowledge
         rows = self.whitening @ np.column_stack([value - data, slopes])
@@ -275,14 +341,7 @@ class Shot:
         return x
 
     def _scale(self, x: Floats, first: int, rings: SpotRings, light: Floats) -> float:
-        """Logarithm of the scale that fits rings best, by linear least squares.
-
-        Args:
-            x: (p,) coordinates; those of glare count.
-            first: place of the first of the rings among all rows.
-            rings: those of the medium, or of a card.
-            light: (c, n) theirs by spread, of scale 1.
-        """
+        """Return ln of the scale that fits rings best, those from row `first` on; light (c, n) is theirs by spread."""
         glare, rows = x[5 : 5 + len(self.beliefs.halos)], slice(first, first + rings.value.size)
         both = np.column_stack([np.append(1.0 - glare.sum(), glare) @ light, rings.value])
         seen, value = (self.whitening[rows, rows] @ both).T
@@ -291,10 +350,7 @@ class Shot:
 
     @cached_property
     def starts(self) -> list[Floats]:
-        """The best points of a coarse search over albedos and lengths, no two neighbours, the best first.
-
-        At each of them scale, beam, surface, glare and cards are those of a few steps of least squares.
-        """
+        """The best points of a coarse search over albedos and lengths, no two neighbours, the best first."""
         places = np.array([[i, j] for i in range(len(ALBEDOS)) for j in range(LENGTHS)])
         u, ln_l = np.array([u_of(one) for one in ALBEDOS]), np.linspace(*self.lengths, LENGTHS)
         points = np.column_stack([u[places[:, 0]], ln_l[places[:, 1]], np.zeros(len(places))])
@@ -314,7 +370,7 @@ class Shot:
             x[2] = self._scale(x, 0, self.medium, spread.light[:-1] + x[4] * spread.own)
         ends = []
         for _ in range(COARSE + 1):
-            rows, slopes = self._residuals(x, *self._rows(x, spread.widened(x[3] - self._first[3])))
+            rows, slopes = self.residuals(x, spread.widened(x[3] - self._first[3]))
             ends.append((float(rows @ rows), x))
             step = np.zeros(x.size)
             step[2:] = np.linalg.lstsq(slopes[:, 2:], -rows)[0]
@@ -324,10 +380,7 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class PhotoFit:
-    """End of a fit: coordinates (p,) and their covariance (p, p); chi-square, its degrees of freedom, and the verdict.
-
-    rivals  minima beyond the intervals of 95 %, of a chi-square that is higher by RIVAL at most
-    """
+    """End of a fit: coordinates (p,), covariance (p, p); rivals have a chi-square higher by RIVAL at most."""
 
     shot: Shot
     x: Floats
@@ -404,21 +457,14 @@ def _descended(shot: Shot, start: Floats) -> Solution:
 def _ended(shot: Shot, done: Solution) -> PhotoFit:
     """Return a descent's end as a fit, whose verdict says where there is no medium."""
     (u, ln_l), (low, high) = done.parameters[:2], (one[1] for one in shot.bounds)
-    result = done.result
-    if u > BLACK:
-        result = AT_BLACK
-    elif u < WHITE:
-        result = AT_WHITE
-    elif not low + ROOM < ln_l < high - ROOM:
-        result = RAN_AWAY
-    elif not done.converged:
-        result = UNENDED
-    return PhotoFit(
-        shot, done.parameters, done.covariance, done.cost, done.residuals.size - done.parameters.size, result
-    )
+    ran = not low + ROOM < ln_l < high - ROOM
+    ended = CONVERGED if done.converged else UNENDED
+    result = AT_BLACK if u > BLACK else AT_WHITE if u < WHITE else RAN_AWAY if ran else ended
+    freedom = done.residuals.size - done.parameters.size
+    return PhotoFit(shot, done.parameters, done.covariance, done.cost, freedom, result)
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:
-    """Relative errors of mu_s' and mu_a that no unbiased estimate from such rings undercuts."""
+    """Return relative errors of mu_s' and mu_a that no unbiased estimate from such rings undercuts."""
     one = PhotoFit(truth, x, covariance(truth.residuals(x)[1]), 0.0, 1, CONVERGED)
     return {name: one.errors[name] / one.values[name] for name in MEDIUM}

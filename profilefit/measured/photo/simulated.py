@@ -28,6 +28,7 @@ from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.runs.simulation import simulate
 from profilefit.errors import InputError
+from profilefit.measured.instrument import between
 from profilefit.measured.model import exact_light
 
 Floats = NDArray[np.float64]
@@ -115,27 +116,22 @@ class SimulatedExposure:
 def light(
     alpha: float, length: float, setting: Setting, optics: SpotOptics, r: Floats, photons: int = 0, seed: int = 0
 ) -> Floats:
-    """I(r) [1/mm^2] of a medium of reduced albedo and l* [mm], per light that falls on it.
-
-    photons  to trace; 0: light is exact
-    """
+    """Return I(r) [1/mm^2] of a medium of reduced albedo and l* [mm], per light on it; exact, or by traced photons."""
     k, weight = _waves(optics, float(r.max()))
-    medium = traced(alpha, length, setting, k, photons, seed) if photons else transform(alpha, length, setting, k)
+    if photons:
+        medium = _traced(alpha, length, setting, k, photons, seed)
+    else:
+        medium = _transform(alpha, length, setting, k.tobytes())
     return _inverse((medium + optics.surface) * optics.transform(k), k, weight, r)
 
 
 def card(optics: SpotOptics, r: Floats) -> Floats:
-    """I(r) [1/mm^2] of a white card that light does not enter."""
+    """Return I(r) [1/mm^2] of a white card that light does not enter."""
     k, weight = _waves(optics, float(r.max()))
     return _inverse(optics.transform(k), k, weight, r)
 
 
-def transform(alpha: float, length: float, setting: Setting, k: Floats) -> Floats:
-    """Return int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
-    return _transform(alpha, length, setting, k.tobytes())
-
-
-def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
+def _traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
     """Return the Hankel transform of traced rings, taken as constant within a ring."""
     layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
     edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
@@ -146,9 +142,10 @@ def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: in
 
 @lru_cache(maxsize=8)
 def _transform(alpha: float, length: float, setting: Setting, k: bytes) -> Floats:
+    """Return int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
     whole = np.frombuffer(k)
     edges = np.append(np.geomspace(NEAR, 1.0, 30), np.linspace(1.0, FAR, PANELS // 2)[1:]) * length
-    rho, weight = _panels(_turned(np.append(0.0, edges), float(whole.max())))
+    rho, weight = between(_turned(np.append(0.0, edges), float(whole.max())), PANEL)
     with jax.enable_x64(True):
         light = exact_light(setting).ring_density(jnp.asarray(rho / length), jnp.asarray(alpha))
     density = np.asarray(light) / length
@@ -170,7 +167,7 @@ def require_resolved(length: float, optics: SpotOptics, far: float) -> None:
 
 def _waves(optics: SpotOptics, far: float) -> tuple[Floats, Floats]:
     """Return k [1/mm] and their weights, for light out to `far` [mm]."""
-    return _panels(_turned(np.linspace(0.0, CUT / optics.sigma, PANELS + 1), far))
+    return between(_turned(np.linspace(0.0, CUT / optics.sigma, PANELS + 1), far), PANEL)
 
 
 def _turned(edges: Floats, rate: float) -> Floats:
@@ -183,11 +180,6 @@ def _turned(edges: Floats, rate: float) -> Floats:
 def _inverse(transformed: Floats, k: Floats, weight: Floats, r: Floats) -> Floats:
     rows = np.array_split(r, max(1, r.size * k.size >> 22))
     return np.concatenate([j0(np.multiply.outer(row, k)) @ (weight * k * transformed) for row in rows]) / (2.0 * np.pi)
-
-
-def _panels(edges: Floats) -> tuple[Floats, Floats]:
-    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
-    return (middle + half * PANEL[0]).ravel(), (half * PANEL[1]).ravel()
 
 
 def exposures_of(
@@ -212,11 +204,10 @@ def exposures_of(
     sees = (1.0 - camera.corner * corner) * (1.0 + camera.uneven * rng.standard_normal(r.shape, dtype=np.float32))
     sees *= _speckle(camera, rng)
     expected = np.empty(r.shape, np.float32)
-    for row in (0, 1):
-        for column in (0, 1):
-            at = (slice(row, None, 2), slice(column, None, 2))
-            # That of few photons rings about zero where there is none.
-            expected[at] = np.maximum(CubicSpline(*radial[PATTERN[row][column]])(r[at]), 0.0)
+    for row, column in np.ndindex(2, 2):
+        at = (slice(row, None, 2), slice(column, None, 2))
+        # Light of few photons rings about zero where there is none.
+        expected[at] = np.maximum(CubicSpline(*radial[PATTERN[row][column]])(r[at]), 0.0)
     expected *= np.float32(electrons) * sees
     return [
         SimulatedExposure(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)
@@ -226,8 +217,7 @@ def exposures_of(
 
 def radii(farthest: float, optics: SpotOptics) -> Floats:
     """Return radii at which a picture's light is computed, from the axis out to `farthest` [mm]."""
-    near = 0.02 * optics.sigma
-    return np.append(0.0, np.geomspace(near, farthest, RADII))
+    return np.append(0.0, np.geomspace(0.02 * optics.sigma, farthest, RADII))
 
 
 def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32]:

@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.model import exact_light
-from profilefit.measured.photo import bracket, medium, rings
-from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
-from profilefit.measured.photo.exposure import COLOURS, GREY, Exposure, read
+from profilefit.measured.photo import exposure, medium, rings
+from profilefit.measured.photo.exposure import COLOURS, FULL, GREY, Exposure, Picture, Sensor, Times, read
 from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
-from profilefit.measured.photo.pixel_scale import MARKER, PixelScale, pixel_scale
-from profilefit.measured.photo.rings import SpotRings
-from profilefit.measured.photo.spot import Spot, spot
+from profilefit.measured.photo.rings import MARKER, PixelScale, Spot, SpotRings, pixel_scale, spot
 from profilefit.measured.problem import Known
 
 Floats = NDArray[np.float64]
@@ -49,9 +46,8 @@ class Bracket:
     @property
     def seconds(self) -> Known | None:
         """Time of the longest exposure: the mean of what all state, and the error that their scatter says."""
-        offsets = np.array(
-            [np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said]
-        )
+        pairs = zip(self.stated, self.times.value, strict=True)
+        offsets = np.array([np.log(said / time) for said, time in pairs if said])
         if offsets.size == 0:
             return None
         scatter = (WORTH * LATE**2 + np.sum((offsets - offsets.mean()) ** 2)) / (WORTH + offsets.size - 1)
@@ -112,11 +108,7 @@ def photo(
 
 
 def measured(
-    seen: Bracket,
-    shown: Sequence[tuple[Bracket, Known | None]],
-    size: PixelScale,
-    where: Setting,
-    beliefs: Beliefs,
+    seen: Bracket, shown: Sequence[tuple[Bracket, Known | None]], size: PixelScale, where: Setting, beliefs: Beliefs
 ) -> Photo:
     """Fit the medium of each colour of a merged bracket; `shown` are those of cards, with their reflectance."""
     pixel = size.pixel(seen.spot.centre)
@@ -138,16 +130,15 @@ def measured(
         fits[colour] = medium.fitted(shot)
         bounds[colour] = dict(medium.fisher(shot, fits[colour].x))
     if not fits:
-        raise InputError(
-            f"{seen.sources[0]}: expected a spot brighter than the scatter of its pixels, got none in any colour"
-        )
+        expected = "a spot brighter than the scatter of its pixels"
+        raise InputError(f"{seen.sources[0]}: expected {expected}, got none in any colour")
     if any(known and not (seen.seconds and one.seconds) for one, known in shown):
         notes.append("no exposure time is stated, so the grey card tells beam and glare, and no scale")
     return Photo(seen, tuple(one for one, _ in shown), size, where, fits, bounds, tuple(notes))
 
 
 def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]:
-    """Exposures of one camera, `like` another of it."""
+    """Read exposures of one camera, `like` another of it."""
     _require_count(paths)
     exposures: list[Exposure] = []
     for path in paths:
@@ -179,49 +170,40 @@ def _level(paths: Sequence[Path], like: Exposure) -> Floats:
     if not paths:
         return np.zeros(len(like.planes))
     _require_count(paths)
-    means = []
-    for path in paths:  # one at a time: they are as large as photographs
-        (frame,) = _read([path], like)
-        means.append([float(plane.counts.mean(dtype=float)) for plane in frame.planes])
+    frames = (_read([path], like)[0] for path in paths)  # one at a time: they are as large as photographs
+    means = [[float(plane.counts.mean(dtype=float)) for plane in frame.planes] for frame in frames]
     return np.asarray(np.mean(means, axis=0), float)
 
 
 def _darkened(one: Exposure, level: Floats) -> Exposure:
     if not np.any(level):
         return one
-    planes = (
-        replace(plane, counts=plane.counts - np.float32(dark), range=plane.range - dark)
-        for plane, dark in zip(one.planes, level.tolist(), strict=True)
-    )
+    pairs = zip(one.planes, level.tolist(), strict=True)
+    planes = [replace(each, counts=each.counts - np.float32(dark), range=each.range - dark) for each, dark in pairs]
     return replace(one, planes=tuple(planes))
 
 
 def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
-    """Exposures merged, with the spot of their brightest colour."""
-    times = bracket.times(shots)
-    own = bracket.sensor(shots, times.value)
-    pictures = bracket.merged(shots, times.value, own)
-    names = [one.colour for one in shots[0].planes]
-    brightest = max(dict.fromkeys(names), key=lambda name: sum(
-        float(np.nansum(one.light)) for one, each in zip(pictures, names, strict=True) if each == name))  # fmt: skip
-    lit = [one for one, name in zip(pictures, names, strict=True) if name == brightest]
+    """Merge exposures, and find the spot of their brightest colour."""
+    times = exposure.times(shots)
+    own = exposure.sensor(shots, times.value)
+    planes = tuple(zip([one.colour for one in shots[0].planes], exposure.merged(shots, times.value, own), strict=True))
+    each = {colour: [one for name, one in planes if name == colour] for colour, _ in planes}
+    lit = max(each.values(), key=lambda pictures: sum(float(np.nansum(one.light)) for one in pictures))
     return Bracket(
         tuple(one.source for one in shots), times, tuple(one.seconds for one in shots),
-        FULL * np.array([max(plane.range for plane in one.planes) for one in shots]), own,
-        tuple(zip(names, pictures, strict=True)), spot(lit, shots[0].sides, size, shots[0].source), shots[0].sides,
+        FULL * np.array([max(plane.range for plane in one.planes) for one in shots]), own, planes,
+        spot(lit, shots[0].sides, size, shots[0].source), shots[0].sides,
     )  # fmt: skip
 
 
 def ringed(scene: Bracket, colour: str, size: PixelScale) -> SpotRings:
-    """Rings of a colour, in counts a second of the longest exposure, where it states its time.
-
-    What the times of the bracket leave open is an error that rings of one exposure share.
-    """
+    """Return rings of a colour, in counts a second of the longest exposure, where it states its time."""
     pictures, pixel = scene.pictures(colour), size.pixel(scene.spot.centre)
     edges = rings.edges_of(scene.spot.reach * pixel, pictures[0].step * pixel)
     seen = rings.rings(pictures, scene.spot.centre, edges, size)
-    share = seen.value[:, None] * bracket.shares(seen.value, scene.times.value, scene.sensor, scene.most)
-    covariance = seen.covariance + share @ scene.times.covariance @ share.T
+    share = seen.value[:, None] * exposure.shares(seen.value, scene.times.value, scene.sensor, scene.most)
+    covariance = seen.covariance + share @ scene.times.covariance @ share.T  # rings of an exposure share its time's
     seconds = 1.0 if scene.seconds is None else scene.seconds.value
     return replace(seen, value=seen.value / seconds, covariance=covariance / seconds**2)
 

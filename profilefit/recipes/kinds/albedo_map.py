@@ -9,10 +9,9 @@ from mcml_sim import Orders
 from profilefit.fitting.quality import albedo_quality
 from profilefit.recipes import pipelines
 from profilefit.recipes.catalogue import find_map as find
-from profilefit.recipes.pipelines import Pipeline, described_fit, judged, places, printed_laws, read
+from profilefit.recipes.pipelines import Pipeline, curves, described_fit, judged, places, printed_laws, read
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.run import RecipeRun, RecordContent
-from profilefit.recipes.summary import curves
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 

@@ -27,8 +27,8 @@ from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TAB
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
+from profilefit.recipes.stack.fit import Tracing
 from profilefit.recipes.stack.gaussians import SumLight, constant_names, errors, quality
-from profilefit.recipes.stack.photons import Tracing
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 PIPELINE = "gaussians"
@@ -72,13 +72,7 @@ ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 @dataclass(frozen=True)
 class SumRecord:
-    """Record of the sums of a stack.
-
-    Attributes:
-        stack: layers of the stack.
-        content: everything that the record says.
-        path: path of the record's file.
-    """
+    """Record of the sums of a stack: its layers, all that it says, and its file."""
 
     stack: LayerStack
     content: Mapping[str, Any]
@@ -86,14 +80,11 @@ class SumRecord:
 
     def laws(self, illumination: str, count: int = DEFAULT) -> tuple[MediumGaussians, ...]:
         """Return the sums of red, green and blue, as `gaussians.shared_gaussians` fits them."""
-        of_light, units = self.content["sums"][illumination], [one.layers[0].similar.mfp for one in self.stack.media]
         variances, *weights = _values(self.content, illumination, count)
-        scaled = (tuple((variances / unit**2).tolist()) for unit in units)
+        whole = self.content["sums"][illumination]["reflectance"]
         return tuple(
-            MediumGaussians(stacks.setting_of(medium, illumination), whole, own, tuple(weight.tolist()))
-            for medium, whole, own, weight in zip(
-                self.stack.media, of_light["reflectance"], scaled, weights, strict=True
-            )
+            gaussians.medium_sum(medium, illumination, one, variances, own)
+            for medium, one, own in zip(self.stack.media, whole, weights, strict=True)
         )
 
     def lights(self, illumination: str) -> tuple[SumLight, ...]:

@@ -13,31 +13,29 @@ from profilefit.errors import RecipeError
 from profilefit.fitting import staged
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes import catalogue, pipelines, starts
+from profilefit.recipes import catalogue, pipelines
 from profilefit.recipes.catalogue import find_law as find
-from profilefit.recipes.paper.protocol import ExactTruth, TallyTruth, Truth
-from profilefit.recipes.paper.reproduction import readings
-from profilefit.recipes.paper.table1 import printed_halves, table1
 from profilefit.recipes.pipelines import (
     QUALITY_ALBEDOS,
     Pipeline,
     by_index,
+    curves,
     described_fit,
     description,
+    errors_by_name,
     fit_from,
     inversion_error,
     judged,
     printed_laws,
     read,
 )
-from profilefit.recipes.recipe import Recipe, RingLayout
+from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.record import Records
+from profilefit.recipes.reproduction import printed_halves, readings, table1
 from profilefit.recipes.run import RecipeRun, RecordContent
-from profilefit.recipes.summary import curves, errors_by_name
-from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
+from profilefit.recipes.targets import albedo_values, starting_law, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
-EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 
 
 def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
@@ -72,7 +70,7 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
     rings = recipe.rings
     if rings is None:
         raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
-    start = starts.starting_law(recipe, run.out)
+    start = starting_law(recipe, run.out)
     truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
     points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
     profiles, unit = truths[1.0], points[1.0]
@@ -105,12 +103,8 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
 
 
 def _evidence(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
-    if recipe.truth == "orders" and light is not None:
-        truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
-    else:
-        truth = ExactTruth()
     laws = _compared_laws(run)
-    found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
+    found = {"readings": readings(), "table1": table1(laws), "halves": printed_halves()}
     return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
-from profilefit.recipes.phases.data import PhaseData, read_phase
-from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
+from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
 from profilefit.recipes.run import LAWS, RecipeRun, Work
 from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS, Fields
 
@@ -182,7 +181,7 @@ def described(data: PhaseData) -> dict[str, Any]:
         "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
         "integral": data.integral,
         "unit": data.unit,
-        "spans": [asdict(span) for span in data.spans],
+        "spans": data.spans,
         "mean_cosine": data.mean_cosine,
         "backscattered": data.backscattered,
         "second": float(data.table.moment(2)),

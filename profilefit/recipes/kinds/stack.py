@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +22,17 @@ from mcml_sim import Medium, Setting, exact
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
-from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
-from profilefit.recipes import catalogue, record, schema
+from profilefit.recipes import record, schema
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Table, Text, words
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
-from profilefit.recipes.stack.photons import USUAL, TracedRings, Tracing
+from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
 
 Floats = NDArray[np.float64]
 PIPELINE = "stack"
@@ -46,14 +46,17 @@ TRACED_NOTE = (
     "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
     "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
 )
-# What shader sources and pictures take from a record besides its laws, by dotted key.
+# What shader sources and pictures take from a record besides its laws, by dotted key; what a report shows, too.
+QUALITY: Fields = {
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
+    "quality.regenerated.delta_A": NUMBER,
+}
 USED: Fields = {
     **dict.fromkeys(("unit", "equations", "note"), TEXT),
     "layers": LIST,
     "half_spaces": TABLE,
     **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     "data_digest": DIGEST,
 }
 # Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
@@ -77,8 +80,7 @@ SHOWN: Fields = {
     **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
     **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
     **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
+    **QUALITY,
     **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
     **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
 }
@@ -155,15 +157,7 @@ class StackRequest(Layered):
 
 @dataclass(frozen=True)
 class StackRecord:
-    """Record of a stack.
-
-    Attributes:
-        name: name of the record.
-        stack: layers of the stack.
-        laws: laws of red, green and blue.
-        content: everything that the record says.
-        digest: SHA-256 of the record's file.
-    """
+    """Record of a stack: its layers, laws of red, green and blue, all that it says, and SHA-256 of its file."""
 
     name: str
     stack: LayerStack
@@ -174,19 +168,6 @@ class StackRecord:
     @property
     def setting(self) -> Setting:
         return self.laws[0].setting
-
-
-class StackQuality(NamedTuple):
-    """Errors of a law at one thickness.
-
-    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
-    delta_A  relative error of A [-]
-    """
-
-    rel: float
-    noise: float
-    ks: float
-    delta_A: float
 
 
 def find(name: str, folder: Path) -> StackRecord | None:
@@ -240,8 +221,8 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
         ]
     else:
         measured = [_of_exact(interface, float(at)) for at in d]
-    kept = {name: [getattr(each, name) for each in measured] for name in ("rel", "ks", "delta_A")}
-    return {"thickness": d.tolist(), **kept}
+    rel, _, ks, delta_a = (list(values) for values in zip(*measured, strict=True))
+    return {"thickness": d.tolist(), "rel": rel, "ks": ks, "delta_A": delta_a}
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -346,8 +327,11 @@ def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, st
     }
 
 
-def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
-    """Measure a law by traced light; rel is of rings from a tenth of the first layer's mean free path."""
+def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> tuple[float, float, float, float]:
+    """Measure a law by traced light: rel, the noise that was taken off it in quadrature, ks, relative error of A [-].
+
+    rel is of rings from a tenth of the first layer's mean free path.
+    """
     within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
     counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
     rel = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
@@ -355,12 +339,10 @@ def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQualit
     noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
     light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
     ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
-    return StackQuality(
-        float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
-    )
+    return float(np.sqrt(max(rel**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
 
 
-def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
+def _of_exact(interface: stacks.Interface, thickness: float) -> tuple[float, float, float, float]:
     law, medium = interface.law, interface.medium
     light = exact.solve(medium.with_first(thickness), law.setting.illumination, stacks.NODES)
     r = stacks.radii(medium)
@@ -368,7 +350,7 @@ def _of_exact(interface: stacks.Interface, thickness: float) -> StackQuality:
     near = r[share <= stacks.LAST_SHARE]
     relative = np.asarray(law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
     ks = float(np.max(np.abs(np.asarray(law.cdf(r, thickness)) - share)))
-    return StackQuality(float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1)
+    return float(np.mean(np.abs(relative))), 0.0, ks, float(law.total(thickness)) / light.reflectance - 1
 
 
 def _channel(illumination: str, medium: Medium, starts: Sequence[Floats], tracing: Tracing) -> dict[str, Any]:
@@ -448,22 +430,19 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
     if len(recorded) != len(medium.layers):
         raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
     if any(layer.g > 0 for layer in medium.layers):
-        own = [replace(setting, g=layer.g) for layer in medium.layers]
-        similar = [layer.similar for layer in medium.layers]
-        laws = [
-            ForwardHalfSpace(each, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
-            for each, values in zip(own, recorded, strict=True)
-        ]
-        return [
-            LayerLaw(each, law, layer.alpha, layer.mfp) for each, law, layer in zip(own, laws, similar, strict=True)
-        ]
-    hazard = catalogue.load("hazard", setting=setting)
-    today = hazard.constants()
+        tops = []
+        for layer, values in zip(medium.layers, recorded, strict=True):
+            own, similar = replace(setting, g=layer.g), layer.similar
+            law = ForwardHalfSpace(own, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
+            tops.append(LayerLaw(own, law, similar.alpha, similar.mfp))
+        return tops
+    tops = stacks.isotropic_tops(medium, setting)
+    today = tops[0].law.constants()
     for constants in recorded:
         same = constants.keys() == today.keys()
         if not (same and np.allclose([constants[name] for name in today], list(today.values()), rtol=EQUAL)):
             raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
-    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+    return tops
 
 
 def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequence[LayerLaw]) -> StackLaw:

@@ -19,8 +19,8 @@ from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes.schema import ERRORS
-from profilefit.recipes.stack import fit, photons
-from profilefit.recipes.stack.photons import USUAL, Tracing
+from profilefit.recipes.stack import fit
+from profilefit.recipes.stack.fit import USUAL, Tracing
 
 Floats = NDArray[np.float64]
 NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
@@ -80,8 +80,8 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES,
     first = medium.layers[0]
     unit = first.similar.mfp
     if any(layer.g > 0 for layer in medium.layers):
-        edges = photons.ring_edges(first, medium.layers)
-        rings = tracing.rings(medium, illumination, edges, photons.STACK_PHOTONS, OFFSET)
+        edges = fit.ring_edges(first, medium.layers)
+        rings = tracing.rings(medium, illumination, edges, fit.STACK_PHOTONS, OFFSET)
         counts = rings.weight > 0
         first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
         inside = slice(first_ring, last_ring + 1)
@@ -104,15 +104,6 @@ def lights_of(
     return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].similar.mfp) for medium in media)
 
 
-def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
-    """Fit the sum of 1 to 8 Gaussians nearest, relatively, to the light of a stack, over rings even in ln r.
-
-    A is the stack's own. InputError as of `stack_law`, and on another count.
-    """
-    (found,) = shared_gaussians((medium,), illumination, count)
-    return found
-
-
 def shared_gaussians(
     media: Sequence[Medium], illumination: str = "searchlight", count: int = 6
 ) -> tuple[MediumGaussians, ...]:
@@ -125,16 +116,14 @@ def shared_gaussians(
     require_illumination(illumination)
     lights = lights_of(media, illumination)
     found = joint(lights, count)
-    units = [medium.layers[0].similar.mfp for medium in media]
-    return tuple(
-        MediumGaussians(
-            fit.setting_of(medium, illumination),
-            light.whole,
-            tuple((found.variances / unit**2).tolist()),
-            tuple(weight),
-        )
-        for medium, light, unit, weight in zip(media, lights, units, found.weights.tolist(), strict=True)
-    )
+    each = zip(media, lights, found.weights, strict=True)
+    return tuple(medium_sum(one, illumination, light.whole, found.variances, own) for one, light, own in each)
+
+
+def medium_sum(medium: Medium, illumination: str, whole: float, variances: Floats, weights: Floats) -> MediumGaussians:
+    """Return the sum of variances (N,) [length^2] and weights (N,) [-], in the medium's own mean free paths."""
+    scaled = tuple((variances / medium.layers[0].similar.mfp ** 2).tolist())
+    return MediumGaussians(fit.setting_of(medium, illumination), whole, scaled, tuple(weights.tolist()))
 
 
 def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:

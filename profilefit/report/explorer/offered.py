@@ -13,6 +13,7 @@ from profilefit.shader.law_file import export
 PREFIX = "law"  # of the names in each text: one law runs at a time
 FIRST = ("hazard-diffuse", "hazard")  # what is shown at the start, if it is there
 ORDER = ("hazard", "quantile", "burley", "burley_diffuse_mfp", "liang", "gaussians", "better_dipole", "dipole")
+RANK = {name: place for place, name in enumerate(ORDER)}
 STEP, STEPS = 0.02, 30
 INDICES = tuple(round(1.0 + STEP * (k + 1), 2) for k in range(STEPS))  # n of a surface that refracts
 WORDS = r"([\s;]+)"  # between two words of a text; the same in laws.js
@@ -32,15 +33,9 @@ class Refracting:
 
 @dataclass(frozen=True)
 class Offered:
-    """Law that the explorer offers under one illumination.
+    """Law under one illumination: its name in addresses, its own, the illumination, its name for readers.
 
-    Attributes:
-        id: name in addresses.
-        name: name of the law.
-        light: illumination that the law's constants belong to.
-        label: name for readers.
-        text: shader source in GLSL ES at n = 1.
-        refracting: shader source at other indices, where the law has constants for them.
+    text, refracting  shader source in GLSL ES at n = 1, and at other indices where the law has constants for them
     """
 
     id: str
@@ -54,11 +49,11 @@ class Offered:
 def offered(folder: Folder) -> list[Offered]:
     """Return every law of a matched surface that has a text, the best first; records are those in `folder`."""
     records, laws = Records.of(folder), []
-    for named in sorted(profile_laws(records), key=_place):
+    for named in sorted(profile_laws(records), key=lambda one: RANK.get(one.name.partition(":")[0], len(RANK))):
         if named.law.entry.has_text:
-            text = _text(named, records)
-            light = named.setting.illumination
-            laws.append(Offered(address(named), named.name, light, _label(named), text, _refracting(named, records)))
+            text, refracting = export(named, records, "glsl-es", PREFIX), _refracting(named, records)
+            label, light = _label(named), named.setting.illumination
+            laws.append(Offered(address(named), named.name, light, label, text, refracting))
     return laws
 
 
@@ -73,10 +68,6 @@ def address(named: LoadedLaw) -> str:
     return re.sub(r"[^\w.]+", "-", named.label)
 
 
-def _text(named: LoadedLaw, records: Records) -> str:
-    return export(named, records, "glsl-es", PREFIX)
-
-
 def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
     """Return the text of the record of the same law and light that holds for every index, if the folder has one."""
     of = profile_laws(records, matched=False) if named.records else []
@@ -84,15 +75,10 @@ def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
     label = next((one.label for one in same if one.setting.n != named.setting.n), None)
     if label is None:
         return None
-    texts = [_text(catalogue.find(label, records, n=n), records) for n in INDICES]
+    texts = [export(catalogue.find(label, records, n=n), records, "glsl-es", PREFIX) for n in INDICES]
     pieces = [re.split(WORDS, text) for text in texts]
     places = [at for at, words in enumerate(zip(*pieces, strict=True)) if len(set(words)) > 1]
     return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])
-
-
-def _place(named: LoadedLaw) -> int:
-    kind = named.name.partition(":")[0]
-    return ORDER.index(kind) if kind in ORDER else len(ORDER)
 
 
 def _label(named: LoadedLaw) -> str:

@@ -51,7 +51,6 @@ RC: Any = MappingProxyType(  # read only
 )
 FORMATS: ContextVar[tuple[str, ...]] = ContextVar("FORMATS", default=("png", "svg"))
 BAND = "95 % of posterior draws, the misfit taken for noise"
-TRUTH_BAND = "95 % of photon noise and model discrepancy together"
 # How each set of constants looks in every figure.
 PUBLISHED: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": (0, (5, 2))})
 CORRECTED: Mapping[str, Any] = MappingProxyType({"color": ORANGE, "linestyle": (0, (4, 1.5, 1, 1.5))})

@@ -1,20 +1,22 @@
-"""Figures of a fit of one's own data: the profile with its residuals, and the posterior of what was fitted."""
+"""Figures of one's own data: the fit of a profile and its posterior, a photographed spot and the fit of its rings."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from profilefit.measured.model import unit_of
+from profilefit.measured.photo.workflow import Photo
 from profilefit.measured.result import MediumPosterior
 from profilefit.report.figures.canvas import (
     BLACK,
     BLUE,
     DATA,
+    GREEN,
     GREY,
     VERMILION,
     WHOLE,
@@ -23,7 +25,7 @@ from profilefit.report.figures.canvas import (
     save,
     styled,
 )
-from profilefit.report.figures.corner_figure import corner_grid, mark
+from profilefit.report.figures.record_figures import corner_grid, mark
 
 BINS = 24
 ENDS = 1.15  # how far axes go beyond the data
@@ -68,16 +70,29 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
 @styled
 def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner") -> list[Path]:
     """Draw the posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
-    names = shown(result)
-    if not names:
+    if result.walk is None or not result.moving:
         return []
+    free = result.fit.spec.free  # no two that say the same, where one coordinate alone was free
+    names = [name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving]
+    names = names if len(free) != 1 else [("alpha", "l", "scale")[free[0]]]
     samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)
     figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
     grid = corner_grid(figure, samples, BINS)
     for row in range(size):
         for column in range(row + 1):
-            _dressed(grid[row, column], row, column)
+            ax = grid[row, column]  # few numbers, none with an offset that the reader must add
+            ax.grid(False)
+            for axis in (ax.xaxis, ax.yaxis)[: 1 + (column < row)]:
+                axis.set_major_locator(MaxNLocator(3, prune="both"))
+                axis.set_major_formatter(ScalarFormatter(useOffset=False))
+            for text in ax.get_xticklabels():
+                text.set_rotation(45)
+            ax.tick_params(labelsize=7, length=2, pad=2)
+            if 0 < column != row:
+                ax.set_yticklabels([])
+            if row < size - 1:
+                ax.set_xticklabels([])
     for at, one in enumerate(names):
         if (best := result.value(one)) is not None:
             mark(grid, at, best, color=BLACK)
@@ -93,27 +108,55 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
     return save(figure, out, name)
 
 
-def shown(result: MediumPosterior) -> tuple[str, ...]:
-    """Return the quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
-    if result.walk is None:
-        return ()
-    free = result.fit.spec.free
-    if len(free) == 1:
-        return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
-    return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)
+COLOURS = {"red": VERMILION, "green": GREEN, "blue": BLUE, "grey": GREY}
+SPOT, RINGS = "photo-spot", "photo-rings"  # their files
+DECADES = 5  # of light that a picture shows
+SHOWN = 800  # pixels of a picture's longer side
+EVERY = 4  # rings of which one is drawn
 
 
-def _dressed(ax: Axes, row: int, column: int) -> None:
-    """Write few numbers, none with an offset that the reader must add."""
-    ax.grid(False)
-    axes: list[Any] = [ax.xaxis] if row == column else [ax.xaxis, ax.yaxis]
-    for axis in axes:
-        axis.set_major_locator(MaxNLocator(3, prune="both"))
-        axis.set_major_formatter(ScalarFormatter(useOffset=False))
-    for text in ax.get_xticklabels():
-        text.set_rotation(45)
-    ax.tick_params(labelsize=7, length=2, pad=2)
-    if column > 0 and row != column:
-        ax.set_yticklabels([])
-    if row < ax.get_subplotspec().get_gridspec().nrows - 1:  # type: ignore[union-attr]
-        ax.set_xticklabels([])
+@styled
+def spot_figure(photo: Photo, out: Path, name: str = SPOT) -> list[Path]:
+    """Draw the merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
+    figure = canvas(5.4)
+    axes = figure.subplots()
+    colour = "green" if "green" in photo.fits else next(iter(photo.fits))
+    (picture, *_), centre = photo.shot.pictures(colour), photo.shot.spot.centre
+    stride = max(1, max(picture.light.shape) // SHOWN)
+    light = picture.light[::stride, ::stride]
+    most = float(np.nanmax(light))
+    shown = np.log10(np.clip(np.where(np.isfinite(light), light, np.nan) / most, 10.0**-DECADES, 1.0))
+    columns, rows = photo.shot.sides
+    shades = matplotlib.colormaps["magma"].with_extremes(bad=VERMILION)
+    image = axes.imshow(shown, cmap=shades, extent=(0, columns, rows, 0), vmin=-DECADES, vmax=0.0)
+    pixel = photo.plate.pixel(centre)
+    for edge in photo.fits[colour].shot.medium.outer[::EVERY]:
+        axes.add_patch(Circle(centre, edge / pixel, fill=False, color="white", linewidth=0.4, alpha=0.7))
+    axes.plot(*centre, marker="+", color="white", markersize=8, linestyle="none")
+    axes.set(xlabel="column [pixel]", ylabel="row [pixel]")
+    axes.grid(visible=False)
+    figure.colorbar(image, ax=axes, label=f"light, {colour}, decades below the brightest")
+    return save(figure, out, name)
+
+
+@styled
+def rings_figure(photo: Photo, out: Path, name: str = RINGS) -> list[Path]:
+    """Draw light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
+    figure = canvas(5.6)
+    top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    for colour, fit in photo.fits.items():
+        rings, shade = fit.shot.medium, COLOURS[colour]
+        light, rows = (one[0][: rings.value.size] for one in (fit.shot.rows(fit.x), fit.shot.residuals(fit.x)))
+        error = np.sqrt(np.diag(rings.covariance))
+        seen = rings.value > 0
+        top.errorbar(
+            rings.r[seen], rings.value[seen], yerr=error[seen], label=f"{colour}: rings", **{**DATA, "color": shade}
+        )
+        top.plot(rings.r, light, label=f"{colour}: fit", **{**WHOLE, "color": shade})
+        below.plot(rings.r, rows, marker="o", markersize=2.6, linewidth=0.6, color=shade)
+    unit = "counts" if photo.shot.seconds is None else "counts a second"
+    top.set(xscale="log", yscale="log", ylabel=f"light [{unit}]")
+    below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
+    below.set(xlabel="r [mm]", ylabel="residual, whitened [σ]")
+    legend_below(figure, [top, below])
+    return save(figure, out, name)

@@ -1,27 +1,68 @@
-"""Every figure that the records of a folder allow."""
+"""Every figure that the records of a folder allow: residuals, quality by albedo, posteriors, sums of Gaussians."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
+import corner
+import jax
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
+from numpy.typing import NDArray
+
+from mcml_sim import exact
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.fitting.measures import MEASURES
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.gaussians import DEFAULT
+from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS
+from profilefit.recipes.kinds import gaussians
+from profilefit.recipes.recipe import Albedos
+from profilefit.recipes.targets import albedo_values
 from profilefit.recipes.workers import Workers
-from profilefit.report.figures.albedo_figure import albedo_figure
-from profilefit.report.figures.coefficient_figures import a_figure, b_figure, c_figure, constants_figure, has_printed
-from profilefit.report.figures.corner_figure import corner_figure
-from profilefit.report.figures.inverse_figure import inverse_figure, inversion_figure
-from profilefit.report.figures.profile_figures import error_figure, profile_figure
-from profilefit.report.figures.quality_figure import quality_figure, record_quality_figure
-from profilefit.report.figures.residual_figure import residual_figure
-from profilefit.report.figures.sum_figure import NAME as OF_SUMS
-from profilefit.report.figures.sum_figure import sum_figure
-from profilefit.report.records import Source, converged, measures
+from profilefit.report.figures.canvas import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    albedo_axis,
+    canvas,
+    legend_below,
+    plain_log,
+    save,
+    styled,
+)
+from profilefit.report.figures.paper_figures import (
+    albedo_figure,
+    coefficient_figure,
+    constants_figure,
+    error_figure,
+    has_printed,
+    inverse_figure,
+    inversion_figure,
+    profile_figure,
+)
+from profilefit.report.kinds import published
+from profilefit.report.records import SETS, Content, Fitted, Source, converged, measures
+from profilefit.report.tables.cells import significant
 
-Draw = Callable[..., list[Path]]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,11 +75,8 @@ class Plan:
     name: str
     needs: tuple[str, ...]
     uses: tuple[str, ...]
-    draw: Draw
+    draw: Callable[..., list[Path]]
     missing: str = ""
-
-    def concerns(self, names: Sequence[str] | None) -> bool:
-        return names is None or not set(names).isdisjoint(self.needs + self.uses)
 
 
 Track = Callable[[list[Plan]], Iterable[Plan]]
@@ -47,9 +85,9 @@ PAPER = (
     Plan("liang-7-profile", ("liang-as-published",), ("liang-whole",), profile_figure),
     Plan("liang-7-error", ("liang-whole",), ("liang-as-published",), error_figure),
     Plan("liang-8-albedo", ("albedo-liang",), ("albedo-rational",), albedo_figure),
-    Plan("liang-11-a", ("liang-as-published",), ("liang-whole",), a_figure),
-    Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), b_figure),
-    Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), c_figure),
+    Plan("liang-11-a", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "a")),
+    Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "b")),
+    Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "c")),
     Plan("liang-19-inverse", ("liang-inverse-whole",), ("liang-inverse-as-published", "liang-whole"), inverse_figure),
     Plan(
         "inversion-error",
@@ -74,7 +112,9 @@ def draw_all(
     source = Source(folder)
     possible: list[Plan] = []
     left_out: list[str] = []
-    for plan in (plan for plan in plans(source) if plan.concerns(names or None)):
+    for plan in plans(source):
+        if names and set(names).isdisjoint(plan.needs + plan.uses):
+            continue
         absent = [name for name in plan.needs if name not in source.paths]
         reason = f"{folder} has no record {', '.join(absent)}" if absent else plan.missing
         if reason:
@@ -118,6 +158,364 @@ def record_plans(source: Source, name: str) -> tuple[Plan, ...]:
     chained = "misfit" in content["posterior"] and "covariance" in content
     chainless = "" if chained else f"no posterior: {content['fit']['result']}"
     residuals = Plan(f"residuals-{name}", (name,), (), partial(residual_figure, name), failed)
-    quality = Plan(f"quality-{name}", (name,), (), partial(record_quality_figure, name), failed)
-    corner = Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), chainless)
-    return (residuals, *([quality] if measures(content, "rel") else []), corner)
+    quality = Plan(f"quality-{name}", (name,), (), partial(quality_figure, names=[name]), failed)
+    posterior = Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), chainless)
+    return (residuals, *([quality] if measures(content, "rel") else []), posterior)
+
+
+ALBEDOS = 6  # of a record's albedos, in order
+WITHIN = 0.995  # of the energy, as in quality.ENERGY_WITHIN: beyond it no measure looks
+MOST_RINGS = 60  # drawn: the paper's 400 even rings would hide each other
+SHARES = np.linspace(0.0, 0.999, 400)
+SHADES = "viridis"  # from dark to light with alpha
+HEIGHT = 3.2  # [inch]
+
+
+@styled
+def residual_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+    """Draw a profile law's energy of a ring over that of the data, less 1 [-], with the data's standard errors.
+
+    Of an inverse cdf: exact cdf(r(xi)) - xi [-]. Of a map: alpha or A, whichever was fitted, less that of the data [-].
+    """
+    fitted = source.needed(record_name)
+    figure = canvas(HEIGHT)
+    ax = figure.subplots()
+    if fitted.content["pipeline"] == "albedo":
+        _of_map(ax, fitted)
+    else:
+        is_inverse = fitted.content["pipeline"] == "inverse"
+        alphas = fitted.arrays["alpha"]
+        rows = np.unique(np.linspace(0, alphas.size - 1, ALBEDOS).round().astype(int))
+        colours = matplotlib.colormaps[SHADES](np.linspace(0.05, 0.9, rows.size))
+        for row, colour in zip(rows, colours, strict=True):
+            alpha = float(alphas[row])
+            if is_inverse:
+                radii = fitted.law.sampler.sample(SHARES, alpha)
+                left = np.asarray(exact.cdf(radii, alpha, setting=fitted.law.setting)) - SHARES
+                ax.plot(SHARES, left, color=colour, label=f"α = {alpha:.3f}")
+            else:
+                _of_profile(ax, fitted, alpha, colour, int(row))
+        if is_inverse:
+            ax.set(xlabel="ξ [-]", ylabel="exact cdf(r(ξ)) − ξ [-]", xlim=(0.0, 1.0))
+        else:
+            ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    return save(figure, out, name or f"residuals-{record_name}")
+
+
+def _of_map(ax: Axes, fitted: Fitted) -> None:
+    """Draw alpha at the data's A, or A at the data's alpha, of the fitted map, less that of the data."""
+    alpha = albedo_values(Albedos(**fitted.content["protocol"]["albedos"]), fitted.law.setting)
+    law = fitted.law.in_reduced()  # as the data's albedos are
+    reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
+    if fitted.content["protocol"]["weighting"]["objective"] == "albedo":
+        left, error = np.asarray(law.alpha(reflectance)) - alpha, error * np.gradient(alpha, reflectance)
+        what = "α"
+    else:
+        left, what = np.asarray(law.reflectance(alpha)) - reflectance, "A"
+    ax.errorbar(alpha, left, error, color=BLUE, marker="o", markersize=2.6, linewidth=0.8, elinewidth=0.8)
+    albedo_axis(ax)
+    ax.set_ylabel(f"{what} of the map less {what} of the data [-]")
+
+
+def _of_profile(ax: Axes, fitted: Fitted, alpha: float, colour: Floats, row: int) -> None:
+    edges, energy = fitted.arrays["r_edges"], fitted.arrays["energy"][row]
+    error = np.nan_to_num(fitted.arrays["energy_error"][row])
+    last = np.searchsorted(np.cumsum(energy), WITHIN * np.sum(energy))
+    index = np.flatnonzero((energy > 0) & (np.arange(energy.size) <= last))
+    index = index[np.unique(np.geomspace(1, index.size, MOST_RINGS).astype(int) - 1)]
+    inner, outer = edges[:-1][index], edges[1:][index]
+    middle = np.sqrt(np.maximum(inner, 0.25 * outer) * outer)
+    (model,) = np.diff(energy_within(fitted.law, np.stack([inner, outer]), alpha), axis=0)
+    left, spread = model / energy[index] - 1.0, error[index] / energy[index]
+    ax.errorbar(middle, left, spread, color=colour, linewidth=1.0, elinewidth=0.7, label=f"α = {alpha:.3f}")
+
+
+def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
+    """Return what the fit compared, within each edge (..., n) [-]."""
+    short = -edges.shape[-1] % MOST_RINGS  # so that one compilation serves all albedos
+    full = np.pad(edges, [(0, 0)] * (edges.ndim - 1) + [(0, short)], mode="edge")
+    with jax.enable_x64(True):
+        return np.asarray(_energy_within(law, full, np.float64(alpha)))[..., : edges.shape[-1]]
+
+
+@jax.jit
+def _energy_within(law: ProfileLaw, edges: jax.Array, alpha: jax.Array) -> jax.Array:
+    return law.unscaled_energy(edges, alpha)
+
+
+SHOWN = (MEASURES["rel"], MEASURES["ks"])
+KINDS = {
+    "searchlight": "pencil beam, n = 1",
+    "diffuse": "diffuse light, n = 1",
+    "refracting": "refracting surfaces, n = 1.4",
+}
+# Lines of one panel in turn, by colour and marker: never by colour alone. Printed constants are dashed.
+COLOURS, MARKERS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY), "osv^Dx+<"
+ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, of what is above [inch]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One set of constants: its label, where it was measured, the measures by name; whether it has a g."""
+
+    label: str
+    alpha: list[float]
+    values: Content
+    printed: bool
+    forward: bool
+
+
+@styled
+def quality_figure(source: Source, out: Path, name: str = "quality", names: Iterable[str] | None = None) -> list[Path]:
+    """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
+
+    A row of panels for each light, one for all surfaces that refract. `names` are the records, all of them if None.
+    """
+    contents = {one: source.content(one) for one in names or source.paths if measures(source.content(one), "rel")}
+    groups: dict[str, list[tuple[str, Content]]] = {kind: [] for kind in KINDS}
+    for one, content in contents.items():
+        light, n, g = (content["setting"][key] for key in ("illumination", "n", "g"))
+        groups[light if (n, g) == (1, 0) else "refracting"].append((one, content))
+    shown = {kind: list(_lines(group)) for kind, group in groups.items() if group}
+    figure = canvas(HEAD + ROW * len(shown) + FEET)
+    grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
+    for row, (kind, lines) in zip(grid, shown.items(), strict=True):
+        for ax, one in zip(row, SHOWN, strict=True):
+            _panel(ax, one.name, lines)
+        row[0].set_ylabel(KINDS[kind])
+        if lines:  # none where every fit failed
+            row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
+    for ax, one in zip(grid[0], SHOWN, strict=True):
+        ax.set_title(f"{one.formula} [{one.unit}]".replace("R_d", "R$_d$"))
+    for ax in grid[:-1].flat:
+        ax.set_xlabel("")
+    return save(figure, out, name)
+
+
+def _panel(ax: Axes, key: str, lines: list[Line]) -> None:
+    for place, line in enumerate(lines):
+        look: dict[str, Any] = {
+            "color": COLOURS[place % len(COLOURS)],
+            "marker": MARKERS[place % len(MARKERS)],
+            "linestyle": "--" if line.printed else "-",
+        }
+        ax.plot(line.alpha, line.values[key], label=line.label, markersize=3.0, **look)
+    albedo_axis(ax)
+    if any(line.forward for line in lines):
+        ax.set_xlabel("single-scattering albedo α [-], reduced if g ≠ 0")
+    ax.tick_params(axis="x", labelsize=7.0)
+    ax.set_yscale("log")
+    plain_log(ax.yaxis)
+
+
+def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
+    """Yield each set once: printed constants are the same in every record of their law."""
+    drawn: set[str] = set()
+    for name, content in contents:
+        quality = content["quality"]
+        for which in (one for one in SETS if one in quality):
+            regenerated = which == "regenerated"
+            g = content["setting"]["g"]
+            label = (name if regenerated else f"{content['law']}, {which}") + (f", g = {g:g}" if g else "")
+            if label not in drawn and (converged(content) or not regenerated):
+                drawn.add(label)
+                yield Line(label, quality["alpha"], quality[which], not regenerated, bool(g))
+
+
+MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon noise"}
+# Probability inside one and two standard deviations of a normal pair of constants: 1 - exp(-k^2 / 2).
+LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
+BINS = 20
+LABEL_DISTANCE = 0.5  # of an axis name from its panel [inch]
+MOST, KEPT = 18, 12  # constants of which a figure shows all: the panels of more are too small, so it shows so many
+LARGE = 5  # constants beyond which the numbers on the axes must be few
+
+
+@styled
+def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
+    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
+
+    kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
+    """
+    fitted = source.needed(record_name)
+    samples = fitted.arrays[f"samples_{kind}"].astype(float)
+    names, held_back = fitted.content["covariance"]["names"], ""
+    if len(names) > MOST:
+        correlation = np.abs(np.corrcoef(samples, rowvar=False))
+        np.fill_diagonal(correlation, 0.0)
+        kept = sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:KEPT].tolist())
+        held_back = f"the {KEPT} of {len(names)} constants that\nare most correlated with another one"
+        samples, names = samples[:, kept], [names[place] for place in kept]
+    constants = [fitted.content["constants"][name] for name in names]
+    figure = canvas(8.0, layout="none")
+    grid = corner_grid(figure, samples, BINS, max_n_ticks=2 if len(names) > LARGE else 4)
+    figure.subplots_adjust(left=0.09, right=0.97, bottom=0.09, top=0.965, wspace=0.06, hspace=0.06)
+    looks = {"regenerated": (BLACK, "-"), "published": (VERMILION, "--")}
+    for column, constant in enumerate(constants):
+        for which, (color, style) in looks.items():  # where they lie in the panel
+            value = constant.get(which)
+            if value is not None and samples[:, column].min() <= value <= samples[:, column].max():
+                mark(grid, column, value, color=color, linestyle=style)
+    _axes(grid, names)
+    title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
+    _caption(figure, samples, names, constants, title)
+    return save(figure, out, name or f"corner-{record_name}")
+
+
+def corner_grid(figure: Figure, samples: Floats, bins: int, **more: Any) -> NDArray[Any]:
+    """Draw samples (draws, n) in pairs and alone, and return the panels (n, n)."""
+    corner.corner(
+        samples, fig=figure, bins=bins, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
+        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
+        contour_kwargs={"linewidths": 0.6}, **more,
+    )  # fmt: skip
+    return np.array(figure.axes).reshape(samples.shape[1], -1)
+
+
+def mark(grid: NDArray[Any], place: int, value: float, **look: Any) -> None:
+    """Draw lines at a value of one constant in all panels that show it."""
+    for row in range(place, len(grid)):
+        grid[row, place].axvline(value, linewidth=0.8, **look)
+    for column in range(place):
+        grid[place, column].axhline(value, linewidth=0.8, **look)
+
+
+def _axes(grid: NDArray[Any], names: list[str]) -> None:
+    """Write names on the outside and few numbers, none with an offset that the reader must add."""
+    size = len(names)
+    small = size > LARGE
+    for row in range(size):
+        for column in range(row + 1):
+            ax: Axes = grid[row, column]
+            ax.grid(False)
+            ax.tick_params(labelsize=6 if small else 8, length=2, pad=2)
+            for axis in (ax.xaxis, ax.yaxis)[: 1 + (column < row)]:
+                axis.set_major_locator(MaxNLocator(2 if small else 3, prune="both"))
+        grid[row, row].set_title(names[row], pad=3)
+    beyond = LABEL_DISTANCE * grid[0, 0].figure.dpi / grid[0, 0].get_window_extent().width
+    for place, name in enumerate(names):
+        _outer(grid[size - 1, place].xaxis, name, 90)
+        grid[size - 1, place].xaxis.set_label_coords(0.5, -beyond)
+        if place:
+            _outer(grid[place, 0].yaxis, name, 0)
+            grid[place, 0].yaxis.set_label_coords(-beyond, 0.5)
+
+
+def _outer(axis: Any, label: str, rotation: float) -> None:
+    axis.set_major_formatter(ScalarFormatter(useOffset=False))
+    axis.get_major_formatter().set_scientific(False)
+    axis.set_label_text(label)
+    for text in axis.get_ticklabels():
+        text.set_rotation(rotation)
+
+
+def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any], title: str) -> None:
+    """Write what is seen, and what is not, into the empty upper right."""
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    printed = [constant.get("published") for constant in constants]
+    outside = [
+        f"{name} = {value:g}".replace(" ", "\N{NO-BREAK SPACE}")
+        for name, value, least, most in zip(names, printed, low, high, strict=True)
+        if value is not None and not least <= value <= most
+    ]
+    handles = [
+        Line2D([], [], color=BLACK, linewidth=0.8, label="regenerated"),
+        Patch(color=BLUE, alpha=0.6, label="39 % and 86 % of the draws: one and two σ"),
+    ]
+    if any(value is not None for value in printed):
+        label = "as printed" + ("" if not outside else "; outside its panel:\n" + fill(", ".join(outside), 40))
+        handles.append(Line2D([], [], color=VERMILION, linestyle="--", linewidth=0.8, label=label))
+    wider = [(c.get("jackknife_error") or 0.0) / s for c, s in zip(constants, samples.std(axis=0, ddof=1), strict=True)]
+    if max(wider) > 1.0:
+        note = f"the jackknife errors are up to {significant(max(wider))} times this wide"
+        handles.append(Line2D([], [], linestyle="none", label=note))
+    figure.legend(handles=handles, loc="upper right", bbox_to_anchor=(0.98, 0.975), title=title, alignment="left")
+
+
+# Error of sums of Gaussians over their number, of every stack that a folder has records of.
+
+OF_SUMS = "gaussians-of-stacks"
+LOOKS = {"red": (VERMILION, "o"), "green": (GREEN, "s"), "blue": (BLUE, "^")}  # never by colour alone
+LONGEST = 3  # panels of a row
+STACK_ROW, STACK_FEET = 2.5, 0.7  # height of a row, and of what is below [inch]
+STROKES = {"searchlight": (0, (1, 1.5)), "diffuse": "-"}
+
+
+def sums_of(folder: Path) -> dict[str, gaussians.SumRecord]:
+    """Return the records of sums that lie in a folder of records, by the names of their stacks."""
+    return {name: gaussians.load(path) for name, path in record.available(folder / SUMS).items()}
+
+
+@styled
+def sum_figure(source: Source, out: Path, name: str = OF_SUMS) -> list[Path]:
+    """Draw rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
+    sums = sums_of(source.folder)
+    columns = min(len(sums), LONGEST)
+    rows = -(-len(sums) // columns)
+    figure = canvas(STACK_ROW * rows + STACK_FEET)
+    panels = list(figure.subplots(rows, columns, sharey=True, squeeze=False).flat)
+    for ax in panels[len(sums) :]:
+        ax.remove()
+    for ax, (stack, one) in zip(panels, sums.items(), strict=False):
+        _draw_sums(ax, one)
+        ax.set_title(stack)
+    for ax in panels[0::columns]:
+        ax.set_ylabel("mean relative error of R$_d$ [-]")
+    legend_below(figure, panels[: len(sums)])
+    return save(figure, out, name)
+
+
+def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
+    """Return what the figure shows, and what six Gaussians cost by these records."""
+    of_six = {
+        (key, stack, light, channel): value
+        for stack, one in sums.items()
+        for light in ILLUMINATIONS
+        for key in ("rel", "alone")
+        for channel, value in zip(CHANNELS, one.content["sums"][light]["by_count"][DEFAULT - 1][key], strict=True)
+    }
+    rel, alone = ({place[1:]: v for place, v in of_six.items() if place[0] == key} for key in ("rel", "alone"))
+    worst = max(rel, key=rel.__getitem__)
+    text = (
+        "Sums of Gaussians of one set of variances in all colours: mean relative error of R_d, in rings even in ln r "
+        "from 0.01 mean free paths to 99.5 % of the light. "
+        f"Six are off by {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
+        f"{worst[2]}, {worst[1]}), by at most {_percent(max(alone.values()))} where each colour has its own variances."
+    )
+    for one in sums.values():
+        if others := published(one).get(one.content["setting"]["illumination"]):
+            own = one.content["sums"][one.content["setting"]["illumination"]]["by_count"][DEFAULT - 1]
+            off = ", ".join(_percent(each["rel"]) for each in others)
+            text += (
+                f" The six that d'Eon and Luebke published for a skin (GPU Gems 3, ch. 14) are off this one's light by "
+                f"{off} in red, green and blue; their cdf by at most {max(each['ks'] for each in others):.2g}, that of "
+                f"the six here by {max(own['ks']):.2g}."
+            )
+    return text
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def _draw_sums(ax: Axes, sums: gaussians.SumRecord) -> None:
+    others = published(sums)
+    for place, (channel, (color, marker)) in enumerate(LOOKS.items()):
+        style: dict[str, Any] = {"color": color, "marker": marker, "markersize": 3.5}
+        for light, line in STROKES.items():
+            rel = [each["rel"][place] for each in sums.content["sums"][light]["by_count"]]
+            ax.plot(gaussians.COUNTS, rel, linestyle=line, label=channel if line == "-" else None, **style)
+            if others:
+                of_six = others[light][place]["rel"]
+                ax.plot(DEFAULT, of_six, color=color, linestyle="none", marker=marker, markersize=6, fillstyle="none")
+    ax.plot([], [], color=GREY, linestyle=STROKES["diffuse"], label="diffuse light")
+    ax.plot([], [], color=GREY, linestyle=STROKES["searchlight"], label="searchlight")
+    if others:
+        ax.plot([], [], color=GREY, linestyle="none", marker="o", markersize=6, fillstyle="none", label="published")
+    ax.set_yscale("log")
+    plain_log(ax.yaxis)
+    ax.set_xticks(list(gaussians.COUNTS))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xlabel("number of Gaussians [-]")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,8 +15,15 @@ from scipy import ndimage
 
 from profilefit.report.figures.canvas import BLACK, ORANGE, PURPLE, VERMILION, WIDTH, YELLOW, canvas, save, styled
 from profilefit.report.tables.stability_tables import SIGNS
-from profilefit.studies.stability.cells import Cells, Verdict
-from profilefit.studies.stability.layout import ARITHMETICS, DTYPES, LENGTHS, QUANTITIES, ArgumentAxis
+from profilefit.studies.stability.cells import (
+    ARITHMETICS,
+    DTYPES,
+    LENGTHS,
+    QUANTITIES,
+    ArgumentAxis,
+    Cells,
+    Verdict,
+)
 
 # Red classes differ in lightness and carry a sign, as does what is not judged; the others are pale.
 COLOURS = {
@@ -35,11 +42,7 @@ ROWS = (
     *("liang, published", "liang-whole", "burley, published", "burley_diffuse_mfp, published", "dipole"),
     *("better_dipole", "beam_diffusion", "gaussians-6", "hazard", "quantile"),
 )
-TICKS = {
-    "α": (0.0, 0.1, 0.5, 0.9, 1.0),
-    "r/l": (0.0, 0.01, 1.0, 100.0, np.inf),
-    "ξ": (0.0, 0.01, 0.5, 0.99),
-}
+TICKS = {"α": (0.0, 0.1, 0.5, 0.9, 1.0), "r/l": (0.0, 0.01, 1.0, 100.0, np.inf), "ξ": (0.0, 0.01, 0.5, 0.99)}
 TITLES = dict(zip(QUANTITIES, ("profile R$_d$", "cdf", "radius drawn", "density of radii"), strict=True))
 USUAL = (1e-3, 1e3)  # l of a panel: the worst over those
 ROW_HEIGHT, MARGIN = 0.95, 1.25  # inch
@@ -51,7 +54,8 @@ def stability_figures(cells: Iterable[Cells], out: Path) -> list[Path]:
     tensors = list(cells)
     files: list[Path] = []
     for arithmetic in ARITHMETICS:
-        panels = {(one.subject, one.quantity): one for one in tensors if _is_drawn(one, arithmetic)}
+        of = (one for one in tensors if one.arithmetic == arithmetic and one.quantity in QUANTITIES)
+        panels = {(one.subject, one.quantity): one for one in of if len(one.axes) > 1 and one.axes[0].name == "α"}
         if panels:
             files += stability_figure(panels, arithmetic, out, f"stability-{arithmetic.replace(' ', '-')}")
     return files
@@ -60,7 +64,9 @@ def stability_figures(cells: Iterable[Cells], out: Path) -> list[Path]:
 @styled
 def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, out: Path, name: str) -> list[Path]:
     """Draw the class of every cell, the worst over all lengths that a law accepts: laws down, quantities across."""
-    subjects = _rows([subject for subject, _ in panels])
+    subjects = list(dict.fromkeys(subject for subject, _ in panels))
+    if len(subjects) > len(ROWS):
+        subjects = [one for one in ROWS if one in subjects]
     figure = canvas(MARGIN + ROW_HEIGHT * len(subjects), WIDTH)
     quantities = [one for one in QUANTITIES if any(quantity == one for _, quantity in panels)]
     grid = figure.subplots(len(subjects), len(quantities), squeeze=False)
@@ -70,7 +76,10 @@ def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, o
         row[0].set_ylabel(subject.replace(", ", "\n").replace("_mfp", "\n_mfp"), rotation=0, ha="right", va="center")
     for ax, quantity in zip(grid[0], quantities, strict=True):
         ax.set_title(TITLES[quantity])
-    _share_labels(grid)
+    for ax in grid[:-1].flat:  # numbers only at the left and below
+        ax.tick_params(labelbottom=False)
+    for ax in grid[:, 1:].flat:
+        ax.tick_params(labelleft=False)
     seen = {code for one in panels.values() for code in np.unique(_worst(one))}
     handles = [
         Patch(facecolor=COLOURS[one], edgecolor=BLACK, linewidth=0.4, label=f"{SIGNS.get(one, '')} {one.words}".strip())
@@ -82,25 +91,13 @@ def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, o
     return save(figure, out, name)
 
 
-def _is_drawn(cells: Cells, arithmetic: str) -> bool:
-    names = [axis.name for axis in cells.axes]
-    return cells.arithmetic == arithmetic and cells.quantity in QUANTITIES and len(names) > 1 and names[0] == "α"
-
-
-def _rows(subjects: Sequence[str]) -> list[str]:
-    """Return the subjects among `ROWS`, or all where few were requested."""
-    distinct = list(dict.fromkeys(subjects))
-    return distinct if len(distinct) <= len(ROWS) else [one for one in ROWS if one in distinct]
-
-
 def _worst(cells: Cells) -> NDArray[np.int8]:
     """Return the worst class over usual lengths, (alphas, radii or shares)."""
     if len(cells.axes) == 2:
         return cells.codes
     lengths, (low, high) = cells.axes[2].values, LENGTHS[DTYPES[cells.arithmetic]]
     usual = (lengths >= max(low, USUAL[0])) & (lengths <= min(high, USUAL[1]))
-    worst: NDArray[np.int8] = np.max(cells.codes[..., usual], axis=2)
-    return worst
+    return cast(NDArray[np.int8], np.max(cells.codes[..., usual], axis=2))
 
 
 def _draw(ax: Axes, cells: Cells | None) -> None:
@@ -142,12 +139,3 @@ def _ticks(put: Any, axis: ArgumentAxis) -> None:
             continue
         places.setdefault(index, "∞" if np.isinf(value) else f"{value:g}".removeprefix("0") or "0")
     put(list(places), list(places.values()))
-
-
-def _share_labels(grid: NDArray[Any]) -> None:
-    """Leave numbers only at the left and below."""
-    for row in grid[:-1]:
-        for ax in row:
-            ax.tick_params(labelbottom=False)
-    for ax in grid[:, 1:].flat:
-        ax.tick_params(labelleft=False)

@@ -27,6 +27,7 @@ from profilefit.report.figures.canvas import (
     GREEN,
     GREY,
     ORANGE,
+    POINTS,
     PURPLE,
     SKY,
     VERMILION,
@@ -35,17 +36,7 @@ from profilefit.report.figures.canvas import (
     save,
     styled,
 )
-from profilefit.studies.tradeoff.points import (
-    BEATEN,
-    FRONT,
-    TIED,
-    Panel,
-    Point,
-    TradeoffPart,
-    WithSpread,
-    front,
-    standings,
-)
+from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Panel, Point, TradeoffPart, front, standings
 
 STEP = 4.5  # from a point to the nearest place of its label [pt]
 # Where a label may stand about its point, in such steps, the nearest places first.
@@ -76,7 +67,17 @@ def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], 
     occupied = [*occupied, *(box_of(axes, [(one.x, one.y)], size / 2) for one in labels)]
     crowdings = []
     for one in labels:
-        note = _note(axes, one, size)
+        note = axes.annotate(
+            one.text,
+            (one.x, one.y),
+            PLACES[0],
+            textcoords="offset points",
+            fontsize=size,
+            annotation_clip=False,
+            zorder=5,
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
+            arrowprops={"arrowstyle": "-", "color": "0.6", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 2.0},
+        )
         boxes = [_placed(note, place, renderer) for place in PLACES]
         costs = [_crowding(box, occupied, inside) for box in boxes]
         far = [DISTANCE * (STEP * np.hypot(*place)) ** 2 for place in PLACES]
@@ -88,8 +89,8 @@ def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], 
 
 def box_of(axes: Axes, points: Sequence[tuple[float, float]], around: float = 0.0) -> Bbox:
     """Return the box in pixels of places in data coordinates, `around` points wider on all sides."""
-    places = axes.transData.transform(np.asarray(points, float))
-    margin = around * _pixels(axes)
+    places, figure = axes.transData.transform(np.asarray(points, float)), axes.figure
+    margin = around * (figure.dpi if isinstance(figure, Figure) else figure.figure.dpi) / POINTS
     (x0, y0), (x1, y1) = places.min(axis=0) - margin, places.max(axis=0) + margin
     return Bbox.from_extents(x0, y0, x1, y1)
 
@@ -97,26 +98,6 @@ def box_of(axes: Axes, points: Sequence[tuple[float, float]], around: float = 0.
 def renderer_of(axes: Axes) -> RendererBase:
     """Return the renderer that measures text on this figure's canvas."""
     return axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
-
-
-def _pixels(axes: Axes) -> float:
-    """Return the pixels of a point, 1/72 inch."""
-    figure = axes.figure
-    return (figure.dpi if isinstance(figure, Figure) else figure.figure.dpi) / 72.0
-
-
-def _note(axes: Axes, label: Label, size: float) -> Annotation:
-    return axes.annotate(
-        label.text,
-        (label.x, label.y),
-        PLACES[0],
-        textcoords="offset points",
-        fontsize=size,
-        annotation_clip=False,
-        zorder=5,
-        bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
-        arrowprops={"arrowstyle": "-", "color": "0.6", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 2.0},
-    )
 
 
 def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase) -> Bbox:
@@ -165,11 +146,22 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     all_axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, part.panels, strict=True):
         draw(axes, panel, colours_of(part.points))
-    _feet(figure, part, caption)
+    used = {standing for panel in part.panels for standing in standings(panel.points)}
+    joined = any(panel.joined for panel in part.panels)
+    handles = [_handle(standing, GREY if joined else _colour(standing)) for standing in MARKS if standing in used]
+    spread = "thin: up to the worst; thick: middle 68 % of repeats"
+    handles.append(Line2D([], [], color=GREY, marker="_", lw=0.7, label=spread))
+    title = fill(caption, CAPTION_WIDTH)
+    legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, title=title, title_fontsize=SMALL)
+    legend.get_title().set_color(GREY)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, panel in zip(all_axes, part.panels, strict=True):
-        _label(axes, panel)
+        occupied = list(_occupied(axes, panel))
+        first = {point.method: point for point in reversed(panel.points)}
+        texts = [text_of(point, first[point.method] is point) for point in panel.points]
+        labels = [Label(text, *xy) for text, *xy in zip(texts, *_xy(panel.points), strict=True)]
+        place_labels(axes, labels, occupied)
     return save(figure, out, f"tradeoff-{part.name}")
 
 
@@ -177,8 +169,9 @@ def draw(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
     """Draw a panel; `colours` of its methods, the same in all of a part's panels."""
     axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
     axes.set_title(panel.title)
-    for points in _lines(panel):
-        axes.plot(*_xy(points), color=colours[points[0].method], lw=0.9, alpha=0.6, zorder=1)
+    for method in colours_of(panel.points) if panel.joined else ():
+        points = [point for point in panel.points if point.method == method]
+        axes.plot(*_xy(points), color=colours[method], lw=0.9, alpha=0.6, zorder=1)
     for point, standing in zip(panel.points, standings(panel.points), strict=True):
         _mark(axes, point, standing, colours[point.method] if panel.joined else _colour(standing))
     best = [panel.points[i] for i in front(panel.points)]
@@ -195,24 +188,11 @@ def _mark(axes: Axes, point: Point, standing: str, colour: str) -> None:
     style: dict[str, Any] = {"color": colour, **MARKS[standing]}
     if standing == FRONT:
         style |= {"mec": VERMILION, "mew": 1.3}
-    axes.errorbar(x.value, y.value, _spread(y), _spread(x), elinewidth=1.6, capsize=2.0, ls="none", **style)
+    of_x, of_y = ([[one.value - one.low], [one.high - one.value]] for one in (x, y))
+    axes.errorbar(x.value, y.value, of_y, of_x, elinewidth=1.6, capsize=2.0, ls="none", **style)
     if point.worst is not None:
         axes.plot([x.value] * 2, [y.value, point.worst.value], color=colour, lw=0.7, zorder=2)
         axes.plot(x.value, point.worst.value, "_", color=colour, ms=6.0, mew=0.9, zorder=2)
-
-
-def _spread(measured: WithSpread) -> list[list[float]]:
-    return [[measured.value - measured.low], [measured.high - measured.value]]
-
-
-def _label(axes: Axes, panel: Panel) -> None:
-    occupied = [box for point in panel.points for box in _boxes(axes, point)] + list(_steps(axes, panel))
-    named: set[str] = set()
-    labels = []
-    for point in panel.points:
-        labels.append(Label(text_of(point, point.method not in named), point.cost.value, point.error.value))
-        named.add(point.method)
-    place_labels(axes, labels, occupied)
 
 
 def text_of(point: Point, first: bool) -> str:
@@ -222,35 +202,17 @@ def text_of(point: Point, first: bool) -> str:
     return f"{method}: {effort}" if first and effort else effort or method
 
 
-def _boxes(axes: Axes, point: Point) -> list[Bbox]:
-    """Return the boxes of a point's bars, which no label should hide."""
-    x, y = point.cost, point.error
-    top = y.high if point.worst is None else point.worst.value
-    return [
-        box_of(axes, [(x.low, y.value), (x.high, y.value)], 1.5),
-        box_of(axes, [(x.value, y.low), (x.value, top)], 2.0),
-    ]
-
-
-def _steps(axes: Axes, panel: Panel) -> Iterator[Bbox]:
-    """Yield boxes along the line of the front."""
+def _occupied(axes: Axes, panel: Panel) -> Iterator[Bbox]:
+    """Yield the boxes of points' bars and along the line of the front, which no label should hide."""
+    for point in panel.points:
+        cost, error = point.cost, point.error
+        top = error.high if point.worst is None else point.worst.value
+        yield box_of(axes, [(cost.low, error.value), (cost.high, error.value)], 1.5)
+        yield box_of(axes, [(cost.value, error.low), (cost.value, top)], 2.0)
     best = [panel.points[i] for i in front(panel.points)]
-    for one, other in pairwise(best):
-        (x, y), (next_x, next_y) = (one.cost.value, one.error.value), (other.cost.value, other.error.value)
+    for (x, y), (next_x, next_y) in pairwise(zip(*_xy(best), strict=True)):
         yield box_of(axes, [(x, y), (next_x, y)], 0.7)
         yield box_of(axes, [(next_x, y), (next_x, next_y)], 0.7)
-
-
-def _feet(figure: Figure, part: TradeoffPart, caption: str) -> None:
-    """Write what the marks mean, and on which machine."""
-    used = {standing for panel in part.panels for standing in standings(panel.points)}
-    joined = any(panel.joined for panel in part.panels)
-    handles = [_handle(standing, GREY if joined else _colour(standing)) for standing in MARKS if standing in used]
-    spread = "thin: up to the worst; thick: middle 68 % of repeats"
-    handles.append(Line2D([], [], color=GREY, marker="_", lw=0.7, label=spread))
-    title = fill(caption, CAPTION_WIDTH)
-    legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, title=title, title_fontsize=SMALL)
-    legend.get_title().set_color(GREY)
 
 
 def _handle(standing: str, colour: str) -> Line2D:
@@ -261,19 +223,9 @@ def _handle(standing: str, colour: str) -> Line2D:
     return handle
 
 
-def _lines(panel: Panel) -> list[list[Point]]:
-    if not panel.joined:
-        return []
-    return [[p for p in panel.points if p.method == method] for method in _methods(panel.points)]
-
-
-def _methods(points: Sequence[Point]) -> list[str]:
-    return list(dict.fromkeys(point.method for point in points))
-
-
 def colours_of(points: Sequence[Point]) -> dict[str, str]:
     """Return a colour by method, the same in all panels of a part."""
-    return {method: LINES[i % len(LINES)] for i, method in enumerate(_methods(points))}
+    return {method: LINES[i % len(LINES)] for i, method in enumerate(dict.fromkeys(point.method for point in points))}
 
 
 def _colour(standing: str) -> str:

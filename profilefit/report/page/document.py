@@ -14,11 +14,21 @@ from mcml_sim.files.whole_file import require_writable, write_whole
 from profilefit.recipes import record
 from profilefit.report.drawing import classed
 from profilefit.report.explorer import explorer_section
-from profilefit.report.page import fits
-from profilefit.report.page.fits import provenance
-from profilefit.report.page.markup import element, section
-from profilefit.report.page.sections import EvidenceFolder, failures, layers, promises, shader, speed
+from profilefit.report.page.markup import element, markup, section
+from profilefit.report.page.sections import (
+    EvidenceFolder,
+    failures,
+    layers,
+    paper_figures,
+    promises,
+    provenance,
+    record_part,
+    shader,
+    speed,
+    whole_figure,
+)
 from profilefit.report.records import Source
+from profilefit.report.tables.record_tables import summary
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
@@ -99,31 +109,22 @@ def write_page(
         record.read(file, whole=True)
     measured = {key: measures.section(name, parts) for key, (name, parts) in MEASURED.items()}
     measured["claims"] = "\n".join(promises(measures))
-    makers = _makers(source, measures, path.name) | {key: partial(str, text) for key, text in measured.items()}
-    made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
-    write_whole(path, _document(made, len(source.paths)))
-
-
-def _makers(source: Source, measures: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
-    """Return the makers of the parts by name; each record is a part of its own, since they take longest."""
-    return {
-        "fits": lambda: fits.overview(source),
+    makers: dict[str, Callable[[], str]] = {
+        "fits": lambda: markup(summary({name: source.content(name) for name in source.paths})),
         "explorer": lambda: explorer_section(source.folder),
-        "constants": lambda: fits.whole_figure(source, "constants"),
-        "quality": lambda: fits.whole_figure(source, "quality"),
-        "paper": lambda: "\n".join(fits.paper_figures(source)),
+        "constants": lambda: whole_figure(source, "constants"),
+        "quality": lambda: whole_figure(source, "quality"),
+        "paper": lambda: paper_figures(source),
         "stacks": lambda: "\n".join(layers(source, measures)),
-        **{f"{RECORD}{name}": partial(fits.record_part, source, name) for name in source.paths},
-        "provenance": lambda: "\n".join(provenance(source, page)),
+        **{f"{RECORD}{name}": partial(record_part, source, name) for name in source.paths},  # these take longest
+        "provenance": lambda: "\n".join(provenance(source, path.name)),
+        **{key: partial(str, text) for key, text in measured.items()},
     }
-
-
-def _document(made: Mapping[str, str], count: int) -> str:
-    records = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
-    inside = {**made, "records": records}
-    parts = {key: (title, inside[key]) for key, title in PARTS.items() if inside[key]}
-    summary = f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}. {CONVENTIONS}"
-    return document(TITLE, LEAD, summary, parts)
+    made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
+    made["records"] = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
+    parts = {key: (title, made[key]) for key, title in PARTS.items() if made[key]}
+    count = f"{len(source.paths)} record{'s' if len(source.paths) != 1 else ''}"
+    write_whole(path, document(TITLE, LEAD, f"{count}, profilefit {__version__}. {CONVENTIONS}", parts))
 
 
 def document(title: str, lead: str, summary: str, parts: Mapping[str, tuple[str, str]]) -> str:

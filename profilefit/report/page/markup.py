@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 
 from rich.console import Console, Group, RenderableType
@@ -76,21 +76,13 @@ def _table(table: Table) -> str:
     return title + element("div", element("table", f"{head}\n{body}"), class_="wide", tabindex="0") + caption
 
 
-def _row(columns: Iterable[Column], cells: Iterable[RenderableType], tag: str) -> str:
-    filled = zip(columns, cells, strict=True)
-    return element("tr", "".join(element(tag, _cell(cell), **_side(column)) for column, cell in filled))
-
-
-def _side(column: Column) -> dict[str, str]:
-    if column.justify == "right":
-        return {"class_": "number"}
-    return {} if column.no_wrap else {"class_": "text"}
-
-
-def _cell(cell: RenderableType) -> str:
-    if isinstance(cell, str | Text):
-        return _letters(cell if isinstance(cell, Text) else Text(cell), Style.null())
-    return markup(cell)
+def _row(columns: Sequence[Column], cells: Iterable[RenderableType], tag: str) -> str:
+    filled = []
+    for column, cell in zip(columns, cells, strict=True):
+        side = {"class_": "number"} if column.justify == "right" else {} if column.no_wrap else {"class_": "text"}
+        text = Text(cell) if isinstance(cell, str) else cell
+        filled.append(element(tag, _letters(text, Style.null()) if isinstance(text, Text) else markup(text), **side))
+    return element("tr", "".join(filled))
 
 
 def _letters(text: Text, around: Style) -> str:

@@ -15,10 +15,10 @@ from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.folder import fits_folder
 from profilefit.report.drawing import inline
-from profilefit.report.figures.photo_figures import RINGS, SPOT
+from profilefit.report.figures.fit_figures import RINGS, SPOT
 from profilefit.report.page.document import document
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
-from profilefit.report.tables.photo_tables import photo_lines, photo_tables
+from profilefit.report.tables.fit_tables import photo_lines, photo_tables
 from profilefit.shader.law_file import export_medium
 
 MOST_DRAWING = 2**24  # bytes
@@ -59,11 +59,15 @@ def medium_text(photo: Photo, law: LoadedLaw) -> str:
 
 def photo_page(photo: Photo, folder: Path, text: str) -> str:
     """Return the page as HTML that needs no other file; `folder` holds the drawings, text is that of the shader."""
+    at = f"--n {photo.setting.n:g} --g {photo.setting.g:g}"
+    exports = f"profilefit export hazard-diffuse {at} --lang hlsl", f"profilefit export hazard {at}"
+    head, shown = f"medium.glsl, {len(text.splitlines())} lines", element("code", escape(text))
+    shown = element("pre", shown, tabindex="0")
     parts = {
         "medium": ("The medium", "\n".join([*map(markup, photo_tables(photo)), *map(paragraph, photo_lines(photo))])),
         "spot": ("The spot", _drawing(folder, SPOT, on_paper=True)),
         "fit": ("The fit", _drawing(folder, RINGS)),
-        "shader": ("For a shader", _shader(photo, text)),
+        "shader": ("For a shader", paragraph(SHADER) + command("\n".join(exports)) + details(head, shown)),
     }
     shots = len(photo.shot.sources)
     summary = f"{shots} exposure{'s' if shots != 1 else ''} from {photo.shot.sources[0]} on, profilefit {__version__}."
@@ -73,10 +77,3 @@ def photo_page(photo: Photo, folder: Path, text: str) -> str:
 def _drawing(folder: Path, name: str, on_paper: bool = False) -> str:
     svg = read_whole(folder / f"{name}.svg", MOST_DRAWING).decode("utf-8")
     return figure(inline(svg, name, DRAWN[name]), DRAWN[name], on_paper)
-
-
-def _shader(photo: Photo, text: str) -> str:
-    at = f"--n {photo.setting.n:g} --g {photo.setting.g:g}"
-    lines = command(f"profilefit export hazard-diffuse {at} --lang hlsl\nprofilefit export hazard {at}")
-    shown = element("pre", element("code", escape(text)), tabindex="0")
-    return paragraph(SHADER) + lines + details(f"medium.glsl, {len(text.splitlines())} lines", shown)

@@ -1,32 +1,140 @@
-"""Measurements of the laws as sections of the page: shader check, cost, failures."""
+"""Sections of the page: records with what makes them again, and measurements of the laws as the commands wrote them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+import shlex
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.recipes.evidence import stale
+from profilefit.recipes.evidence import digest, stale
+from profilefit.recipes.record import record_setting
+from profilefit.recipes.run import preset_photons
 from profilefit.report.drawing import address, checked, inline
-from profilefit.report.figures.sum_figure import NAME as OF_SUMS
-from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
-from profilefit.report.page.fits import drawing
+from profilefit.report.figures.canvas import only
+from profilefit.report.figures.record_figures import (
+    OF_SUMS,
+    PAPER,
+    Plan,
+    plans,
+    record_plans,
+    sum_caption,
+    sum_figure,
+    sums_of,
+)
+from profilefit.report.kinds import stack_table, sum_tables
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
-from profilefit.report.records import Source
+from profilefit.report.records import Content, Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
-from profilefit.report.tables.stack_table import stack_table
-from profilefit.report.tables.sum_table import sum_tables
+from profilefit.report.tables.record_tables import photons_text, record_tables
 from profilefit.report.tables.tradeoff_tables import with_spread
 from profilefit.studies.stability.cells import Verdict
 
-Content = dict[str, Any]
+SHOWN = 12  # letters of a SHA-256
+
+
+def provenance(source: Source, page: str) -> Iterator[str]:
+    """Yield digests of data and records, libraries, the commands that make it again; `page` is the file's own name."""
+    contents = {name: source.content(name) for name in source.paths}
+    columns = {
+        "record": list(contents),
+        "photons": [photons_text(one) for one in contents.values()],
+        "seed": [str(one["seed"]) for one in contents.values()],
+        "preset": [str(one["preset"]) for one in contents.values()],
+        "data": [str(one.get("data_digest", ABSENT))[:SHOWN] for one in contents.values()],
+        "record's own": [hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] for path in source.paths.values()],
+    }
+    caption = f"SHA-256, the first {SHOWN} letters, of the numbers that were fitted and of the record's file"
+    yield markup(column_table("Records", columns, caption, left=("record", "preset", "data", "record's own")))
+    versions = {tuple(sorted((one.get("versions") or {}).items())) for one in contents.values()} - {()}
+    for known in sorted(versions):
+        yield paragraph("Made with " + ", ".join(f"{name} {number}" for name, number in known) + ".", "dim")
+    yield paragraph(f"SHA-256 over all records of the folder: {digest(source.folder)}", "dim")
+    yield paragraph("To make all of it again (measurements with the records have their own commands, beside them):")
+    shown = shlex.join(["profilefit", "report", *(source.names or ()), "--fits", "fits", "--html", page])
+    yield command("\n".join([*_remake_lines(contents, bool(source.names)), shown]))
+
+
+def _remake_lines(contents: Mapping[str, Content], named: bool = True) -> list[str]:
+    """Return the commands that make these records again, a line for each preset, seed and number of photons."""
+    groups: dict[str, list[str]] = {}
+    for name, one in contents.items():
+        options, photons = f"--preset {one['preset']} --seed {one['seed']}", (one.get("truth") or {}).get("photons")
+        if photons not in (None, preset_photons(one["preset"], record_setting(one))):
+            options += f" --photons {photons}"
+        groups.setdefault(options, []).append(name)
+    alone = len(groups) == 1 and not named
+    return [
+        " ".join(["profilefit regenerate", *([] if alone else map(shlex.quote, names)), options, "--out fits"])
+        for options, names in groups.items()
+    ]
+
+
+# What a figure shows, by how its name begins.
+CAPTIONS = {
+    "liang-7-profile": "Equation (7): r R_d of photons, of the exact half space, of the law printed and regenerated.",
+    "liang-7-error": "R_d of the law over the exact one, less 1; the band holds photon noise and model discrepancy.",
+    "liang-8-albedo": "The map from A to alpha, and its errors to the right.",
+    "liang-11-a": "Coefficient a of (7) over alpha: fits at each albedo, the law (11) printed and regenerated.",
+    "liang-13-b": "Coefficient b of (7) over alpha: fits at each albedo, the law (13) printed and regenerated.",
+    "liang-15-c": "Coefficient c of (7) over alpha: fits at each albedo, the law (15) printed and regenerated.",
+    "liang-19-inverse": "The inverse cdf (19)-(20): printed, regenerated and exact.",
+    "inversion-error": "Largest error of inverse cdfs in the share of the reflected energy, by albedo.",
+    "constants": "Printed constants against regenerated ones. z: their difference over its error.",
+    "quality": "Error over the single-scattering albedo, at held-out albedos.",
+    "residuals": "Residuals of the fit.",
+}
+
+
+def _drawn(plan: Plan, source: Source) -> str:
+    """Return the figure of a plan as part of a page; where it cannot be drawn, why."""
+    reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
+    if reason:
+        return paragraph(f"{plan.name}: {reason}", "dim")
+    title = CAPTIONS.get(plan.name) or CAPTIONS[plan.name.split("-")[0]]
+    return _drawing(plan.name, lambda out: plan.draw(source, out, name=plan.name), title)
+
+
+def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
+    """Return the figure `name` that `draw` writes into a folder."""
+    with tempfile.TemporaryDirectory() as folder, only("svg"):
+        (file,) = draw(Path(folder))
+        return figure(inline(file.read_text(encoding="utf-8"), name, title), title)
+
+
+def whole_figure(source: Source, name: str) -> str:
+    """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
+    (plan,) = (one for one in plans(source) if one.name == name)
+    return _drawn(plan, source)
+
+
+def paper_figures(source: Source) -> str:
+    """Return the figures of the paper again, as far as there are records for them."""
+    return "\n".join(_drawn(plan, source) for plan in PAPER if set(plan.needs) <= set(source.paths))
+
+
+def record_part(source: Source, name: str, figures: bool = True) -> str:
+    """Return everything of one record, folded; without `figures` only what its .json has."""
+    content = source.content(name)
+    tables = "\n".join(markup(part) for part in record_tables(content))
+    plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
+    corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
+    drawings = "\n".join(_drawn(plan, source) for plan in plans_of if plan.name != corner)
+    draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
+    commands = [draw] if any(plan.name == corner for plan in plans_of) else []
+    command_again = command("\n".join([*_remake_lines({name: content}), *commands]))
+    title = element("b", escape(name)) + " " + element("span", escape(content["title"]), class_="dim")
+    return details(title, element("div", tables + drawings + command_again, class_="record"), f"record-{name}")
+
+
 ALL = "all"
 MOST_DRAWING = 2**24  # bytes; the largest of ours has a fourteenth of it
 
@@ -90,8 +198,7 @@ class EvidenceFolder:
         return "\n".join(parts)
 
 
-def missing(name: str) -> str:
-    """Return the text for a measurement that is absent."""
+def _missing(name: str) -> str:
     return paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")
 
 
@@ -119,10 +226,7 @@ OF_LAYERS = {
     "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
     "own-data.png": "What rings can know of tissue, by place and error; n and g given or open.",
 }
-GROUPS = {
-    "laws": ("Laws in float32", OF_PROFILE),
-    "maps": ("Maps in float32", OF_MAP[:2]),
-}
+GROUPS = {"laws": ("Laws in float32", OF_PROFILE), "maps": ("Maps in float32", OF_MAP[:2])}
 MEANING = (
     "model: the record's error against the exact half space or photons, worst albedo; float32: what rounding adds; "
     "bad: NaN, Inf, negative or not monotone, in and out of where the law holds"
@@ -131,13 +235,10 @@ COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median 
 
 
 def shader(evidence: EvidenceFolder) -> Iterator[str]:
-    """Yield the parts of the section."""
+    """Yield the parts of its section."""
     content = evidence.content("check")
-    yield missing("check") if content is None else "\n".join([evidence.origin(content), *_check(content)])
-    for name, title in RENDERS.items():
-        path = evidence.folder / name
-        if path.exists():
-            yield _picture(path.read_bytes(), title)
+    yield _missing("check") if content is None else "\n".join([evidence.origin(content), *_check(content)])
+    yield from _pictures(evidence, RENDERS)
 
 
 def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
@@ -147,13 +248,10 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
         return
     yield markup(table)
     if sums := sums_of(source.folder):
-        yield drawing(OF_SUMS, lambda out: sum_figure(source, out), sum_caption(sums))
+        yield _drawing(OF_SUMS, lambda out: sum_figure(source, out), sum_caption(sums))
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
-    for name, title in OF_LAYERS.items():
-        path = evidence.folder / name
-        if path.exists():
-            yield _picture(path.read_bytes(), title)
+    yield from _pictures(evidence, OF_LAYERS)
 
 
 def _check(content: Content) -> Iterator[str]:
@@ -166,8 +264,11 @@ def _check(content: Content) -> Iterator[str]:
             yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
     if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
-    if content["costs"]:
-        yield markup(column_table(COSTS, _costs(content["costs"]), left=("source",)))
+    if costs := content["costs"]:
+        columns = {"source": list(costs)}
+        for work in next(iter(costs.values()))["ns"]:
+            columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
+        yield markup(column_table(COSTS, columns, left=("source",)))
 
 
 def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, list[str]]:
@@ -190,16 +291,11 @@ def _label(content: Content) -> str:
     return f"{content['name']}, {content['constants']}" if content["constants"] else str(content["name"])
 
 
-def _costs(costs: Content) -> dict[str, list[str]]:
-    works = list(next(iter(costs.values()))["ns"])
-    columns = {"source": list(costs)}
-    for work in works:
-        columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
-    return columns
-
-
-def _picture(png: bytes, title: str) -> str:
-    return figure(f'<img alt="{escape(title)}" src="{address(png, loss=True)}">', title)
+def _pictures(evidence: EvidenceFolder, titles: Mapping[str, str]) -> Iterator[str]:
+    for name, title in titles.items():
+        if (path := evidence.folder / name).exists():
+            source = address(path.read_bytes(), loss=True)
+            yield figure(f'<img alt="{escape(title)}" src="{source}">', title)
 
 
 CHARTS = {
@@ -211,10 +307,10 @@ CHARTS = {
 
 
 def speed(evidence: EvidenceFolder) -> Iterator[str]:
-    """Yield the parts of the section."""
+    """Yield the parts of its section."""
     content = evidence.content("tradeoff")
     if content is None:
-        yield missing("tradeoff")
+        yield _missing("tradeoff")
         return
     for name, title in CHARTS.items():
         if name in content:
@@ -245,42 +341,37 @@ HOLDS = {
     False: "A law, map or solver of this project has a red cell inside its stated range.",
 }
 UNKNOWN = "no reference there: NaN, sign and order only"
-NOT_JUDGED = Verdict.NOT_JUDGED.words
 ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
 def failures(evidence: EvidenceFolder) -> Iterator[str]:
-    """Yield the parts of the section."""
+    """Yield the parts of its section."""
     content = evidence.content("stability")
     if content is None:
-        yield missing("stability")
+        yield _missing("stability")
         return
     yield evidence.origin(content)
     yield paragraph(HOLDS[bool(content["passed"])], "bold")
-    aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == NOT_JUDGED)
+    aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == Verdict.NOT_JUDGED.words)
     yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
-    columns = _advice(content["regions"])
+    groups: dict[str, list[Content]] = {}
+    for region in content["regions"]:
+        # Earlier versions wrote a cause and its remedy.
+        sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"
+        groups.setdefault(sentence or UNKNOWN, []).append(region)
+    rows = dict(sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]})))
+    columns = {
+        "laws": [str(len({one["law"] for one in group})) for group in rows.values()],
+        "cells": [str(sum(int(one["count"]) for one in group)) for group in rows.values()],
+        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows.values()],
+        "what helps": list(rows),
+    }
     yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
     for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
         figure = evidence.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
         yield details(title, figure, is_open=path.stem == FIRST)
-
-
-def _advice(regions: Sequence[Content]) -> dict[str, list[str]]:
-    groups: dict[str, list[Content]] = {}
-    for region in regions:
-        # Earlier versions wrote a cause and its remedy.
-        sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"
-        groups.setdefault(sentence or UNKNOWN, []).append(region)
-    rows = sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]}))
-    return {
-        "laws": [str(len({one["law"] for one in group})) for _, group in rows],
-        "cells": [str(sum(int(one["count"]) for one in group)) for _, group in rows],
-        "as": [", ".join(sorted({one["class"] for one in group})) for _, group in rows],
-        "what helps": [sentence for sentence, _ in rows],
-    }
 
 
 def promises(evidence: EvidenceFolder) -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from rich.cells import cell_len
-from rich.console import Group, JustifyMethod, RenderableType
+from rich.console import Group, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
@@ -82,12 +82,12 @@ def column_table(
     table = Table(box=None, header_style="dim", padding=(0, 2, 0, 0), pad_edge=False)
     for header, cells in columns.items():
         side: JustifyMethod = "left" if header in left or header in fold else "right"
-        whole = None if header in fold else _width([header, *cells])  # a number that is cut reads as another one
+        widths = (cell_len(line) for text in (header, *cells) for line in text.splitlines())
+        whole = None if header in fold else max(widths, default=0)  # a number that is cut reads as another one
         table.add_column(Text(header), justify=side, no_wrap=header not in fold, overflow="fold", min_width=whole)
     for row in zip(*columns.values(), strict=True):
         table.add_row(*(Text(cell) for cell in row))
-    parts: list[RenderableType] = [Text(title, style="bold"), table]
-    return Group(*parts, Text(caption, style="dim")) if caption else Group(*parts)
+    return Group(Text(title, style="bold"), table, *([Text(caption, style="dim")] if caption else []))
 
 
 def row_table(
@@ -108,11 +108,6 @@ def row_table(
     return column_table(title, shown, caption, left, fold)
 
 
-def _width(texts: Sequence[str]) -> int:
-    """Return the columns of the screen that the widest line takes."""
-    return max(cell_len(line) for text in texts for line in (text.splitlines() or [""]))
-
-
 BLOCKS = "▁▂▃▄▅▆▇█"
 GAP = " "  # for what is no positive number
 
@@ -124,17 +119,20 @@ def spark(values: Sequence[float | None], ends: tuple[float, float] | None, widt
     """
     if ends is None:
         return GAP * min(len(values), width or len(values))
-    return "".join(_block(value, *ends) for value in _at_most(values, width or len(values)))
+    count = min(width or len(values), len(values))
+    places = [round(i * len(values) / max(count, 1)) for i in range(count + 1)]
+    stretches = (filter(_is_shown, values[a:b]) for a, b in pairwise(places))
+    return "".join(_block(max(stretch, default=None), *ends) for stretch in stretches)  # type: ignore[type-var]
 
 
 def span(rows: Iterable[Sequence[float | None]]) -> tuple[float, float] | None:
     """Return the smallest and the largest positive number of all, the one scale of a table's sparks; None of none."""
-    known = [value for row in rows for value in row if _is_shown(value)]
-    return (min(known), max(known)) if known else None  # type: ignore[type-var, return-value]
+    known = [value for row in rows for value in row if value is not None and _is_shown(value)]
+    return (min(known), max(known)) if known else None
 
 
 def _block(value: float | None, low: float, high: float) -> str:
-    if value is None or not _is_shown(value):
+    if value is None:
         return GAP
     share = math.log(value / low) / math.log(high / low) if high > low else 0.0
     return BLOCKS[round(min(max(share, 0.0), 1.0) * (len(BLOCKS) - 1))]
@@ -142,11 +140,3 @@ def _block(value: float | None, low: float, high: float) -> str:
 
 def _is_shown(value: float | None) -> bool:
     return value is not None and math.isfinite(value) and value > 0
-
-
-def _at_most(values: Sequence[float | None], width: int) -> list[float | None]:
-    """Return the largest of each of `width` stretches of equally many values; all of them if they are no more."""
-    count = min(width, len(values))
-    ends = [round(i * len(values) / count) for i in range(count + 1)]
-    stretches = [values[a:b] for a, b in pairwise(ends)]
-    return [max((v for v in stretch if _is_shown(v)), default=None) for stretch in stretches]  # type: ignore[type-var]

@@ -13,12 +13,10 @@ from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.shader.check import half
 from profilefit.shader.check.chosen import REGENERATED, checked, chosen
-from profilefit.shader.check.half import HalfCheck
-from profilefit.shader.check.law_check import JUDGED, OWN, LawCheck
+from profilefit.shader.check.dense_grid import ShaderCheck
+from profilefit.shader.check.law_check import HALVES, JUDGED, OWN, HalfCheck, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
-from profilefit.shader.check.map_check import MapCheck
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
@@ -41,63 +39,51 @@ HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16
 def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
     """Return a line a law and a line a map."""
     parts: list[RenderableType] = []
-    for kind, names, cells, checks in _kinds(laws, maps):
-        caption, has_g = CAPTION if kind == "law" else "", any(one.of.setting.g for one in checks)
-        header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
-        rows = [
-            (one.of.label, *_setting(one.of)[1 : 2 + has_g], *cells(one), *_counts(one), _result(one)) for one in checks
-        ]
-        title = f"{kind.capitalize()}s in float32, {device}"
-        parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
+    for kind, names, checks in (("law", LAW_COLUMNS, laws), ("map", MAP_COLUMNS, maps)):
+        if checks:
+            has_g = any(one.of.setting.g for one in checks)
+            header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
+            rows = [(one.of.label, *_setting(one.of)[1 : 2 + has_g], *_cells(one)) for one in checks]
+            title, caption = f"{kind.capitalize()}s in float32, {device}", CAPTION if kind == "law" else ""
+            parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
     return parts
-
-
-def _kinds(laws: Sequence[LawCheck], maps: Sequence[MapCheck]) -> list[tuple[str, tuple[str, ...], Any, Sequence[Any]]]:
-    """Return word, headers, cells and checks of laws and of maps, where there are any."""
-    kinds: list[tuple[str, tuple[str, ...], Any, Sequence[Any]]] = [
-        ("law", LAW_COLUMNS, _law_cells, laws),
-        ("map", MAP_COLUMNS, _map_cells, maps),
-    ]
-    return [kind for kind in kinds if kind[-1]]
 
 
 def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
-    """Return the distribution of each law's errors, and where the largest is."""
+    """Return the distribution of each law's errors, and where the largest is; below the GPU's beside the record's."""
     parts: list[RenderableType] = []
     for one in laws:
-        spreads = one.spreads.values()
-        columns = {
-            "float32 error": list(one.spreads),
-            "50 %": [significant(spread.half) for spread in spreads],
-            "99 %": [significant(spread.most) for spread in spreads],
-            "largest": [significant(spread.largest) for spread in spreads],
-            "at": [spread.where for spread in spreads],
-        }
-        parts.append(column_table(_called(one), columns, _against_exact(one), left=("float32 error", "at")))
+        rows = [
+            (name, *map(significant, (spread.half, spread.most, spread.largest)), spread.where)
+            for name, spread in one.spreads.items()
+        ]
+        pairs = [
+            f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})"
+            for name, value in one.measured.items()
+        ]
+        caption = f"GPU against the exact half space: {', '.join(pairs)}" if pairs else ""
+        header = ("float32 error", "50 %", "99 %", "largest", "at")
+        parts.append(row_table(_called(one), header, rows, caption, left=("float32 error", "at")))
     return parts
-
-
-def _against_exact(check: LawCheck) -> str:
-    """Return the GPU's own errors beside the record's."""
-    pairs = [
-        f"{name} {significant(value, 3)} (model {significant(check.model.get(name), 3)})"
-        for name, value in check.measured.items()
-    ]
-    return f"GPU against the exact half space: {', '.join(pairs)}" if pairs else ""
 
 
 def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
     """Return a row for each source."""
-    columns = {"source": list(costs)}
-    for work in WORKS:
-        columns[work] = [f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for cost in costs.values()]
-    return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("source",))
+    title = f"Cost of one evaluation, {device}"
+    return row_table(title, ("source", *WORKS), _cost_rows(costs), COST_CAPTION, left=("source",))
+
+
+def _cost_rows(costs: Mapping[str, Cost]) -> list[tuple[str, ...]]:
+    return [
+        (name, *(f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for work in WORKS))
+        for name, cost in costs.items()
+    ]
 
 
 def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
     """Return a line a law, a column for each thing that is stored in float16."""
     columns = {"law": [_at_index(one.of) for one in checks]}
-    for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
+    for name in HALVES:
         if any(name in one.rel for one in checks):
             columns[name] = [
                 f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT
@@ -124,20 +110,15 @@ def markdown_check(folder: Path) -> str:
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
     """Return the README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
-    for kind, names, cells, group in _kinds(laws, maps):
-        header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
-        rows = [(one.of.label, *_setting(one.of), *cells(one), *_counts(one), _result(one)) for one in group]
-        parts.append(markdown_table(header, rows))
-    checks: list[LawCheck | MapCheck] = [*laws, *maps]
-    broken = [f"- `{_called(one)}`: {bound}" for one in checks for bound in one.broken]
-    if broken:
+    for kind, names, group in (("law", LAW_COLUMNS, laws), ("map", MAP_COLUMNS, maps)):
+        if group:
+            header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
+            rows = [(one.of.label, *_setting(one.of), *_cells(one)) for one in group]
+            parts.append(markdown_table(header, rows))
+    if broken := [f"- `{_called(one)}`: {bound}" for one in (*laws, *maps) for bound in one.broken]:
         parts.append("\n".join(broken))
     if costs:
-        rows = [
-            (name, *(f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for work in WORKS))
-            for name, cost in costs.items()
-        ]
-        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), rows))
+        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(costs)))
     captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if costs else [])]
     return "\n\n".join([*parts, f"On {device}. {'. '.join(captions)}."])
 
@@ -150,10 +131,9 @@ def content(
     device: str,
 ) -> dict[str, Any]:
     """Return all checks as plain numbers and text, for --json; null stands for what is not finite."""
-    checks: list[LawCheck | MapCheck] = [*laws, *maps]
     whole = {
         "device": device,
-        "passed": not any(one.broken for one in checks),
+        "passed": not any(one.broken for one in (*laws, *maps)),
         "laws": [{**_check_content(one), "spreads": one.spreads} for one in laws],
         "maps": [_check_content(one) for one in maps],
         "costs": dict(costs),
@@ -162,22 +142,16 @@ def content(
     return dict(plain(whole))
 
 
-def _check_content(check: LawCheck | MapCheck) -> dict[str, Any]:
+def _check_content(check: ShaderCheck) -> dict[str, Any]:
+    measured = ("model", "rounding", "measured", "inside", "outside", "bounds")
     return {
-        "name": check.of.name,
-        "constants": check.of.constants,
-        "setting": check.of.setting,
-        "model": check.model,
-        "rounding": check.rounding,
-        "measured": check.measured,
-        "inside": check.inside,
-        "outside": check.outside,
-        "bounds": check.bounds,
+        **{name: getattr(check.of, name) for name in ("name", "constants", "setting")},
+        **{name: getattr(check, name) for name in measured},
         "broken": [str(bound) for bound in check.broken],
     }
 
 
-def _called(check: LawCheck | MapCheck) -> str:
+def _called(check: ShaderCheck) -> str:
     """Return a label that distinguishes a map from the law of its name, and an index from others."""
     name = _at_index(check.of)
     return f"map {name}" if isinstance(check, MapCheck) and not check.of.records else name
@@ -188,28 +162,17 @@ def _at_index(named: LoadedLaw) -> str:
     return named.label + where + (f", g = {named.setting.g:g}" if named.setting.g else "")
 
 
-def _law_cells(check: LawCheck) -> tuple[str, ...]:
-    """Return model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
-    rounding = {name: value for name, value in check.rounding.items() if JUDGED[name] in check.spreads}
-    own = check.spreads.get(OWN)
-    cells = [value for name in ("rel", "ks") for value in (check.model.get(name), rounding.get(name))]
-    return tuple(significant(value) for value in (*cells, rounding.get("inversion_error"), own.most if own else None))
-
-
-def _map_cells(check: MapCheck) -> tuple[str, ...]:
-    return tuple(
-        significant(value)
-        for name in ("delta_A", "delta_alpha")
-        for value in (check.model.get(name), check.rounding[name])
-    )
-
-
-def _counts(check: LawCheck | MapCheck) -> tuple[str, str]:
-    return str(check.inside.total), str(check.outside.total)
-
-
-def _result(check: LawCheck | MapCheck) -> str:
-    return FAIL if check.broken else PASS
+def _cells(check: ShaderCheck) -> tuple[str, ...]:
+    """Return model and float32 errors: of profile and cdf, or A and α; of radii and pdf; bad values and the verdict."""
+    rounding, more = check.rounding, list[float | None]()
+    if isinstance(check, LawCheck):
+        rounding = {name: value for name, value in rounding.items() if JUDGED[name] in check.spreads}
+        own = check.spreads.get(OWN)
+        more = [rounding.get("inversion_error"), own.most if own else None]
+    names = ("delta_A", "delta_alpha") if isinstance(check, MapCheck) else ("rel", "ks")
+    numbers = [value for name in names for value in (check.model.get(name), rounding.get(name))] + more
+    bad = (str(check.inside.total), str(check.outside.total))
+    return (*map(significant, numbers), *bad, FAIL if check.broken else PASS)
 
 
 def _setting(named: LoadedLaw) -> tuple[str, str, str]:

@@ -13,30 +13,20 @@ from profilefit.report.tables.cells import column_table, on_the_point, significa
 from profilefit.studies.choose.case import is_filter
 from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
 from profilefit.studies.choose.cost import Ratios
-from profilefit.studies.choose.error import CHANNELS, Error
+from profilefit.studies.choose.error import CHANNELS, ReferenceLight, passes
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import reference_light
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
-    from profilefit.studies.choose.atlas import AtlasNeed
-    from profilefit.studies.choose.fur import FurNeed
-    from profilefit.studies.choose.sea import SeaNeed
+    from profilefit.studies.choose.scenes import AtlasNeed, FurNeed, SeaNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
-CAUSES = {
-    "model": "its shape",
-    "curvature": "the curved surface",
-    "pixel": "large pixels",
-    "noise": "noise",
-}
-LAYERS = {
+CAUSES = {"model": "its shape", "curvature": "the curved surface", "pixel": "large pixels", "noise": "noise"}
+LAYERS = {  # the worse the later
     "enough": "one layer is enough",
     "enough alone": "one layer is enough by itself, but not with this choice: a more accurate way leaves it room",
-    "not enough": "one layer is not enough: fit the stack's own profile (profilefit fit STACK.mco)",
     "undecided": "undecided: as far from the tolerance as the photons' noise",
+    "not enough": "one layer is not enough: fit the stack's own profile (profilefit fit STACK.mco)",
 }
-SEVERITY = ("enough", "enough alone", "undecided", "not enough")
 
 
 def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> RenderableType:
@@ -56,21 +46,13 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
         "": list(rows),
         "way": [one.option.label for one in rows.values()],
         "error %": [_percent(one.error.total, places) for one in rows.values()],
-        **{
-            header: [_percent(getattr(one.error, part), places) for one in rows.values()]
-            for part, header in PARTS.items()
-        },
+        **{h: [_percent(getattr(one.error, part), places) for one in rows.values()] for part, h in PARTS.items()},
         "ms": on_the_point([significant(one.ms) for one in rows.values()]),
         "range": [f"{significant(one.frame.least)} to {significant(one.frame.most)}" for one in rows.values()],
         "serves": [_serves(one, choice) for one in rows.values()],
     }
-    fold = ("way", "most of the error")
-    parts: list[RenderableType] = [
-        column_table(headline(choice), columns, _caption(choice, ratios), ("", "serves"), fold)
-    ]
-    if layers:
-        parts += [Text(), Text(_layer(layers, choice), style="bold")]
-    return Group(*parts)
+    table = column_table(headline(choice), columns, _caption(choice, ratios), ("", "serves"), ("way",))
+    return Group(table, Text(), Text(_layer(layers, choice), style="bold")) if layers else table
 
 
 def atlas_line(answer: AtlasNeed) -> str:
@@ -119,43 +101,30 @@ def fur_lines(answer: FurNeed) -> list[str]:
     """Return how many layers fur needs, a line an angle, and the answer."""
     lines = []
     for angle, layers in answer.layers.items():
-        counts = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
+        counts = ", ".join(f"{name.replace(',', '')} {count or 'none'}" for name, count in layers.items())
         best = answer.cheapest(angle)
-        lines.append(f"{angle} degrees: {counts}; cheapest: {'none' if best is None else _plain(best.name)}")
+        lines.append(f"{angle} degrees: {counts}; cheapest: {'none' if best is None else best.name.replace(',', '')}")
     requested = f"(requested: {_percent(answer.tolerance)} % of the length)"
     if answer.way is None:
-        return [
-            *lines,
-            f"no way is within the tolerance at {answer.angle} degrees, by {answer.most} layers {requested}",
-        ]
-    return [
-        *lines,
-        f"{_plain(answer.way.name)}, {answer.count} layers: the cheapest to {answer.angle} degrees {requested}",
-    ]
+        none = f"no way is within the tolerance at {answer.angle} degrees, by {answer.most} layers {requested}"
+        return [*lines, none]
+    way = answer.way.name.replace(",", "")
+    return [*lines, f"{way}, {answer.count} layers: the cheapest to {answer.angle} degrees {requested}"]
 
 
 def fur_content(answer: FurNeed) -> dict[str, Any]:
     """Return the answer as data."""
     return {
-        "way": None if answer.way is None else answer.way.name,
+        "way": getattr(answer.way, "name", None),
         "layers": answer.count,
         "angle": answer.angle,
         "tolerance": answer.tolerance,
         "most": answer.most,
         "by_angle": [
-            {
-                "angle": angle,
-                "layers": dict(layers),
-                "cheapest": None if (best := answer.cheapest(angle)) is None else best.name,
-            }
+            {"angle": angle, "layers": dict(layers), "cheapest": getattr(answer.cheapest(angle), "name", None)}
             for angle, layers in answer.layers.items()
         ],
     }
-
-
-def _plain(name: str) -> str:
-    """Return the name of a way without commas, for a list."""
-    return name.replace(",", "")
 
 
 def headline(choice: Choice) -> str:
@@ -174,7 +143,8 @@ def headline(choice: Choice) -> str:
 
 def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> dict[str, Any]:
     """Return a choice and all options as data, with the constants that a shader needs, and layers of every colour."""
-    scene = choice.scene
+    scene, option = choice.scene, choice.nearest.option
+    filters = passes(option, middle(scene), ReferenceLight(scene.setting)) if is_filter(option) else ()
     made: dict[str, Any] = {
         "tolerance": scene.tolerance,
         "budget_ms": scene.budget.ms,
@@ -185,7 +155,10 @@ def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> 
         "cheaper": _data(choice.cheaper) if choice.cheaper else None,
         "dearer": _data(choice.dearer) if choice.dearer else None,
         "options": [_data(one) for one in choice.predicted],
-        "filters": _filters(choice),
+        "filters": [  # weights [-] and offsets [unit] of the taps, in the middle of the scene's ranges
+            {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
+            for share, kernel, stretches in filters
+        ],
         "export": export_hint(choice),
     }
     verdicts = [{**vars(layer), "verdict": _verdict(layer, choice)} for layer in layers]
@@ -223,18 +196,6 @@ def _data(prediction: Predicted) -> dict[str, Any]:
     }
 
 
-def _filters(choice: Choice) -> list[dict[str, Any]]:
-    """Return weights [-] and offsets [unit] of the taps of each filter, in the middle of the scene's ranges."""
-    option, scene = choice.nearest.option, choice.scene
-    if not is_filter(option):
-        return []
-    filters = passes(option, middle(scene), reference_light(scene.setting))
-    return [
-        {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
-        for share, kernel, stretches in filters
-    ]
-
-
 def _serves(prediction: Predicted, choice: Choice) -> str:
     """Return which of the limits an option keeps."""
     precise, paid = prediction.error.total <= choice.scene.tolerance, affordable(prediction, choice.scene)
@@ -244,20 +205,17 @@ def _serves(prediction: Predicted, choice: Choice) -> str:
     return "no: " + " and ".join(what for what, good in (("error", precise), ("ms", paid)) if not good)
 
 
-def _reason(error: Error, unit: str) -> str:
-    """Return where the error is worst, and what most of it comes from."""
-    part = max(PARTS, key=lambda name: getattr(error, name))
-    case = error.case
-    shape = "flat" if case.is_flat else f"radius {significant(case.radius)} {unit}"
-    return f"{CHANNELS[error.channel]}, pixel {significant(case.pixel)} {unit}, {shape}; mostly {CAUSES[part]}"
-
-
 def _caption(choice: Choice, ratios: Ratios) -> str:
     scene = choice.scene
     budget, setting = scene.budget, scene.setting
-    reasons = {"worst": choice.nearest, "the best cheaper": choice.cheaper}
-    lines = [
-        *(f"{name}: {_reason(one.error, scene.unit)}." for name, one in reasons.items() if one is not None),
+    lines = []
+    for name, one in {"worst": choice.nearest, "the best cheaper": choice.cheaper}.items():
+        if one is not None:
+            case, part = one.error.case, max(PARTS, key=lambda name, error=one.error: getattr(error, name))
+            shape = "flat" if case.is_flat else f"radius {significant(case.radius)} {scene.unit}"
+            at = f"{CHANNELS[one.error.channel]}, pixel {significant(case.pixel)} {scene.unit}, {shape}"
+            lines.append(f"{name}: {at}; mostly {CAUSES[part]}.")
+    lines += [
         f"error: root mean square of radiance within {scene.within.mfp:g} transport mean free paths (at least "
         f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "
         "share of white; then its parts, which add in squares.",
@@ -279,7 +237,7 @@ def _verdict(layer: OneLayer, choice: Choice) -> str:
 def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     """Return what one layer in place of the stack costs, of several colours in the worst."""
     verdicts = [_verdict(layer, choice) for layer in layers]
-    worst = max(range(len(layers)), key=lambda one: (SEVERITY.index(verdicts[one]), layers[one].error))
+    worst = max(range(len(layers)), key=lambda one: (list(LAYERS).index(verdicts[one]), layers[one].error))
     layer, verdict = layers[worst], verdicts[worst]
     colour = "of one colour" if len(layers) == 1 else f"of three colours, {CHANNELS[worst]} the worst"
     unit = choice.scene.unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from html import escape
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any
 
@@ -67,30 +67,26 @@ def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
     path = folder / FILE
     claims = read_json(path)
     try:
-        return {**claims["made"]}, [_claim(row) for row in claims["rows"]]
+        for row, field in product(claims["rows"], fields(Claim)):
+            accepted = is_line if field.type == "str" else is_number
+            if not accepted(row[field.name]) or (field.name == "sense" and row["sense"] not in (AT_MOST, AT_LEAST)):
+                raise ValueError(f"{field.name} {shown(row[field.name])}")
+        names = [field.name for field in fields(Claim)]
+        return {**claims["made"]}, [Claim(**{name: row[name] for name in names}) for row in claims["rows"]]
     except (KeyError, TypeError, ValueError) as error:
         given = f"{type(error).__name__}: {error}"
         raise InputError(f"{path}: expected what `make claims` writes, got {given}") from error
 
 
-def _claim(row: Any) -> Claim:
-    for field in fields(Claim):
-        if not (is_line if field.type == "str" else is_number)(row[field.name]):
-            raise ValueError(f"{field.name} {shown(row[field.name])}")
-    if row["sense"] not in (AT_MOST, AT_LEAST):
-        raise ValueError(f"sense {shown(row['sense'])}")
-    return Claim(**{field.name: row[field.name] for field in fields(Claim)})
-
-
 def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
     """Return a table for each command, under its name."""
-    return [_table(command, list(rows)) for command, rows in groupby(claims, key=lambda one: one.command)]
-
-
-def _table(command: str, rows: Sequence[Claim]) -> RenderableType:
-    caption = f"held against: {rows[0].truth}; {rows[0].date}, load before {rows[0].load}"
-    header = ("claim", "promised", "measured", "noise")
-    return row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise"))
+    parts: list[RenderableType] = []
+    for command, group in groupby(claims, key=lambda one: one.command):
+        rows = list(group)
+        caption = f"held against: {rows[0].truth}; {rows[0].date}, load before {rows[0].load}"
+        header = ("claim", "promised", "measured", "noise")
+        parts.append(row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise")))
+    return parts
 
 
 def markdown_claims(folder: Path) -> str:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.convert import ENGINES, LENGTHS, QUANTITIES, Engine, Optical
-from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, on_the_point, significant
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant
 
 Floats = NDArray[np.float64]
 DIGITS, COLOUR_PLACES = 5, 4
@@ -35,28 +35,22 @@ class ConventionRow:
 
 def _rows(medium: Optical, n: float) -> list[ConventionRow]:
     """Return all quantities; a table leaves out what says the same twice."""
+    surface, matched = _surface(n, medium.g), _surface(1.0, medium.g)
     return [
         ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
         ConventionRow("alpha_unreduced", "  unreduced", "", 0, "mu_s / (mu_s + mu_a)", medium.alpha_unreduced),
         *(
-            ConventionRow(
-                f"reflectance_{light}", "reflectance A", light, 0, _surface(n, medium.g), medium.reflectance(light, n)
-            )
+            ConventionRow(f"reflectance_{light}", "reflectance A", light, 0, surface, medium.reflectance(light, n))
             for light in ILLUMINATIONS
         ),
         *(
-            ConventionRow(
-                f"matched_{light}", "  index-matched", light, 0, _surface(1.0, medium.g), medium.reflectance(light)
-            )
+            ConventionRow(f"matched_{light}", "  index-matched", light, 0, matched, medium.reflectance(light))
             for light in ILLUMINATIONS
         ),
         ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
         ConventionRow("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
         ConventionRow("mu_s_unreduced", "  unreduced mu_s", "", -1, "mu_s' / (1 - g)", medium.mu_s / (1.0 - medium.g)),
-        *(
-            ConventionRow(length.name, length.title, length.colour, 1, length.formula, medium.length(length.name))
-            for length in LENGTHS
-        ),
+        *(ConventionRow(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
     ]
 
 
@@ -73,28 +67,19 @@ def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, Any]:
 
 
 def _typed(engine: Engine, medium: Optical, unit: str, n: float) -> dict[str, Any]:
-    inverse = "1/" if engine.power < 0 else ""
+    of = (engine.unit if unit else "") or unit
     return {
-        "name": engine.name,
-        "product": engine.product,
-        "version": engine.version,
-        "method": engine.method,
+        **{name: getattr(engine, name) for name in ("name", "product", "version", "method")},
         "colour_field": engine.fields[0],
         "colour": engine.typed_colour(medium.alpha, n, medium.g),
         "length_field": engine.fields[1],
         "length": engine.typed_length(medium.alpha, medium.mfp, medium.g, unit),
-        "unit": f"{inverse}{_unit(engine, unit)}" if _unit(engine, unit) else None,
+        "unit": f"{'1/' if engine.power < 0 else ''}{of}" if of else None,
         "scale_field": engine.fields[2] or None,
         "scale": engine.scale,
         "renders": engine.rendered(medium.alpha, medium.g),
-        "formula": engine.formula,
-        "source": engine.source,
-        "checked": engine.checked,
+        **{name: getattr(engine, name) for name in ("formula", "source", "checked")},
     }
-
-
-def _unit(engine: Engine, unit: str) -> str:
-    return (engine.unit if unit else "") or unit
 
 
 def convert_table(medium: Optical, unit: str, n: float = 1.0, sources: bool = False) -> RenderableType:
@@ -102,10 +87,8 @@ def convert_table(medium: Optical, unit: str, n: float = 1.0, sources: bool = Fa
 
     unit  that of length, or ""; n the index that A is of
     """
-    parts: list[RenderableType] = [_quantities(medium, unit, n), Text(), _engines(medium, unit, n)]
-    if sources:
-        parts += [Text(), Text("\n".join(_described(engine) for engine in ENGINES))]
-    return Group(*parts)
+    described = (Text(), Text("\n".join(map(_described, ENGINES)))) if sources else ()
+    return Group(_quantities(medium, unit, n), Text(), _engines(medium, unit, n), *described)
 
 
 def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
@@ -114,30 +97,29 @@ def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
     if medium.g == 0.0:
         hidden |= {"alpha_unreduced", "mu_s_unreduced", "mfp_unreduced"}
     rows = [row for row in _rows(medium, n) if row.name not in hidden]
-    cells = np.array([[_cell(value) for value in row.values] for row in rows])
-    columns = {"": [row.title for row in rows]}
-    for i in range(cells.shape[1]):
-        header = "value" if cells.shape[1] == 1 else f"channel {i + 1}"
-        columns[header] = on_the_point(list(cells[:, i]))
     units = {0: "", 1: unit or "length", -1: f"1/{unit or 'length'}"}
-    columns |= {
-        "unit": [units[row.power] for row in rows],
-        "A of": [row.light for row in rows],
-        "is": [row.formula for row in rows],
-    }
+    count = len(rows[0].values)
+    channels = ["value"] if count == 1 else [f"channel {i + 1}" for i in range(count)]
+    cells = [(row.title, *map(_cell, row.values), units[row.power], row.light, row.formula) for row in rows]
     caption = [f"{MEMO}. {SEARCHLIGHT}."]
-    if NONE in cells:
+    if any(NONE in row for row in cells):
         caption += [f"{NONE}: without absorption (alpha = 1) there is no diffuse mean free path."]
-    return column_table("The medium", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))
+    header, left = ("", *channels, "unit", "A of", "is"), ("", "unit", "A of")
+    return row_table("The medium", header, cells, "\n".join(caption), left, ("is",), channels)
 
 
 def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     rows = [_typed(engine, medium, unit, n) for engine in ENGINES]
+    in_unit = []
+    for engine in ENGINES:
+        field = engine.unit or (f"{unit} scene" if unit else "scene unit")
+        scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
+        in_unit.append(f"{'1/' if engine.power < 0 else ''}{field}{scale}")
     columns = {
         "": [engine.title for engine in ENGINES],
         "colour": [_colours(row["colour"]) for row in rows],
         "length": [" ".join(_cell(value, DIGITS - 1) for value in row["length"]) for row in rows],
-        "in": [_where(engine, unit) for engine in ENGINES],
+        "in": in_unit,
         "renders A": [_colours(row["renders"], COLOUR_PLACES - 1, "") for row in rows],
     }
     caption = [
@@ -155,12 +137,6 @@ def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     return column_table("What to type", columns, "\n".join(caption), ("", "in"))
 
 
-def _where(engine: Engine, unit: str) -> str:
-    field = engine.unit or (f"{unit} scene" if unit else "scene unit")
-    scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
-    return f"{'1/' if engine.power < 0 else ''}{field}{scale}"
-
-
 def _described(engine: Engine) -> str:
     fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
     return (
@@ -170,11 +146,9 @@ def _described(engine: Engine) -> str:
 
 
 def _colours(values: Floats | None, places: int = COLOUR_PLACES, absent: str = ABSENT) -> str:
-    return absent if values is None else " ".join(_share(value, places) for value in values)
-
-
-def _share(value: float, places: int) -> str:
-    return f"{value:.{places}f}" if math.isfinite(value) else NONE
+    if values is None:
+        return absent
+    return " ".join(f"{value:.{places}f}" if math.isfinite(value) else NONE for value in values)
 
 
 def _cell(value: float, digits: int = DIGITS) -> str:

@@ -1,8 +1,10 @@
-"""A fit of one's own data as tables, and its goodness of fit and identifiability in sentences."""
+"""Fits of one's own data as tables, sentences and JSON content: of one medium, of layers, of a photographed spot."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -11,19 +13,24 @@ from rich.text import Text
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.identifiability import REFERENCE_ERROR, REPEATS, Candidate, relative_errors
-from profilefit.measured.model import QUANTITIES, correlation, unit_of
-from profilefit.measured.oblique import NEAR
+from profilefit.measured.identifiability import LOOSE, REFERENCE_ERROR, REPEATS, Candidate, relative_errors
+from profilefit.measured.model import NEAR, QUANTITIES, correlation, unit_of
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
+from profilefit.recipes import record
 from profilefit.report.tables.cells import (
     ABSENT,
     SEARCHLIGHT,
     column_table,
     interval,
     on_the_point,
+    row_table,
     significant,
     to_error,
 )
+
+if TYPE_CHECKING:  # which a fit of one medium does not load
+    from profilefit.measured.layers import LayersFit
+    from profilefit.measured.photo.workflow import Photo
 
 HELD, EDGE = "held", "edge"
 SHARES = ("A", "alpha")  # which end at 1
@@ -61,11 +68,12 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     data = fit.errors(fit.statistical) if result.identified else {}
     law = fit.errors(fit.of_law) if fit.rel is not None and result.identified else {}
     moving = result.identified
-    truth = known_medium(fit.data)
+    ends = {name: any(result.ends(name)) for name in result.moving}
+    marks = {name: (EDGE if ends[name] else ABSENT) if name in ends else HELD for name in names}
     columns = {
         "": list(names),
         "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
-        "± statistical": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
+        "± statistical": [significant(data[name]) if name in moving else marks[name] for name in names],
     }
     caption = CAPTION
     if fit.rel != 0 or fit.spec.ranges:  # exact light has no error of its own
@@ -76,47 +84,35 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
     whole = bool(result.whole_draws)
-    columns["95 %"] = [
-        _ends(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
-        for name in names
-    ]
+    columns["95 %"] = []
+    for name in names:
+        within = result.whole_interval(name) if whole else result.interval(name)
+        low, high = within or (None, None)
+        is_wide = low is not None and high is not None and 0 < WIDE * low < high
+        columns["95 %"].append(ANYTHING if is_wide else interval(within, 1.0 if name in SHARES else None))
     caption += "; 95 %: interval by " + (
         "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
     )
-    if any(any(result.ends(name)) for name in result.moving):
+    if any(ends.values()):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
     if fit.spec.law.setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
     columns["unit"] = [unit_of(name, fit.data.unit) for name in names]
     if fit.spec.law.setting.g:
         caption += "; alpha is the reduced albedo, l = 1 / (mu_s' + mu_a)"
-    if truth:
+    if truth := known_medium(fit.data):
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
         caption += "; of file: its layer that scatters most, with scattering reduced by 1 - g"
     return column_table(title, columns, caption, left=("", "unit"))
-
-
-def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
-    """Return an interval, or in words that it says nothing."""
-    low, high = ends or (None, None)
-    wide = low is not None and high is not None and low > 0 and high > WIDE * low
-    return ANYTHING if wide else interval(ends, most)
-
-
-def _mark(result: MediumPosterior, name: str) -> str:
-    """Return what stands where a quantity has no symmetric error."""
-    if name not in result.moving:
-        return HELD
-    return EDGE if any(result.ends(name)) else ABSENT
 
 
 def _correlation_table(result: MediumPosterior) -> RenderableType:
     names = result.identified
     joint = correlation(result.fit.gradients, result.fit.statistical, names)
     columns = {"": list(names)}
-    for at, name in enumerate(names):
+    for at, name in enumerate(names[:-1]):
         columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
-    return column_table("Correlations", {k: v for k, v in columns.items() if k != names[-1]})
+    return column_table("Correlations", columns)
 
 
 def _advice_table(result: MediumPosterior) -> RenderableType:
@@ -159,16 +155,27 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
         return
     if fit.at_edge:
         yield f"AT AN EDGE: {fit.minimum.result}"
-    if np.isfinite(fit.data.pooled):
-        yield from _estimated(result)
+    if np.isfinite(fit.data.pooled):  # errors of the data that are themselves estimates
+        yield (
+            f"these are estimates of {np.median(fit.data.freedom):.2g} degrees of freedom each, their trend of "
+            f"{fit.data.pooled:.2g}: so ± statistical is widened by a factor of {np.sqrt(fit.widening):.2f}, 95 % is "
+            f"{fit.quantile:.2f} times ± statistical (Student's t) and the p-value below is of an F test; {HELD_IN}"
+        )
     yield from _goodness(result)
-    yield from _rivals(result)
+    for one in fit.rivals:  # other media that explain the data as well
+        values = rival_values(fit, one)
+        told = ", ".join(f"{name} {values[name]:.3g} {unit_of(name, fit.data.unit)}".rstrip() for name in RIVALLED)
+        yield (
+            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
+            "both: measure nearer to the beam, or the total reflectance, or the scale"
+        )
     yield from _beam(result)
     yield from _oblique(result)
     yield from _medium(result)
     yield from _scale(result)
     yield from _identifiability(result)
-    if (g := _forward(result)) is not None:
+    g = 0.0 if fit.data.layer is None else fit.data.layer.g  # of a simulation
+    if g and not fit.spec.law.setting.g:
         yield (
             f"the medium scatters with g = {g:g}, what is fitted isotropically: within ten transport mean free paths "
             "this is off by tens of percent, which shows as a misfit only if rows lie within one"
@@ -180,22 +187,6 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
         yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
     if result.walk is not None and result.walk.result != "converged":
         yield f"posterior: {result.walk.result}"
-
-
-def _estimated(result: MediumPosterior) -> Iterator[str]:
-    """Yield a line on errors of data that are themselves estimates."""
-    fit = result.fit
-    yield (
-        f"these are estimates of {np.median(fit.data.freedom):.2g} degrees of freedom each, their trend of "
-        f"{fit.data.pooled:.2g}: so ± statistical is widened by a factor of {np.sqrt(fit.widening):.2f}, 95 % is "
-        f"{fit.quantile:.2f} times ± statistical (Student's t) and the p-value below is of an F test; {HELD_IN}"
-    )
-
-
-def _forward(result: MediumPosterior) -> float | None:
-    """Return g of a simulation whose scattering the law takes for isotropic."""
-    layer = result.fit.data.layer
-    return None if layer is None or result.fit.spec.law.setting.g else layer.g or None
 
 
 def p_value(value: float) -> str:
@@ -253,20 +244,7 @@ def _effect(result: MediumPosterior, added: dict[str, float]) -> str:
     return f"it adds {by_lack}, where all other errors are {rest}; 95 % includes it"
 
 
-def _rivals(result: MediumPosterior) -> Iterator[str]:
-    """Yield other media that explain the data as well."""
-    fit, unit = result.fit, result.fit.data.unit
-    for one in fit.rivals:
-        values = rival_values(fit, one)
-        told = ", ".join(f"{name} {values[name]:.3g} {unit_of(name, unit)}".rstrip() for name in RIVALLED)
-        yield (
-            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
-            "both: measure nearer to the beam, or the total reflectance, or the scale"
-        )
-
-
 def _oblique(result: MediumPosterior) -> Iterator[str]:
-    """Yield lines on the centre of oblique light: whether it is explained, and known well where it was measured."""
     fit, unit = result.fit, result.fit.data.unit or "units of r"
     one = fit.spec.oblique
     if one is None:
@@ -283,7 +261,6 @@ def _oblique(result: MediumPosterior) -> Iterator[str]:
 
 
 def _beam(result: MediumPosterior) -> Iterator[str]:
-    """Yield lines on the beam that was assumed, and whether another one would matter."""
     fit, width = result.fit, result.width
     unit = fit.data.unit or "units of r"
     if fit.spec.instrument.beam is not None:
@@ -317,14 +294,16 @@ def _narrowed(fit: MediumFit) -> str:
 
 
 def _medium(result: MediumPosterior) -> Iterator[str]:
-    """Yield lines on n and g: known as ranges, or assumed."""
     spec, there, unit = result.fit.spec, result.tissue, result.fit.data.unit
     if spec.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
         yield f"known as ranges: {known}; {_narrowed(result.fit)}"
     if there is not None:
         names = spec.assumed
-        here, other = (_named(names, one) for one in (spec.law.setting, there.setting))
+        here, other = (
+            " and ".join(f"{name} = {getattr(one, name):g}" for name in names)
+            for one in (spec.law.setting, there.setting)
+        )
         told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
         yield (
             f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
@@ -332,12 +311,7 @@ def _medium(result: MediumPosterior) -> Iterator[str]:
         )
 
 
-def _named(names: tuple[str, ...], setting: Setting) -> str:
-    return " and ".join(f"{name} = {getattr(setting, name):g}" for name in names)
-
-
 def _scale(result: MediumPosterior) -> Iterator[str]:
-    """Yield lines on a free scale that no reflectance has, and a length that the data do not reach."""
     fit = result.fit
     scale, mfp, r = fit.values["scale"], fit.values["l"], fit.data.r
     free = "scale" in result.moving and fit.spec.scale is None and fit.data.unit
@@ -352,9 +326,7 @@ def _scale(result: MediumPosterior) -> Iterator[str]:
 
 def _identifiability(result: MediumPosterior) -> Iterator[str]:
     identifiability, advice, unit = result.identifiability, result.advice, result.fit.data.unit
-    if identifiability is None or advice is None:
-        return
-    if identifiability.all_identified:
+    if identifiability is None or advice is None or identifiability.all_identified:
         return
     if identifiability.trades and identifiability.pair is not None:
         first, second = identifiability.pair
@@ -371,3 +343,184 @@ def _identifiability(result: MediumPosterior) -> Iterator[str]:
     for name, error in (identifiability.loose if result.identified else {}).items():  # no errors at an edge
         yield f"  {name} is known to {100 * min(error, 99.0):.0f} %" + (" or worse" if error > 99 else "")
     yield f"  most informative additional measurement: {described(advice.candidates[0], unit or 'units of r')}"
+
+
+# Layers
+
+UNKNOWN = "not identified"
+MOST = 9.0  # relative error, as a logarithm, beyond which a product is not known at all
+
+
+def layers_tables(fit: LayersFit, title: str) -> list[RenderableType]:
+    """Return what is free, with errors and correlations; and the products of powers that the data know, best first."""
+    unit = fit.data.unit or "unit of r"
+    free = {
+        "": fit.names,
+        "value": [to_error(value, value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
+        "±": [significant(value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
+        "95 %": [
+            UNKNOWN if name in fit.loose else interval(ends)
+            for name, ends in zip(fit.names, fit.intervals.tolist(), strict=True)
+        ],
+        "unit": ["" if name == "scale" else unit if name[0] == "d" else f"1/{unit}" for name in fit.names],
+    }
+    for at, name in enumerate(fit.names[:-1]):
+        free[name] = [f"{fit.correlation[row, at]:.2f}" if row > at else "" for row in range(len(fit.names))]
+    caption = "±: from the errors of the data, wider where they do not explain the residuals; right: correlations"
+    products = {
+        "product": [fit.product(at) for at in range(len(fit.products))],
+        "known to": [f"{100 * error:.2g} %" if error < MOST else ABSENT for _, error in fit.products],
+    }
+    parts = [column_table(title, free, caption, left=("", "unit"))]
+    if len(fit.names) > 1:
+        parts.append(column_table("What the data know, best first", products, left=("product",)))
+    return list(parts)
+
+
+def layers_lines(fit: LayersFit) -> Iterator[str]:
+    """Yield a sentence each on what was held, the goodness of fit, and what is not identified."""
+    if fit.result != "converged":
+        yield f"the fit failed: {fit.result}"
+    for number, layer in enumerate(fit.medium.layers, start=1):
+        thick = "endless" if math.isinf(layer.thickness) else f"d {layer.thickness:.4g}"
+        yield f"layer {number}: n {layer.n:g}, mu_a {layer.mu_a:.4g}, mu_s {layer.mu_s:.4g}, {thick}"
+    yield (
+        f"chi-square {fit.chi2:.1f} for {fit.freedom} degrees of freedom"
+        f"{' (at most: the errors are bounds)' if fit.data.bounded else ''}, p-value {p_value(fit.chance)}: "
+        + ("THESE LAYERS DO NOT EXPLAIN THE DATA" if fit.chance < DETECTED else "no misfit is detected")
+    )
+    for name in fit.loose:
+        yield f"{name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; hold it, or measure elsewhere"
+
+
+def layers_content(fit: LayersFit) -> dict[str, Any]:
+    """Return all results as JSON content."""
+    data = fit.data
+    content = {
+        "data": {"file": data.source, "sha256": data.digest, "unit": data.unit, "inner": data.inner,
+                 "outer": data.outer, "value": data.value, "sigma": data.sigma, "notes": data.notes},
+        "light": fit.light,
+        "setting": fit.premises.setting,
+        "beam": None if fit.premises.instrument.beam is None else fit.premises.instrument.beam.words,
+        "start": fit.start,
+        "medium": fit.medium,
+        "free": fit.names,
+        "values": fit.values,
+        "relative_errors": fit.errors,
+        "intervals_95": fit.intervals,
+        "correlation": fit.correlation,
+        "products": [{"exponents": powers, "relative_error": error} for powers, error in fit.products],
+        "chi2": fit.chi2,
+        "freedom": fit.freedom,
+        "p_value": fit.chance,
+        "not_identified": fit.loose,
+        "result": fit.result,
+        "versions": record.versions(),
+    }  # fmt: skip
+    return dict(record.plain(content))
+
+
+# Photographs of a spot
+
+MEDIUM = ("mu_s'", "mu_a", "alpha", "l", "A")
+UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm", "A": ""}
+REMEDY = "photograph cards, or expose longer"
+CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
+
+
+def photo_tables(photo: Photo) -> list[RenderableType]:
+    """Return a line a colour and quantity, with what such photographs can know at best."""
+    rows = []
+    for colour, fit in photo.fits.items():
+        for name in MEDIUM:
+            value, error = fit.values[name], fit.errors[name]
+            best = photo.bounds[colour].get(name)
+            rows.append((
+                colour if name == MEDIUM[0] else "", name, to_error(value, error), significant(error),
+                interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+            ))  # fmt: skip
+    title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
+    caption = (
+        "±: from the scatter over sectors, a correlated 1 %, and what is known of beam, surface, glare and scale; "
+        "at best: by Fisher's information of such rings and of what is known"
+    )
+    header = ("colour", "", "value", "±", "95 %", "at best", "unit")
+    return [row_table(title, header, rows, caption, left=("colour", "", "unit"))]
+
+
+def photo_lines(photo: Photo) -> Iterator[str]:
+    """Yield a sentence each on sensor, spot, surface and lens, the goodness of fit, and what is not identified."""
+    shot = photo.shot
+    yield f"scale: {photo.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
+    if len(shot.sources) == 1:
+        yield "one exposure does not tell gain and read noise: one electron a step is taken for both"
+    else:
+        yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
+        yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times.value))
+    yield from photo.notes
+    for colour, fit in photo.fits.items():
+        x = dict(zip(fit.shot.names, fit.x, strict=True))
+        glare = sum(value for name, value in x.items() if name.startswith("glare"))
+        lens = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
+        widened = f"MISFIT, for which errors are widened by a factor of {fit.widening:.1f}"
+        verdict = widened if fit.chance < DETECTED else "no misfit is detected"
+        yield (
+            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {lens}; chi-square {fit.chi2:.1f} "
+            f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
+        )
+        if not fit.converged:
+            yield f"{colour}: NO ANSWER: {fit.result}"
+        for one in fit.rivals:
+            values = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in (*MEDIUM[:2], "A"))
+            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {values}; chi-square {one.chi2 - fit.chi2:+.1f}"
+        for name in MEDIUM[:2]:
+            if not fit.errors[name] < LOOSE * fit.values[name]:
+                yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
+    if not photo.cards:
+        first, *_ = photo.fits.values()
+        halos = first.shot.beliefs.halos
+        yield (
+            f"no card was photographed, so the shape of glare is not known: it is a mixture of halos {halos[0]:.3g} to "
+            f"{halos[-1]:.3g} mm wide; {CARDS}"
+        )
+
+
+def photo_content(photo: Photo) -> dict[str, Any]:
+    """Return all results as JSON content."""
+    content = {
+        "shots": photo.shot.sources,
+        "times": photo.shot.times.value,
+        "sensor": vars(photo.shot.sensor),
+        "spot": vars(photo.shot.spot),
+        "scale": {"matrix": photo.plate.matrix, "words": photo.plate.words},
+        "setting": photo.setting,
+        "notes": photo.notes,
+        "colours": {
+            colour: {
+                "values": fit.values,
+                "errors": fit.errors,
+                "at_best": photo.bounds[colour],
+                "coordinates": dict(zip(fit.shot.names, fit.x.tolist(), strict=True)),
+                **{name: getattr(fit, name) for name in ("chi2", "freedom", "chance", "converged", "result")},
+                "rivals": [one.values | {"chi2": one.chi2} for one in fit.rivals],
+                **{name: getattr(fit.shot.medium, name) for name in ("inner", "outer", "value", "covariance")},
+            }
+            for colour, fit in photo.fits.items()
+        },
+        "versions": record.versions(),
+    }
+    return dict(record.plain(content))
+
+
+def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[RenderableType]:
+    """Return what a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
+    rows = [
+        (setup, colour, *(f"{100 * errors[name]:.1f} %" for name in MEDIUM[:2]))
+        for setup, by_colour in bounds.items()
+        for colour, errors in by_colour.items()
+    ]
+    caption = (
+        "by Fisher's information of rings of exact light that scatter by 0.3 %, a correlated 1 %, and what a fit "
+        "takes for known of surface, glare and lens"
+    )
+    return [row_table("At best", ("photographs", "colour", *MEDIUM[:2]), rows, caption, left=("photographs", "colour"))]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from rich.console import RenderableType
 from rich.text import Text
 
@@ -21,13 +21,12 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
-from profilefit.laws.base import Sampler
 from profilefit.recipes.catalogue import LoadedLaw, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.targets import albedo_values
-from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant, span, spark
+from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, row_table, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check
 from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.markdown import markdown_table
@@ -61,44 +60,26 @@ class MeasuredSampler:
     exact_error: Floats
 
 
-def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
-    """Yield the items, without any progress shown."""
-    del title, total
-    return items
-
-
 def for_each(
-    measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track = untracked, title: str = ""
+    measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track | None = None, title: str = ""
 ) -> list[Measured]:
     """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(track(pool.map(measure, laws), title, len(laws)))
-
-
-def measured_profile(named: LoadedLaw, alpha: ArrayLike = ALBEDOS) -> Quality:
-    """Return the measures of a profile law at `alpha` (m,)."""
-    return profile_quality(named.law, alpha)
-
-
-def measured_map(named: LoadedLaw) -> AlbedoQuality:
-    """Return the measures of an A -> alpha map."""
-    return albedo_quality(named.law)
+        results = pool.map(measure, laws)
+        return list(track(results, title, len(laws)) if track else results)
 
 
 def measured_samplers(named: LoadedLaw, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
     """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if named.law.entry.has_text else SLOW_ALBEDOS)
-    samplers = []
+    samplers, xi, target = [], np.linspace(0.0, LAST_SHARE, SHARES), ExactTarget(named.setting)
     for name, sampler in named.law.in_reduced().samplers.items():
-        errors = np.array([_exact_error(named.law.samplers[name], float(value)) for value in albedos])
-        samplers.append(MeasuredSampler(named, name, sampler_quality(sampler, albedos), errors))
+        errors = []
+        for value in albedos:
+            drawn = drawn_by(named.law.samplers[name], xi, float(unreduced(value, named.setting.g)), target)
+            errors.append(np.max(np.abs(drawn - xi)))
+        samplers.append(MeasuredSampler(named, name, sampler_quality(sampler, albedos), np.array(errors)))
     return samplers
-
-
-def _exact_error(sampler: Sampler, reduced: float) -> float:
-    xi, setting = np.linspace(0.0, LAST_SHARE, SHARES), sampler.law.setting
-    share = drawn_by(sampler, xi, float(unreduced(reduced, setting.g)), ExactTarget(setting))
-    return float(np.max(np.abs(share - xi)))
 
 
 INFINITE = "∞"
@@ -122,17 +103,19 @@ CAPTION = (
 
 def sampler_tables(qualities: Mapping[str, SamplerQuality]) -> list[RenderableType]:
     """Return a table a sampler, by albedo, the worst last; what the columns are stands under the last."""
-    names = list(qualities)
-    return [_table(name, qualities[name], CAPTION if name == names[-1] else "") for name in names]
+    parts: list[RenderableType] = []
+    for name, quality in qualities.items():
+        columns = {"α": [*(f"{alpha:.3f}" for alpha in quality.alpha), "worst"]}
+        for header, measure in COLUMNS.items():
+            values = getattr(quality, measure)
+            columns[header] = on_the_point([*(sampler_number(float(value)) for value in values), _worst(values)])
+        caption = CAPTION if len(parts) == len(qualities) - 1 else ""
+        parts.append(column_table(f"Sampler: {name}", columns, caption, left=("α",)))
+    return parts
 
 
-def _table(name: str, quality: SamplerQuality, caption: str) -> RenderableType:
-    columns = {"α": [*(f"{alpha:.3f}" for alpha in quality.alpha), "worst"]}
-    for header, measure in COLUMNS.items():
-        values: NDArray[np.float64] = getattr(quality, measure)
-        worst = values[np.argmax(np.abs(values))]
-        columns[header] = on_the_point([sampler_number(float(value)) for value in [*values, worst]])
-    return column_table(f"Sampler: {name}", columns, caption, left=("α",))
+def _worst(values: Floats) -> str:
+    return sampler_number(float(values[np.argmax(np.abs(values))]))
 
 
 def sampler_number(value: float) -> str:
@@ -152,7 +135,7 @@ SCALES: Mapping[str, tuple[float, str]] = {
     "mse": (BILLIONTHS, " [1e-9 / mfp²]"),
     "r2": (1.0, ""),
 }
-MAP_HEADERS = ("δA", "δα", "√(1-α)", "rises", "α(1)", "fold")
+MAP_HEADERS = ("map", "light", "n", "δA", "δα", "√(1-α)", "rises", "α(1)", "fold", "α(0)")
 NOTHING = "None of these records holds a law that can be measured against the exact half space."
 
 
@@ -170,7 +153,7 @@ def measured(
     names: Names = None,
     alpha: Floats = ALBEDOS,
     sampled_alpha: Sequence[float] | None = None,
-    track: Track = untracked,
+    track: Track | None = None,
 ) -> Qualities:
     """Measure profiles by setting, then maps, then samplers.
 
@@ -180,8 +163,8 @@ def measured(
     records = Records.of(folder)
     profiles, maps, sampled = (find(records, names, False) for find in (profile_laws, albedo_laws, sampled_laws))
     profiles, sampled = (sorted(laws, key=lambda one: _order(one.setting)) for laws in (profiles, sampled))
-    qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
-    of_maps = for_each(measured_map, maps, track, "maps")
+    qualities = for_each(lambda one: profile_quality(one.law, alpha), profiles, track, "profiles")
+    of_maps = for_each(lambda one: albedo_quality(one.law), maps, track, "maps")
     samplers = for_each(lambda one: measured_samplers(one, sampled_alpha), sampled, track, "samplers")
     return Qualities(
         profiles=list(zip(profiles, qualities, strict=True)),
@@ -231,15 +214,11 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
     def laws() -> str:
         profiles = profile_laws(folder, matched=False)
-        return markdown_laws(list(zip(profiles, for_each(measured_profile, profiles), strict=True)))
+        qualities = for_each(lambda one: profile_quality(one.law, ALBEDOS), profiles)
+        return markdown_laws(list(zip(profiles, qualities, strict=True)))
 
-    def samplers() -> str:
-        return markdown_samplers(
-            list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder, matched=False))))
-        )
-
-    claims = {"claims": lambda: markdown_claims(folder / EVIDENCE)}
-    return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder), **claims}
+    check, claims = (lambda: markdown_check(folder)), (lambda: markdown_claims(folder / EVIDENCE))
+    return {"laws": laws, "check": check, "claims": claims}
 
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
@@ -254,25 +233,13 @@ def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
     )
     rows = [
         (
-            *_home(one),
+            *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
             str(len(one.law.constant_names())),
             *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
         )
         for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
     ]
     return markdown_table(header, rows)
-
-
-def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
-    """Return a line a sampler, each measure at its worst albedo."""
-    header = ("law", "constants", "light", "n", "sampler", *_sampler_headers())
-    rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
-    return markdown_table(header, rows)
-
-
-def _home(named: LoadedLaw) -> tuple[str, str, str, str]:
-    """Return law, constants, light, n."""
-    return named.name, named.constants or "none", named.setting.illumination, f"{named.setting.n:g}"
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
@@ -294,32 +261,25 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
 
 
 def _map_table(measured: Sequence[tuple[LoadedLaw, AlbedoQuality]]) -> RenderableType:
-    maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
-    columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
-    columns["n"] = [f"{one.setting.n:g}" for one in maps]
-    for header, measure in zip(MAP_HEADERS, OF_MAP, strict=True):
-        columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
-    columns["α(0)"] = [albedo_number("at_one", one.law.alpha(0.0)) for one in maps]
+    rows = [
+        (
+            *(one.label, one.setting.illumination, f"{one.setting.n:g}"),
+            *(albedo_number(measure, getattr(quality, measure)) for measure in OF_MAP),
+            albedo_number("at_one", one.law.alpha(0.0)),
+        )
+        for one, quality in measured
+    ]
     caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
-    return column_table("Maps between A and α", columns, caption, left=("light",), fold=("map",))
+    return row_table("Maps between A and α", MAP_HEADERS, rows, caption, left=("light",), fold=("map",))
 
 
 def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
-    columns: dict[str, list[str]] = {"law: sampler": [_sampler_label(one) for one in samplers]}
-    cells = [_sampler_cells(one) for one in samplers]
-    for i, header in enumerate(_sampler_headers("\n")):
-        columns[header] = [row[i] for row in cells]
+    rows = [
+        (_sampler_label(s), *map(_worst, (s.exact_error, *(getattr(s.quality, name) for name in COLUMNS.values()))))
+        for s in samplers
+    ]
     caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
-    return column_table(f"Samplers, {setting}", columns, caption, fold=("law: sampler",))
-
-
-def _sampler_headers(space: str = " ") -> list[str]:
-    return ["exact", *(header.replace("\n", space) for header in COLUMNS)]
-
-
-def _sampler_cells(sampler: MeasuredSampler) -> list[str]:
-    measures = [sampler.exact_error, *(getattr(sampler.quality, measure) for measure in COLUMNS.values())]
-    return [sampler_number(float(values[np.argmax(np.abs(values))])) for values in measures]
+    return row_table(f"Samplers, {setting}", ("law: sampler", "exact", *COLUMNS), rows, caption, fold=("law: sampler",))
 
 
 def _sampler_label(sampler: MeasuredSampler) -> str:

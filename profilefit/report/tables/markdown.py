@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
 import numpy as np
 
 from profilefit.fitting.measures import MEASURES, OF_MAP
-from profilefit.recipes.paper.reproduction import LENGTH, PUBLISHED
+from profilefit.recipes.reproduction import LENGTH, PUBLISHED
 from profilefit.report.records import (
-    ERRORS,
     Content,
     at_index,
     converged,
@@ -28,6 +27,7 @@ from profilefit.report.tables.quality_tables import albedo_number
 
 OF_THE_PAPER = ("liang", "burley", "rational")  # its own laws, and those it is compared with
 PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
+DISTANCES = ("constant_distance", "curve_distance")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
@@ -43,8 +43,7 @@ SHORT |= {("hazard-refracting", "regenerated")}
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
     """Return every constant of every record: printed, regenerated, and its errors; a failed fit has no row."""
-    present = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
-    known = {key: word for key, word in ERRORS.items() if key in present}
+    known = known_errors(one for content in _fits(records).values() for one in content["constants"].values())
     header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
     rows: list[Sequence[str]] = []
     failures = []
@@ -57,27 +56,22 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
             if not values.get("free", True):
                 errors = ["held", *[ABSENT] * (len(known) - 1)]
             published = values.get("published")
-            rows.append(
-                (
-                    name,
-                    EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT,
-                    constant,
-                    ABSENT if published is None else f"{published:g}",
-                    to_error(values["regenerated"], largest_error(values)),
-                    *errors,
-                )
-            )
+            rows.append((
+                name, EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT, constant,
+                ABSENT if published is None else f"{published:g}",
+                to_error(values["regenerated"], largest_error(values)), *errors,
+            ))  # fmt: skip
     note = "Digits end where the largest error does; constants are correlated, so compute with the record's own."
     return "\n\n".join([markdown_table(header, rows), *failures, note])
 
 
-def markdown_hazard(records: Mapping[str, Content]) -> str:
+def _hazard(records: Mapping[str, Content]) -> str:
     """Return the constants of the hazard law in every setting, a record a column, and its worst errors there.
 
     Records of n = 1 come first, then those that span the indices of a surface that refracts.
     """
-    fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
-    fitted = {name: c for name, c in fits.items() if converged(c)}
+    of_hazard = {name: c for name, c in _fits(records).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
+    fitted = {name: c for name, c in of_hazard.items() if converged(c)}
     forms: dict[tuple[str, ...], dict[str, Content]] = {}
     for name, content in sorted(fitted.items(), key=lambda item: bool(item[1].get("indices"))):
         forms.setdefault(tuple(content["constants"]), {})[name] = content
@@ -87,29 +81,17 @@ def markdown_hazard(records: Mapping[str, Content]) -> str:
 def _hazard_constants(fitted: Mapping[str, Content]) -> str:
     """Return records of the same constants, a column each."""
     names = next(iter(fitted.values()))["constants"]
-    rows = [
-        (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
-        for columns in [list(fitted.values())]
-        for name in names
-    ]
+    rows = [("n", *map(index_words, fitted.values()))]
+    for name in names:
+        of = [content["constants"][name] for content in fitted.values()]
+        rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
     for measure in ("rel", "ks"):
         worst_of = (regenerated_worst(c, measure) for c in fitted.values())
         rows.append((f"{measure}, worst", *map(significant, worst_of)))
-    rows.insert(0, ("n", *map(index_words, fitted.values())))
     return markdown_table(("constant", *fitted), rows)
 
 
-def markdown_quality(records: Mapping[str, Content]) -> str:
-    """Return measures of every set of constants, mean and worst over alpha, of A -> alpha maps and inversions."""
-    parts = [
-        _profile_quality(records),
-        _inversion_quality(records),
-        _albedo_quality(records),
-    ]
-    return "\n\n".join(part for part in parts if part)
-
-
-def markdown_readings(records: Mapping[str, Content]) -> str:
+def _readings(records: Mapping[str, Content]) -> str:
     """Return the reading nearest to print of each equation: its choices, its result, and the verdict."""
     header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
     readings = [r for content in records.values() for r in content.get("readings") or ()]
@@ -122,8 +104,7 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
             best[equation]["choices"],
             ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
             ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
-            _percent(best[equation]["constant_distance"]),
-            _percent(best[equation]["curve_distance"]),
+            *(ABSENT if (far := best[equation][key]) is None else f"{far:.1%}" for key in DISTANCES),
             best[equation]["verdict"],
         )
         for equation in dict.fromkeys(reading["equation"] for reading in readings)
@@ -133,19 +114,15 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
 
 def sections(records: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
-    paper = {
-        name: content
-        for name, content in records.items()
-        if _is_searchlight(content) and content["law"] in OF_THE_PAPER
-    }
+    paper = {name: c for name, c in records.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
     tables = {
-        "short": _short_quality(records),
-        "quality": _profile_quality(paper),
+        "short": _short(records),
+        "quality": _quality(_measured(paper, "rel"), PROFILE_MEASURES),
         "constants": markdown_constants(paper),
-        "hazard": markdown_hazard(records),
-        "readings": markdown_readings(records),
-        "inversion": _inversion_quality(records),
-        "maps": _albedo_quality(records),
+        "hazard": _hazard(records),
+        "readings": _readings(records),
+        "inversion": _quality(_measured(records, "inversion_error"), ("inversion_error",)),
+        "maps": _maps(records),
     }
     return {name: text for name, text in tables.items() if text}
 
@@ -160,87 +137,61 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def _table_of(
-    records: Mapping[str, Content], needed: str, header: Iterable[str], cells: Callable[[Content], Iterable[str]]
-) -> str:
-    """Return a row for each set of constants that a measure is known of; nothing where there is none."""
-    rows = [(owner, which, *cells(values)) for owner, which, values in _measured(records, needed)]
-    return markdown_table(("record", "constants", *header), rows) if rows else ""
-
-
-def _profile_quality(records: Mapping[str, Content]) -> str:
-    header = (f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst"))
-    return _table_of(
-        records, "rel", header, lambda of: [t for key in PROFILE_MEASURES for t in _mean_and_worst(key, of.get(key))]
-    )
-
-
-def _short_quality(records: Mapping[str, Content]) -> str:
-    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
-    searchlight = {name: c for name, c in records.items() if _is_searchlight(c) or _is_refracting(c)}
-    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+def _quality(sets: Sequence[tuple[str, str, Content]], measures: Sequence[str], of: str = "record") -> str:
+    """Return a row for each set of constants: mean and worst over alpha of these measures; nothing without a set."""
+    header = (of, "constants", *(f"{key.replace('_', ' ')} {end}" for key in measures for end in ("mean", "worst")))
     rows = [
-        (
-            owner + at_index(records.get(owner, {})),
-            which,
-            *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])),
-        )
-        for owner, which, values in sorted(chosen, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+        (owner, which, *(text for key in measures for text in _mean_and_worst(key, values.get(key))))
+        for owner, which, values in sets
     ]
-    header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
 
 
-def _inversion_quality(records: Mapping[str, Content]) -> str:
-    key, header = "inversion_error", ("inversion error mean", "inversion error worst")
-    return _table_of(records, key, header, lambda of: _mean_and_worst(key, of[key]))
+def _short(records: Mapping[str, Content]) -> str:
+    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
+    searchlight = {name: c for name, c in records.items() if _is_searchlight(c, spanning=True)}
+    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+    return _quality([(one + at_index(records.get(one, {})), *rest) for one, *rest in chosen], ("rel", "ks"), "law")
 
 
-def _albedo_quality(records: Mapping[str, Content]) -> str:
-    header = (MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP)
-    return _table_of(records, "delta_A", header, lambda of: (albedo_number(name, of[name]) for name in OF_MAP))
+def _maps(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
+    rows = [
+        (owner, which, *(albedo_number(name, values[name]) for name in OF_MAP))
+        for owner, which, values in _measured(records, "delta_A")
+    ]
+    return markdown_table(header, rows) if rows else ""
 
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
     """Return (record or law, set, measures) of each set once, printed constants of a law only once."""
-    sets: list[tuple[str, str, Content]] = []
+    sets: dict[tuple[str, str], Content] = {}
     for name, content in _fits(records).items():
         for which in measured_sets(content):
             regenerated = which == "regenerated"
             owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
-            values = content["quality"][which]
-            failed = regenerated and not converged(content)
-            if measure in values and not failed and (owner, which) not in [item[:2] for item in sets]:
-                sets.append((owner, which, values))
-    return sets
+            if measure in content["quality"][which] and (converged(content) or not regenerated):
+                sets.setdefault((owner, which), content["quality"][which])
+    return [(*place, values) for place, values in sets.items()]
 
 
 def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
     if values is None:  # photons do not say it
         return ABSENT, ABSENT
-    return _number(measure, float(np.mean(values))), _number(measure, MEASURES[measure].worst(values))
+    mean, worst = float(np.mean(values)), MEASURES[measure].worst(values)
+    return (f"{mean:.4f}", f"{worst:.4f}") if measure == "r2" else (significant(mean), significant(worst))
 
 
-def _number(measure: str, value: float) -> str:
-    return f"{value:.4f}" if measure == "r2" else significant(value)
-
-
-def _is_searchlight(content: Content) -> bool:
+def _is_searchlight(content: Content, spanning: bool = False) -> bool:
+    """Return whether a record is of a searchlight on a matched surface, or `spanning` on one of many indices."""
     setting = content.get("setting") or {}
-    return (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
-
-
-def _is_refracting(content: Content) -> bool:
-    """Return whether it spans the indices of a surface under a searchlight."""
-    return bool(content.get("indices")) and content["setting"]["illumination"] == "searchlight"
+    matched = setting.get("n") == 1 or bool(spanning and content.get("indices"))
+    return matched and setting.get("illumination") == "searchlight"
 
 
 def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
     return {name: content for name, content in records.items() if "constants" in content}
-
-
-def _percent(share: float | None) -> str:
-    return ABSENT if share is None else f"{share:.1%}"
 
 
 def _text(cell: str) -> str:

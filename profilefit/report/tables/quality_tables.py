@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -44,13 +45,11 @@ def worst_measures(content: Content) -> dict[str, dict[str, float]]:
     quality = content["quality"]
     names = [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
     keys = [key for key in (*OF_PROFILE, "delta_A", "largest_s") if key in quality["regenerated"]]
-    return {key: {name: _worst(content, name, key) for name in names} for key in keys}
-
-
-def _worst(content: Content, name: str, key: str) -> float:
-    if name == "regenerated":
-        return regenerated_worst(content, key)
-    return MEASURES[key].worst(content["quality"][name][key])
+    worst: dict[str, dict[str, float]] = {key: {} for key in keys}
+    for key, name in product(keys, names):
+        is_law = name == "regenerated"
+        worst[key][name] = regenerated_worst(content, key) if is_law else MEASURES[key].worst(quality[name][key])
+    return worst
 
 
 def spark_table(content: Content) -> list[RenderableType]:
@@ -69,31 +68,29 @@ def spark_table(content: Content) -> list[RenderableType]:
         "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
     }
     caption = "One logarithmic scale for each measure, from its least to its worst"
-    return [
-        column_table(
-            "Errors over α" + at_index(content) + _failed(content), columns, caption, left=("", list(columns)[1])
-        )
-    ]
+    title = f"Errors over α{at_index(content)}{_failed(content)}"
+    return [column_table(title, columns, caption, left=("", list(columns)[1]))]
 
 
 def quality_tables(content: Content) -> list[RenderableType]:
     """Return measures by albedo for every set of constants, or those of an A -> alpha map, and by index."""
-    first = [index_table(content)] if by_index(content) else []
+    first = [_index_table(content)] if by_index(content) else []
     if measures(content, "delta_A"):
-        return [*first, _albedo_table(content)]
+        columns = {"": [MEASURES[measure].formula for measure in OF_MAP]}
+        for name in measured_sets(content):
+            columns[name] = [albedo_number(measure, content["quality"][name][measure]) for measure in OF_MAP]
+        return [*first, column_table(f"Quality of the map{at_index(content)}{_failed(content)}", columns)]
     sets = [content["quality"][name] for name in measured_sets(content)]
     groups = [[key for key in group if all(values_of(one, key) is not None for one in sets)] for group in TABLES]
     return [*first, *(_table(content, group) for group in groups if group)]
 
 
-def index_table(content: Content) -> RenderableType:
+def _index_table(content: Content) -> RenderableType:
     """Return the worst measures over alpha at each index that a record was judged at."""
     worst = by_index(content)
     columns = {name: [f"{value:g}" for value in worst[name]] for name in SPANS if name in worst}
-    for measure in INDEX_MEASURES:
-        if measure in worst:
-            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in worst[measure]])
     known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in worst]
+    columns |= {one.header: on_the_point(list(map(significant, worst[one.name]))) for one in known}
     caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
     title = "By refractive index" + (" and g" if "g" in worst else "")
     return column_table(title + _failed(content), columns, caption, left=("n",))
@@ -111,17 +108,8 @@ def _table(content: Content, group: list[str]) -> RenderableType:
             header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
     caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
-    return column_table(
-        "Quality at held-out albedos" + at_index(content) + _failed(content), columns, caption, left=("α",)
-    )
-
-
-def _albedo_table(content: Content) -> RenderableType:
-    quality = content["quality"]
-    columns = {"": [MEASURES[measure].formula for measure in OF_MAP]}
-    for name in measured_sets(content):
-        columns[name] = [albedo_number(measure, quality[name][measure]) for measure in OF_MAP]
-    return column_table("Quality of the map" + at_index(content) + _failed(content), columns)
+    title = f"Quality at held-out albedos{at_index(content)}{_failed(content)}"
+    return column_table(title, columns, caption, left=("α",))
 
 
 def albedo_number(measure: str, value: Any) -> str:

@@ -5,7 +5,10 @@ Cells are `Text`, so that units in brackets are no markup. Every table fits 80 c
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf, log
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -13,17 +16,21 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
-from profilefit.recipes.kinds.stack import PIPELINE as STACK
-from profilefit.recipes.starts import SAME_COST
+from profilefit.recipes import record
+from profilefit.recipes.checks import SAME_COST
+from profilefit.recipes.record import SPANS
+from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
+from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import (
+    SETS,
     TOTAL,
     Content,
     at_index,
     converged,
-    cosine_words,
     index_words,
     known_errors,
     largest_error,
+    measures,
     z_score,
 )
 from profilefit.report.tables.cells import (
@@ -33,14 +40,14 @@ from profilefit.report.tables.cells import (
     on_the_point,
     row_table,
     significant,
+    span,
+    spark,
     to_error,
 )
-from profilefit.report.tables.evidence_tables import evidence_tables
-from profilefit.report.tables.quality_tables import quality_tables, spark_table
-from profilefit.report.tables.stack_table import stack_tables
-from profilefit.report.tables.summary_tables import summary, truth
+from profilefit.report.tables.quality_tables import quality_tables, spark_table, values_of, worst_measures
 
-__all__ = ["constants_table", "record_tables", "summary"]
+if TYPE_CHECKING:
+    from profilefit.recipes.regenerate import Reproduction
 
 Line = tuple[str, RenderableType]
 MEANING_OF_ERROR = {
@@ -55,26 +62,25 @@ DERIVED = {
     "reflectance": ("A", "Total reflectance"),
 }
 TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
+LIMITS = ("energy_limit", "source_limit")  # of a profile, that weigh in its fit
 KINDS = {"statistical": "photon noise", "misfit": "misfit as noise"}
 
 
 def record_tables(content: Content) -> list[RenderableType]:
     """Return everything about one record: where it comes from, constants, the state of fit and chains, quality."""
     if content["pipeline"] == "evidence":
-        return _spaced([_title(content), *evidence_tables(content)])
-    if content["pipeline"] == STACK:
-        return _spaced([_title(content), *stack_tables(content)])
-    parts = [_title(content), constants_table(content), intervals_table(content)]
+        return spaced([title_of(content), *evidence_tables(content)])
+    parts = [title_of(content), constants_table(content), _intervals_table(content)]
     if "derived" in content:
-        parts.append(derived_table(content["derived"], at_index(content)))
+        parts.append(_derived_table(content["derived"], at_index(content)))
     parts.append(fit_facts(content))
     if "stages" in content:
         parts += stage_tables(content["stages"])
-    parts += [*spark_table(content), *quality_tables(content)]
-    return _spaced(parts)
+    return spaced([*parts, *spark_table(content), *quality_tables(content)])
 
 
-def _spaced(parts: list[RenderableType]) -> list[RenderableType]:
+def spaced(parts: Sequence[RenderableType]) -> list[RenderableType]:
+    """Return the parts with a blank line below each."""
     return [Padding(part, (0, 0, 1, 0)) for part in parts]
 
 
@@ -83,12 +89,13 @@ def constants_table(content: Content) -> RenderableType:
     constants = content["constants"]
     rows = list(constants.values())
     columns: dict[str, list[str]] = {}
-    if any(row.get("published") is not None for row in rows):
-        columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")])
+    published = [row.get("published") for row in rows]
+    if any(v is not None for v in published):
+        columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in published])
     columns["\nregenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
-    known = known_errors(constants)
+    known = known_errors(constants.values())
     for place, (key, word) in enumerate(known.items()):
-        texts = on_the_point([significant(value) for value in _each(rows, key)])
+        texts = on_the_point([significant(row.get(key)) for row in rows])
         if place == 0:
             texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
         columns[f"±\n{word}"] = texts
@@ -104,7 +111,7 @@ def constants_table(content: Content) -> RenderableType:
     return column_table(title, {"": list(constants), **columns}, caption)
 
 
-def intervals_table(content: Content) -> RenderableType:
+def _intervals_table(content: Content) -> RenderableType:
     """Return the 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
     chains = content["posterior"]
     if not chains:
@@ -117,7 +124,7 @@ def intervals_table(content: Content) -> RenderableType:
     return row_table("Credible intervals (emcee)", ("", "from", "68 %", "95 %"), rows, left=("", "from"))
 
 
-def derived_table(derived: Content, surface: str = "") -> RenderableType:
+def _derived_table(derived: Content, surface: str = "") -> RenderableType:
     """Return A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
     errors = derived["statistical"], derived["model"]
     both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
@@ -148,26 +155,21 @@ def fit_facts(content: Content) -> RenderableType:
         facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
         lines.append((f"chain, {KINDS.get(kind, kind)}", _verdict(chain["result"])))
         lines.append(("", f"{facts}, {chain['steps']} steps of {chain['walkers']} walkers"))
-    if off := content.get("discrepancy"):
-        lines += _discrepancy(off)
+    if (off := content.get("discrepancy")) and off["amplitude"] is None:
+        lines.append(("discrepancy", _verdict(off["result"])))
+    elif off:  # the Gaussian process that the residuals are taken for
+        amplitude = to_error(off["amplitude"], off["amplitude_error"])
+        reach = f"correlation length {significant(off['length_s'])} in √(1 − α)"
+        if off["length_r"] is not None:
+            reach += f", {significant(off['length_r'])} in ln r"
+        size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
+        lines += [("discrepancy", size), ("", f"{reach}; {off['result']}")]
     if left := content.get("left_out"):
         facts = (
             f"{left['rings']} radial bins and {left['albedos']} albedos left out: too few photons for a standard error"
         )
         lines.append(("data", facts))
     return _facts("Fit", lines + _second_opinions(content))
-
-
-def _discrepancy(off: Content) -> list[Line]:
-    """Return the Gaussian process that the residuals are taken for."""
-    if off["amplitude"] is None:
-        return [("discrepancy", _verdict(off["result"]))]
-    amplitude = to_error(off["amplitude"], off["amplitude_error"])
-    reach = f"correlation length {significant(off['length_s'])} in √(1 − α)"
-    if off["length_r"] is not None:
-        reach += f", {significant(off['length_r'])} in ln r"
-    size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
-    return [("discrepancy", size), ("", f"{reach}; {off['result']}")]
 
 
 def _second_opinions(content: Content) -> list[Line]:
@@ -210,17 +212,14 @@ def stage_tables(stages: Content) -> list[RenderableType]:
     return [row_table(title, header, rows, aligned=header[1:]), _facts("", states)]
 
 
-def _title(content: Content) -> RenderableType:
-    head = Text.assemble((content["name"], "bold"), "  ", content["title"])
-    return Group(head, Padding(_facts("", _provenance(content)), (0, 0, 0, 2)))
-
-
-def _provenance(content: Content) -> list[Line]:
-    setting = content["setting"]
+def title_of(content: Content) -> RenderableType:
+    """Return name and title of a record, and below them what it was fitted to, and how."""
+    setting, protocol = content["setting"], content.get("protocol") or {}
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
-    surface = f"every n in {index_words(content)}" if content.get("indices") else f"n = {setting['n']:g}"
-    g = f"every g in {cosine_words(content)}" if content.get("cosines") else f"g = {setting['g']:g}"
-    light = f"{setting['illumination']}{beam}, {surface}, {g}"
+    light = f"{setting['illumination']}{beam}"
+    for name, ranges in SPANS.items():
+        is_in = f"every {name} in" if content.get(ranges) else f"{name} ="
+        light += f", {is_in} {index_words(content, name)}"
     if content.get("indices"):
         light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
     lines: list[Line] = [
@@ -228,41 +227,29 @@ def _provenance(content: Content) -> list[Line]:
         ("setting", light),
         ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
-    protocol = content.get("protocol") or {}
-    if protocol.get("albedos"):
-        a = protocol["albedos"]
+    if a := protocol.get("albedos"):
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
-    if protocol.get("indices"):
-        lines.append(("indices", ", ".join(f"{n:g}" for n in protocol["indices"])))
-    if protocol.get("cosines"):
-        lines.append(("g", ", ".join(f"{g:g}" for g in protocol["cosines"]) + "; albedos and radii are reduced"))
-    if protocol.get("rings"):
-        lines.append(("bins", _rings(protocol["rings"])))
-    if protocol.get("weighting"):
-        lines.append(("weighting", _weighting(protocol["weighting"])))
-    if protocol.get("held"):
-        lines.append(("held", ", ".join(protocol["held"])))
-    if content.get("note"):
-        lines.append(("note", content["note"]))
-    return lines
-
-
-def _rings(rings: Content) -> str:
-    if rings.get("dr"):
-        text = f"even, {rings['dr']:g} wide, to {rings['last']:g}"
-    else:
-        text = f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
-    trim = rings.get("trim", "none")
-    return text if trim == "none" else f"{text}; trimmed by (6) on {trim}, ε = {rings['epsilon']:g}"
-
-
-def _weighting(weighting: Content) -> str:
-    extras = [
-        f"{key.replace('_', ' ')} × {weighting[key]:g}" for key in ("energy_limit", "source_limit") if weighting[key]
-    ]
-    if weighting.get("shares"):
-        extras.append(f"{weighting['shares']} shares up to {weighting['last_share']:g}")
-    return "; ".join([f"objective {weighting['objective']}", *extras])
+    if indices := protocol.get("indices"):
+        lines.append(("indices", ", ".join(f"{n:g}" for n in indices)))
+    if cosines := protocol.get("cosines"):
+        lines.append(("g", ", ".join(f"{g:g}" for g in cosines) + "; albedos and radii are reduced"))
+    if rings := protocol.get("rings"):
+        even = f"even, {rings['dr']:g} wide, to {rings['last']:g}" if rings.get("dr") else ""
+        text = even or f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
+        if (trim := rings.get("trim", "none")) != "none":
+            text += f"; trimmed by (6) on {trim}, ε = {rings['epsilon']:g}"
+        lines.append(("bins", text))
+    if weighting := protocol.get("weighting"):
+        extras = [f"{key.replace('_', ' ')} × {weighting[key]:g}" for key in LIMITS if weighting[key]]
+        if weighting.get("shares"):
+            extras.append(f"{weighting['shares']} shares up to {weighting['last_share']:g}")
+        lines.append(("weighting", "; ".join([f"objective {weighting['objective']}", *extras])))
+    if held := protocol.get("held"):
+        lines.append(("held", ", ".join(held)))
+    if note := content.get("note"):
+        lines.append(("note", note))
+    head = Text.assemble((content["name"], "bold"), "  ", content["title"])
+    return Group(head, Padding(_facts("", lines), (0, 0, 0, 2)))
 
 
 def _verdict(result: str) -> Text:
@@ -280,5 +267,212 @@ def _facts(title: str, lines: Iterable[Line]) -> RenderableType:
     return table
 
 
-def _each(rows: list[Content], key: str) -> list[float | None]:
-    return [row.get(key) for row in rows]
+BEST = 3  # readings shown of each equation, nearest to print first
+
+
+def evidence_tables(content: Content) -> list[RenderableType]:
+    """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
+    parts = [_readings_of(equation, readings) for equation, readings in _by(content["readings"], "equation").items()]
+    if content["table1"]:
+        parts.append(_table1(content["table1"]))
+    if halves := content.get("halves"):
+        columns = {
+            "material": [f"{row.get('material', ABSENT)}, {row.get('model', '')}" for row in halves],
+            "off": [_share(row.get("off")) for row in halves],
+        }
+        title = "Table 1 as printed: mean of its halves over its whole, less 1"
+        parts.append(column_table(title, columns, left=("material",)))
+    return parts or [Text("This record holds no readings.")]
+
+
+def _readings_of(equation: str, readings: list[Content]) -> RenderableType:
+    best = sorted(readings, key=lambda one: inf if one["curve_distance"] is None else one["curve_distance"])[:BEST]
+    columns = {
+        "verdict": [one["verdict"] for one in best],
+        "curve": [_share(one["curve_distance"]) for one in best],
+        "constants": [_share(one["constant_distance"]) for one in best],
+        "reading, its constants, its evidence": [_reading(one) for one in best],
+    }
+    more = len(readings) - len(best)
+    caption = f"and {more} more in the record, further from print" if more else ""
+    title = f"{equation}: rms distance of the curve and largest distance of a constant from print"
+    return column_table(title, columns, caption, left=("verdict",), fold=("reading, its constants, its evidence",))
+
+
+def _reading(reading: Content) -> str:
+    printed = reading["published"]
+    pairs = ", ".join(
+        f"{name} {value:.4g}" + (f" (printed {printed[name]:g})" if name in printed else "")
+        for name, value in reading["constants"].items()
+    )
+    return "\n".join(part for part in (reading["choices"], pairs, reading.get("evidence")) if part)
+
+
+def _table1(rows: list[Content]) -> RenderableType:
+    """Return every model of each material, at the channel and range that the other law's printed error points to."""
+    shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
+    ranges = [f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT for row in shown]
+    columns = {
+        "material": [
+            f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {size}"
+            for row, size in zip(shown, ranges, strict=True)
+        ],
+        "model": [row.get("model", ABSENT) for row in shown],
+    }
+    for place, part in enumerate(("near half", "far half", "all")):
+        columns[part] = [significant(ratio[place], 3) if place < len(ratio) else ABSENT for ratio in map(_ratio, shown)]
+    caption = (
+        f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
+        "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
+    )
+    return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model",))
+
+
+def _at_its_range(rows: list[Content]) -> list[Content]:
+    known = [row for row in rows if row.get("model") == NORMALIZED_DIFFUSION]
+    if not known:
+        return rows
+    best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf)
+    return [
+        row for row in rows if all(row.get(key) == best.get(key) for key in ("channel", "range_choice", "range_mm"))
+    ]
+
+
+def _ratio(row: Content) -> list[float]:
+    return list(row.get("mse_over_printed", ()))
+
+
+def _share(value: float | None) -> str:
+    return ABSENT if value is None else f"{100 * value:.1f} %"
+
+
+def _by(rows: Iterable[Content], key: str) -> dict[Any, list[Content]]:
+    """Return rows by the values of a key, in order."""
+    groups: dict[Any, list[Content]] = {}
+    for row in rows:
+        groups.setdefault(row.get(key, ABSENT), []).append(row)
+    return groups
+
+
+# All records on one screen: a line each, what was fitted to what, and its worst error before and after.
+
+SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
+FAILED = "FAILED"
+Records = Mapping[str, Content]
+REPRODUCED = "Records made, and the largest moves of their constants from the shipped records"
+REPRODUCED_CAPTION = (
+    "moved: in units of the constant's stated error; at most 0.05 counts as reproduced. relative: as a "
+    "share of the constant. interval: largest move of an interval's end, in units of what the Monte Carlo error of the "
+    f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
+)
+CAPTION = (
+    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
+    "regenerated. "
+    "`profilefit report NAME` has constants, errors and quality by α."
+)
+
+
+# Measure that a kind of records has, by which one knows them -> title, and measures by their headers.
+SUMMARIES = {
+    "rel": ("Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)", {"rel": "rel"}),
+    "inversion_error": ("Inverse cdfs: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
+    "delta_A": ("Maps between A and α", {"max error of A": "delta_A", "of √(1 − α)": "largest_s"}),
+}
+
+
+def summary(records: Records) -> RenderableType:
+    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+    groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
+    readings = {name: content for name, content in records.items() if content["pipeline"] == "evidence"}
+    for name, content in records.items():
+        if name not in readings:
+            is_of = (measure for measure in ("delta_A", "rel") if measures(content, measure))
+            groups[next(is_of, "inversion_error")][name] = content
+    shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
+    if readings:
+        lines = []
+        for content in readings.values():
+            verdicts = [(one["equation"], one["verdict"]) for one in content["readings"]]
+            good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
+            lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
+        columns = {"record": list(readings), "found": lines}
+        shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
+    failures = [
+        Text(f"{name}: {content['fit']['result']}", style="red")
+        for name, content in records.items()
+        if "fit" in content and not converged(content)
+    ]
+    parts = [part for table in shown for part in (table, Text())]
+    return Group(*parts, *failures, Text(CAPTION, style="dim"))
+
+
+def _summary_table(measure: str, records: Records) -> RenderableType:
+    """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
+    title, headers = SUMMARIES[measure]
+    spans = [content.get("indices") for content in records.values()]
+    numbers = [f"{content['setting']['n']:g}" for content in records.values()]
+    columns = {
+        "record": list(records),
+        "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
+        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
+        **{header: [_course(content, key) for content in records.values()] for header, key in headers.items()},
+    }
+    if measure == "rel":
+        columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in records.values()]
+    if measure != "delta_A":
+        rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in records.values()]
+        columns["over α"] = [spark(row, span(rows), SPARK) for row in rows]
+    return column_table(title, columns, left=("record", "over α"))
+
+
+def outcome(path: Path) -> dict[str, Any]:
+    """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
+    content = record.read(path)
+    body: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
+    if "fit" not in content:
+        return {**body, "readings": len(content.get("readings", []))}
+    kept = ("published", "regenerated", *ERRORS)
+    constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
+    return {**body, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
+
+
+def reproduced(
+    seconds: Mapping[str, float], paths: Mapping[str, Path], reproductions: Mapping[str, Reproduction | None]
+) -> RenderableType:
+    """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
+    rows = []
+    for name, spent in seconds.items():
+        one, content = reproductions.get(name), record.read(paths[name]) if name in paths else {"fit": {"result": ""}}
+        result = content["fit"]["result"] if "fit" in content else f"{len(content.get('readings', []))} readings"
+        numbers = (one.moved, one.relative, one.intervals) if one else ()
+        cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
+        rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
+    headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
+    return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
+
+
+def verdict(reproductions: Sequence[Reproduction]) -> str:
+    """Return one line: how many records are reproduced, and the largest move of a constant."""
+    count, moved = sum(one.is_reproduced for one in reproductions), max(one.moved for one in reproductions)
+    return f"{count} of {len(reproductions)} records reproduced; largest move {moved:.1g} of a stated error"
+
+
+def photons_text(content: Content) -> str:
+    """Return how many photons a record was fitted to; – where its light is exact."""
+    photons = (content.get("truth") or {}).get("photons")
+    return ABSENT if photons is None else f"{photons:.3g}".replace("e+0", "e")
+
+
+def truth(content: Content) -> str:
+    """Return what a record was fitted to: the exact solution, or so many photons."""
+    text = photons_text(content)
+    return f"{text} photons" if text != ABSENT else str((content.get("truth") or {}).get("kind", ABSENT))
+
+
+def _course(content: Content, measure: str) -> str:
+    """Return the worst error of each set in turn; a failed fit has no law to measure."""
+    worst = worst_measures(content).get(measure, {})
+    shown = [significant(worst[name]) for name in SETS if name in worst]
+    if not converged(content):
+        shown.append(FAILED)
+    return " → ".join(shown)

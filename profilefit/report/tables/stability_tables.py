@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,15 @@ from rich.text import Text
 
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.studies.stability.atlas import Findings
-from profilefit.studies.stability.cells import Cells, Verdict, cell_count
+from profilefit.studies.stability.cells import Cells, Region, Verdict
 from profilefit.studies.stability.fit_cases import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
-from profilefit.studies.stability.regions import Region
 
-COLUMNS = (
-    "law", "quantity", "precision", "cells", "class", "count", "inside_its_range", "worst_cell", "value", "reference",
-    "error", "bound", "advice",
-)  # fmt: skip
+# Columns of the CSV, and what of a region they hold.
+COLUMNS = {
+    "law": "subject", "quantity": "quantity", "precision": "arithmetic", "cells": "where", "class": "verdict.words",
+    "count": "count", "inside_its_range": "inside", "worst_cell": "place", "value": "value", "reference": "reference",
+    "error": "error", "bound": "bound", "advice": "advice",
+}  # fmt: skip
 FIT_COLUMNS = ("law", "case", "value", "converged", "best", "spread", "constant", "results")
 SHORT = {
     Verdict.NOT_JUDGED: "not judged",
@@ -30,15 +32,7 @@ SHORT = {
     Verdict.NOT_FINITE: "NaN/Inf",
     Verdict.RAISES: "raises",
 }
-# One character a class, as in the figure.
-SIGNS = {
-    Verdict.NOT_JUDGED: "?",
-    Verdict.INACCURATE: "≈",
-    Verdict.NOT_MONOTONE: "↕",
-    Verdict.NEGATIVE: "−",
-    Verdict.NOT_FINITE: "×",
-    Verdict.RAISES: "!",
-}
+SIGNS = dict(zip(SHORT, "?≈↕−×!", strict=True))  # one character a class, as in the figure
 LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
 BARE = "no reference there: only NaN, sign and order are looked at"
 LONGEST_NAME = 18  # characters: a line of 100 holds it beside the advice
@@ -57,25 +51,23 @@ SUMMARY = (
 def advice_table(parts: Sequence[Findings]) -> RenderableType:
     """Return a row for each piece of advice: the subjects that it is for, their cells and the classes of failure."""
     groups: dict[tuple[bool, str], list[Region]] = {}
-    for region in _regions(parts):
+    for region in (region for part in parts for region in part.regions):
         groups.setdefault((not region.verdict.is_red, region.advice), []).append(region)
     rows = sorted(groups.items(), key=lambda item: (item[0][0], -len({one.subject for one in item[1]})))
     columns = {
-        "of": [_among([one.subject for one in group]) for _, group in rows],
+        "of": [_among({one.subject for one in group}) for _, group in rows],
         "cells": [str(sum(one.count for one in group)) for _, group in rows],
         "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
         "what helps": [advice or BARE for (_, advice), _ in rows],
     }
-    total = cell_count([one for part in parts for one in part.cells])
+    total = sum(one.codes.size for part in parts for one in part.cells)
     caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
     return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
 
 
-def _among(subjects: Sequence[str]) -> str:
-    distinct = list(dict.fromkeys(subjects))
-    if len(distinct) > 1:
-        return f"{len(distinct)} of them"
-    return distinct[0] if len(distinct[0]) <= LONGEST_NAME else distinct[0][: LONGEST_NAME - 1].rstrip() + "…"
+def _among(subjects: set[str]) -> str:
+    name = next(iter(subjects)) if len(subjects) == 1 else f"{len(subjects)} of them"
+    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def region_table(part: Findings, most: int = 20) -> RenderableType:
@@ -100,22 +92,19 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
     for subject in dict.fromkeys(one.subject for one in fits):
         columns["fit"].append(subject)
         for header, case, begins, is_share in SUMMARY:
-            one = next(
-                (o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins)), None
-            )
-            columns[header].append(ABSENT if one is None else _cell(one, is_share))
-    refused = sum(one.case == NONSENSE and one.converged == 0 for one in fits)
-    nonsense = sum(one.case == NONSENSE for one in fits)
+            of = (o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins))
+            one = next(of, None)
+            if one is None or not (is_share or one.worst):
+                columns[header].append(ABSENT)
+            else:
+                columns[header].append(f"{100.0 * one.converged:.0f} %" if is_share else significant(one.spread))
+    nonsense = [one.converged == 0 for one in fits if one.case == NONSENSE]
     caption = (
         "Share that converges from starts so far off, and on dark or white albedos alone; then the largest relative\n"
         "change of a constant: with wider bins, under noise, trimmed at 0.0005 instead of 0.05.\n"
-        f"Nonsense (NaN, all zeros, one albedo): {refused} of {nonsense} refused by name."
+        f"Nonsense (NaN, all zeros, one albedo): {sum(nonsense)} of {len(nonsense)} refused by name."
     )
     return column_table("Fits", columns, caption, ("fit",))
-
-
-def _cell(case: FitCase, is_share: bool) -> str:
-    return f"{100.0 * case.converged:.0f} %" if is_share else significant(case.spread) if case.worst else ABSENT
 
 
 def fit_table(fits: Sequence[FitCase]) -> RenderableType:
@@ -131,10 +120,8 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
         "spread": [f"{significant(one.spread)} {one.worst}" if one.worst else ABSENT for one in shown],
         "else": [", ".join(f"{count} {kind}" for kind, count in one.results if kind != "converged") for one in shown],
     }
-    nonsense = sorted({kind for one in fits if one.case == NONSENSE for kind, _ in one.results})
-    caption = "spread: the largest relative change of a constant. Nonsense (NaN, all zeros, one albedo): " + "; ".join(
-        nonsense
-    )
+    nonsense = "; ".join(sorted({kind for one in fits if one.case == NONSENSE for kind, _ in one.results}))
+    caption = f"spread: the largest relative change of a constant. Nonsense (NaN, all zeros, one albedo): {nonsense}"
     return column_table("Fits", columns, caption, ("fit",), ("case", "else"))
 
 
@@ -143,55 +130,36 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
     lines = []
     for part in parts:
         lines += [
-            Text(
-                f"FAIL {one.subject}: {one.quantity}, {one.arithmetic}, {one.verdict.words} at {one.place}: "
-                f"{one.value:.4g}, reference {one.reference:.4g}; {one.advice}"
-            )
+            f"FAIL {one.subject}: {one.quantity}, {one.arithmetic}, {one.verdict.words} at {one.place}: "
+            f"{one.value:.4g}, reference {one.reference:.4g}; {one.advice}"
             for one in part.regions
             if one.is_failure
         ]
-        lines += [
-            Text(f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}") for one in part.fits if one.is_failure
-        ]
+        lines += [f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}" for one in part.fits if one.is_failure]
     ours = [part for part in parts if part.fits or any(one.own for one in part.cells)]
     broken = sum(part.failures > 0 for part in ours)
     summary = (
-        "none has a red cell inside its range" if not broken else f"{broken} of them with red cells inside their range"
+        f"{broken} of them with red cells inside their range" if broken else "none has a red cell inside its range"
     )
-    aside, inside = _unjudged(parts)
-    share = Text(f"of ours {aside} of {inside} cells inside their ranges are not judged: no reference there")
-    return [*lines, Text(f"ours: {len(ours)} laws, maps and functions, {summary}"), *([share] if aside else [])]
-
-
-def _unjudged(parts: Sequence[Findings]) -> tuple[int, int]:
-    """Return the number of our own cells that are not judged, and of all, inside their ranges."""
+    lines.append(f"ours: {len(ours)} laws, maps and functions, {summary}")
     own = [one for part in parts for one in part.cells if one.own]
-    aside = sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own)
-    return aside, sum(int(np.sum(one.inside)) for one in own)
+    inside = sum(int(np.sum(one.inside)) for one in own)
+    if aside := sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own):
+        lines.append(f"of ours {aside} of {inside} cells inside their ranges are not judged: no reference there")
+    return list(map(Text, lines))
 
 
 def regions_csv(parts: Iterable[Findings]) -> str:
     """Return every region that is red or not judged as CSV, a line each."""
-    rows = [
-        (
-            one.subject, one.quantity, one.arithmetic, one.where, one.verdict.words, one.count, one.inside, one.place,
-            one.value, one.reference, one.error, one.bound, one.advice,
-        )
-        for one in _regions(parts)
-    ]  # fmt: skip
-    return _csv(COLUMNS, rows)
+    values = attrgetter(*COLUMNS.values())
+    return _csv(COLUMNS, (values(region) for part in parts for region in part.regions))
 
 
-def fits_csv(fits: Iterable[FitCase]) -> str:
+def fits_csv(fits: Sequence[FitCase]) -> str:
     """Return every case of fits as CSV, a line each."""
-    rows = [
-        (
-            one.subject, one.case, one.value, one.converged, one.best, one.spread, one.worst,
-            "; ".join(f"{count} {kind}" for kind, count in one.results),
-        )
-        for one in fits
-    ]  # fmt: skip
-    return _csv(FIT_COLUMNS, rows)
+    values = attrgetter("subject", "case", "value", "converged", "best", "spread", "worst")
+    results = ("; ".join(f"{count} {kind}" for kind, count in one.results) for one in fits)
+    return _csv(FIT_COLUMNS, ((*values(one), text) for one, text in zip(fits, results, strict=True)))
 
 
 def content(parts: Sequence[Findings]) -> dict[str, Any]:
@@ -199,26 +167,17 @@ def content(parts: Sequence[Findings]) -> dict[str, Any]:
     return {
         "passed": not any(part.failures for part in parts),
         "subjects": {part.name: _counts(part.cells) for part in parts if part.cells},
-        "regions": [dict(zip(COLUMNS, row, strict=True)) for row in csv.reader(io.StringIO(regions_csv(parts)))][1:],
+        "regions": list(csv.DictReader(io.StringIO(regions_csv(parts)))),
         "fits": [vars(one) for part in parts for one in part.fits],
     }
 
 
 def _counts(cells: Sequence[Cells]) -> Mapping[str, int]:
-    total = {one.words: 0 for one in Verdict}
-    for each in cells:
-        for code, count in zip(*np.unique(each.codes, return_counts=True), strict=True):
-            total[Verdict(int(code)).words] += int(count)
-    return total
+    total = np.sum([np.bincount(one.codes.ravel(), minlength=len(Verdict)) for one in cells], axis=0)
+    return {one.words: int(total[one]) for one in Verdict}
 
 
-def _regions(parts: Iterable[Findings]) -> list[Region]:
-    return [region for part in parts for region in part.regions]
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def _csv(header: Iterable[str], rows: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([tuple(header), *rows])
     return text.getvalue()

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -46,11 +46,10 @@ ENDS = {"": "value", "_low": "low", "_high": "high"}
 
 def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
     """Return a table a panel; under the last one what was left out, and what is not in the times."""
-    last = len(part.panels) - 1
-    return [_table(part, panel, "\n".join(part.notes) if i == last else "") for i, panel in enumerate(part.panels)]
+    return [_table(part, panel, part.notes if panel is part.panels[-1] else ()) for panel in part.panels]
 
 
-def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
+def _table(part: TradeoffPart, panel: Panel, notes: Sequence[str]) -> RenderableType:
     points = panel.points
     columns = {
         "": [f"{p.method}, {p.label}" if p.label else p.method for p in points],
@@ -65,7 +64,7 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
     if "distance" in columns:
         caption += "; distance: of the constants from their noise-free limit, in their standard errors"
     title = f"{part.name}, {panel.title}".replace("$", "")
-    return column_table(title, columns, "\n".join(filter(None, (caption, notes))), left=("", "stands"))
+    return column_table(title, columns, "\n".join((caption, *notes)), left=("", "stands"))
 
 
 def with_spread(value: float, low: float, high: float) -> str:
@@ -79,11 +78,7 @@ def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
     comments = [f"{part.name}: {part.title}", *(f"{name}: {value}" for name, value in machine.items())]
     comments += [f"panel {p.name}: {p.title}; cost: {p.cost}; error, worst: {p.error}" for p in part.panels]
     comments += part.notes
-    rows = [
-        _row(point, standing)
-        for panel in part.panels
-        for point, standing in zip(panel.points, standings(panel.points), strict=True)
-    ]
+    rows = [_row(*one) for panel in part.panels for one in _standing(panel)]
     columns = list(dict.fromkeys(column for row in rows for column in row))
     text = io.StringIO()
     text.writelines(f"# {line.replace('$', '')}\n" for line in comments)
@@ -100,17 +95,16 @@ def as_numbers(part: TradeoffPart) -> dict[str, Any]:
         "notes": list(part.notes),
         "panels": {
             panel.name: {
-                "title": panel.title,
-                "cost": panel.cost,
-                "error": panel.error,
-                "points": [
-                    {**asdict(point), "standing": standing}
-                    for point, standing in zip(panel.points, standings(panel.points), strict=True)
-                ],
+                **{name: getattr(panel, name) for name in ("title", "cost", "error")},
+                "points": [{**asdict(point), "standing": standing} for point, standing in _standing(panel)],
             }
             for panel in part.panels
         },
     }
+
+
+def _standing(panel: Panel) -> list[tuple[Point, str]]:
+    return list(zip(panel.points, standings(panel.points), strict=True))
 
 
 def _row(point: Point, standing: str) -> dict[str, str]:

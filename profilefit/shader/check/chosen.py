@@ -13,10 +13,8 @@ from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
-from profilefit.shader.check.half import HalfCheck, check_half
-from profilefit.shader.check.law_check import LawCheck, check_laws
+from profilefit.shader.check.law_check import HalfCheck, LawCheck, MapCheck, check_half, check_laws, check_map
 from profilefit.shader.check.law_cost import Cost, law_costs
-from profilefit.shader.check.map_check import MapCheck, check_map
 from profilefit.shader.check.shader_law import half_extension, no_half
 from profilefit.shader.context import opened, renderer
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.shader.check.bounds import Bound, ModelError
+from profilefit.shader.check.bounds import ULP, Bound, ModelError
 from profilefit.shader.check.shader_law import Values
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-ULP = 2.0**-24  # half a step of float32 below 1: what rounding a share costs
+
 SMALLEST = 2.0**-126  # below it a float32 loses digits, or is 0 on many GPUs
 DIMMEST = 1e-30  # R_d l^2 below which products of small factors leave float32
 LEAST_X = 1e-6  # R_d is taken here where x = r/l is less: at the source itself it is infinite

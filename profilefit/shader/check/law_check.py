@@ -1,9 +1,11 @@
-"""Check of a law's source where it runs: its float32 against the float64 law and against the exact half space.
+"""Check of a source where it runs: float32 of a law or map against its float64 and against the exact half space.
 
 Every law is held to its own model error: rounding below a tenth of it, the errors of the record met by the GPU's own
 numbers, and nothing that is no number, infinite, negative or goes the wrong way where the law says that it holds.
 
-Each text is also translated line by line into numpy and run in float64, where rounding is out of sight.
+Each text of a law is also translated line by line into numpy and run in float64, where rounding is out of sight. What
+half precision costs, of what is stored in it and of computing in it where the driver can, informs and breaks nothing:
+engines store albedo textures and results in float16 and compute in float32.
 """
 
 from __future__ import annotations
@@ -20,17 +22,19 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
 from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
-from profilefit.laws.base import ProfileLaw
+from profilefit.laws.base import ProfileLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record import Folder
-from profilefit.shader.check import bounds, dense_grid, validity
-from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
-from profilefit.shader.check.dense_grid import XI, Arguments, ShaderCheck, Spread, bad_numbers
-from profilefit.shader.check.shader_law import ShaderLaw, Values
-from profilefit.shader.languages import translated
+from profilefit.shader.check import bounds, dense_grid
+from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, ULP, Bound, ModelError
+from profilefit.shader.check.dense_grid import XI, Arguments, Count, ShaderCheck, Spread, bad_numbers
+from profilefit.shader.check.shader_law import ShaderLaw, ShaderMap, Values, half_extension
+from profilefit.shader.emit import translated
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -135,8 +139,8 @@ def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Fol
         references = pool.map(
             lambda loaded: dense_grid.reference(loaded.law.in_reduced(), dense_grid.arguments()), laws
         )
-        for loaded, exact in zip(laws, references, strict=True):
-            yield check_law(context, loaded, folder, exact=exact)
+        for loaded, known in zip(laws, references, strict=True):
+            yield check_law(context, loaded, folder, exact=known)
 
 
 def check_law(
@@ -146,15 +150,15 @@ def check_law(
 
     text   in place of its own; exact  the law in float64 on the grid, where that is known already
     """
-    model, valid = bounds.of_profile(loaded, folder), validity.of_profile(loaded, folder)
+    model, valid = bounds.model_of_profile(loaded, folder), bounds.valid_profile(loaded, folder)
     shader, at = ShaderLaw(context, loaded.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        exact = exact or dense_grid.reference(loaded.law.in_reduced(), at)
+        right = exact or dense_grid.reference(loaded.law.in_reduced(), at)
         profiled, drawn = (
-            np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, dense_grid.ALPHA, dense_grid.XI)
+            np.broadcast_to(mask, at.shape) for mask in bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
         )
-        spreads, rounding = _rounding(loaded.law.in_reduced(), found, exact, at, profiled, drawn)
+        spreads, rounding = _rounding(loaded.law.in_reduced(), found, right, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:
@@ -165,26 +169,26 @@ def check_law(
     outside = dense_grid.counted(found, at, everywhere, everywhere, jump).less(inside)
     measured = _measured(shader, loaded, model)
     limits = _limits(model, rounding, measured, spreads)
-    limits += [bad_numbers(inside), *validity.promised_by_profile(loaded, folder)]
+    limits += [bad_numbers(inside), *bounds.promised_by_profile(loaded, folder)]
     return LawCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), spreads)
 
 
 def _rounding(
-    law: ProfileLaw, found: Values, exact: Values, at: Arguments, profiled: Mask, drawn: Mask
+    law: ProfileLaw, found: Values, right: Values, at: Arguments, profiled: Mask, drawn: Mask
 ) -> tuple[dict[str, Spread], dict[str, float]]:
     """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
-    seen = (at.x >= NEAREST) & (exact.cdf <= ENERGY_WITHIN)  # where `rel` looks
-    tells = profiled & (exact.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(exact.profile)
-    dense = drawn.any(axis=1, keepdims=True) & (exact.pdf * at.mfp > dense_grid.DIMMEST) & np.isfinite(exact.pdf)
-    profile = np.abs(found.profile / exact.profile - 1.0)
-    cdf = np.abs(found.cdf - exact.cdf)
-    sample = _misplaced(law, found, exact, at)
+    seen = (at.x >= NEAREST) & (right.cdf <= ENERGY_WITHIN)  # where `rel` looks
+    tells = profiled & (right.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(right.profile)
+    dense = drawn.any(axis=1, keepdims=True) & (right.pdf * at.mfp > dense_grid.DIMMEST) & np.isfinite(right.pdf)
+    profile = np.abs(found.profile / right.profile - 1.0)
+    cdf = np.abs(found.cdf - right.cdf)
+    sample = _misplaced(law, found, right, at)
     spreads = {
         PROFILE: dense_grid.spread(profile, tells & seen, at),
         EVERYWHERE: dense_grid.spread(profile, tells, at),
         CDF: dense_grid.spread(cdf, profiled, at),
         SAMPLE: dense_grid.spread(sample, drawn, at, of_share=True),
-        PDF: dense_grid.spread(np.abs(found.pdf / exact.pdf - 1.0), dense & seen, at),
+        PDF: dense_grid.spread(np.abs(found.pdf / right.pdf - 1.0), dense & seen, at),
     }
     used = tells & seen
     means = np.sum(np.where(used, profile, 0.0), axis=1) / np.maximum(np.sum(used, axis=1), 1)
@@ -193,12 +197,12 @@ def _rounding(
     return {name: spread for name, spread in spreads.items() if spread is not None}, rounding
 
 
-def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> Floats:
+def _misplaced(law: ProfileLaw, found: Values, right: Values, at: Arguments) -> Floats:
     """Return the share of the energy between the radii of float32 and float64 [-], of the part that both are of."""
     sampler = dense_grid.drawn_by(law)
-    there, drawn = exact.sample, np.where(found.sample >= 0, found.sample, np.inf)
-    mine, right = (np.asarray(sampler.undone(x, at.xi, at.alpha, at.mfp)) for x in (drawn, there))
-    return np.abs(mine - right)
+    drawn = np.where(found.sample >= 0, found.sample, np.inf)
+    mine, there = (np.asarray(sampler.undone(x, at.xi, at.alpha, at.mfp)) for x in (drawn, right.sample))
+    return np.abs(mine - there)
 
 
 def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[str, float]:
@@ -214,15 +218,22 @@ def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[s
     return found
 
 
-def _limits(
-    model: ModelError, rounding: dict[str, float], measured: dict[str, float], spreads: dict[str, Spread]
+def _of_model(
+    model: ModelError, rounding: dict[str, float], measured: dict[str, float], places: dict[str, str]
 ) -> list[Bound]:
     found = []
     for name, value in model.values.items():
-        place = spreads[JUDGED[name]].where if JUDGED[name] in spreads else ""
-        found.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, place))
+        found.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places.get(name, "")))
         if name in measured:
             found.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
+    return found
+
+
+def _limits(
+    model: ModelError, rounding: dict[str, float], measured: dict[str, float], spreads: dict[str, Spread]
+) -> list[Bound]:
+    places = {name: spreads[of].where for name, of in JUDGED.items() if of in spreads}
+    found = _of_model(model, rounding, measured, places)
     rel, ks = model.get("rel"), model.get("ks")
     if SAMPLE in spreads and ks is not None and model.get("inversion_error") is None:  # as good as the cdf it inverts
         name = "float32 inversion_error"
@@ -230,3 +241,109 @@ def _limits(
     if OWN in spreads and rel is not None:
         found.append(Bound(f"{OWN}, 99 % of it", spreads[OWN].most, ROUNDING_SHARE * rel, spreads[OWN].where))
     return found
+
+
+# Even in A, and even in sqrt(1 - alpha) as `quality.albedo_quality`: both as the GPU sees them.
+REFLECTANCE = np.linspace(0.0, 1.0, 2001).astype(np.float32).astype(np.float64)
+ALPHA = (1.0 - np.linspace(1.0, 0.0, 1001) ** 2).astype(np.float32).astype(np.float64)
+STEPS = 4  # of ULP that a falling alpha or A may be rounding
+
+
+@dataclass(frozen=True)
+class MapCheck(ShaderCheck):
+    """Findings on one map: `delta_A` and `delta_alpha`, and where their rounding is largest, in words."""
+
+    places: dict[str, str]
+
+
+def check_map(context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text: str = "") -> MapCheck:
+    """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
+    model = bounds.model_of_map(loaded, folder)
+    of_reflectance, of_alpha = bounds.valid_map(loaded, folder)
+    shader, law = ShaderMap(context, loaded.law, text), loaded.law.in_reduced()
+    alpha, reflectance = shader.alpha(REFLECTANCE), shader.reflectance(ALPHA)
+    a, c = of_alpha.holds(ALPHA), of_reflectance.holds(REFLECTANCE)
+    with np.errstate(all="ignore"):  # what is no number is counted, not warned of
+        of_a, of_c = np.abs(reflectance - law.reflectance(ALPHA))[a], np.abs(alpha - law.alpha(REFLECTANCE))[c]
+    rounding = {"delta_A": float(np.max(of_a)), "delta_alpha": float(np.max(of_c))}
+    places = {
+        "delta_A": f"α {ALPHA[a][np.argmax(of_a)]:.4g}",
+        "delta_alpha": f"A {REFLECTANCE[c][np.argmax(of_c)]:.4g}",
+    }
+    measured = _map_measured(shader, of_alpha)
+    inside = _map_counted(alpha, reflectance, of_reflectance, of_alpha)
+    outside = _map_counted(alpha, reflectance, Range(), Range()).less(inside)
+    limits = _of_model(model, rounding, measured, places)
+    limits += [bad_numbers(inside), *bounds.promised_by_map(loaded)]
+    return MapCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), places)
+
+
+def _map_measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
+    """Largest errors against the exact half space, for albedos below 1 where the map holds [-]."""
+    if not shader.setting.is_solved:
+        return {}
+    alpha = ALPHA[of_alpha.holds(ALPHA)]
+    truth = np.asarray(exact.reflectance(unreduced(alpha, shader.setting.g), setting=shader.setting))
+    return {
+        "delta_A": float(np.max(np.abs(shader.reflectance(alpha) - truth))),
+        "delta_alpha": float(np.max(np.abs(shader.alpha(truth) - alpha))),
+    }
+
+
+def _map_counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_alpha: Range) -> Count:
+    """Count what must not be: both directions rise."""
+    numbers, first = np.zeros(4, int), ""
+    for given, value, span, sign in ((REFLECTANCE, alpha, of_reflectance, "A"), (ALPHA, reflectance, of_alpha, "α")):
+        held = span.holds(given)
+        with np.errstate(invalid="ignore"):
+            falls = np.append(False, np.diff(value) < -STEPS * ULP) & held & np.append(False, held[:-1])
+            kinds = [np.isnan(value) & held, np.isinf(value) & held, (value < 0) & held, falls]
+        numbers += [int(np.sum(kind)) for kind in kinds]
+        bad = np.any(kinds, axis=0)
+        if np.any(bad) and not first:
+            first = f"{sign} {given[np.argmax(bad)]:.4g}"
+    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
+    return Count(nan, infinite, negative, wrong_way, first)
+
+
+# What is kept in half, or computed in it.
+HALVES = ("α stored", "A stored", "r stored", "results stored", "arithmetic")
+FARTHEST, RADII = 100.0, 200
+
+
+@dataclass(frozen=True)
+class HalfCheck:
+    """`rel` and `ks` [-] of what float16 alone changes, worst over the records' albedos, for l = 1."""
+
+    of: LoadedLaw
+    rel: dict[str, float]
+    ks: dict[str, float]
+
+
+def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
+    """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
+    law = loaded.law.in_reduced()
+    r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]
+    cdf = np.asarray(law.cdf(r, alpha))
+    truth = np.asarray(law.profile(r, alpha)), cdf, cdf <= ENERGY_WITHIN
+    single = ShaderLaw(context, law)
+    found = {HALVES[0]: single.values(r, 0.5, _half(alpha))}
+    if getattr(law, "albedo", None) is not None:
+        found[HALVES[1]] = single.values(r, 0.5, law.albedo.alpha(_half(law.albedo.reflectance(alpha))))
+    found[HALVES[2]] = single.values(_half(r), 0.5, alpha)
+    found[HALVES[3]] = ShaderLaw(context, law, results="f2").values(r, 0.5, alpha)
+    if half_extension(context):
+        found[HALVES[4]] = ShaderLaw(context, law, half=True).values(r, 0.5, alpha)
+    errors = {name: _half_errors(values, *truth) for name, values in found.items()}
+    return HalfCheck(loaded, {n: error[0] for n, error in errors.items()}, {n: error[1] for n, error in errors.items()})
+
+
+def _half(values: Floats) -> Floats:
+    return np.asarray(values, np.float16).astype(np.float64)
+
+
+def _half_errors(values: Values, profile: Floats, cdf: Floats, used: NDArray[np.bool_]) -> tuple[float, float]:
+    with np.errstate(all="ignore"):
+        error = np.where(used, np.abs(values.profile / profile - 1.0), 0.0)
+        rel = np.sum(error, axis=1) / np.sum(used, axis=1)
+        return float(np.max(rel)), float(np.max(np.abs(values.cdf - cdf)))

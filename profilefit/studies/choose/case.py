@@ -96,11 +96,11 @@ class Case:
     window       half the width and height of what is seen, the edge in the middle [length]
     """
 
-    reflectance: tuple[float, float, float]
-    mfp: tuple[float, float, float]
+    reflectance: tuple[float, ...]
+    mfp: tuple[float, ...]
     pixel: float
     radius: float = math.inf
-    kernel: tuple[float, float, float] | None = None
+    kernel: tuple[float, ...] | None = None
     window: tuple[float, float] = (math.inf, math.inf)
 
     @property
@@ -109,7 +109,7 @@ class Case:
         return int(np.argmax(self.mfp))
 
     @property
-    def filter_reflectance(self) -> tuple[float, float, float]:
+    def filter_reflectance(self) -> tuple[float, ...]:
         return self.reflectance if self.kernel is None else self.kernel
 
     @property

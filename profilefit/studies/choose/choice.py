@@ -16,9 +16,8 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
-from profilefit.studies.choose.error import Error, error
+from profilefit.studies.choose.error import Error, ReferenceLight, error
 from profilefit.studies.choose.requirements import Range, Requirements
-from profilefit.studies.choose.response import reference_light
 
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is
@@ -87,12 +86,6 @@ def laws(setting: Setting) -> dict[str, ProfileLaw]:
     return laws
 
 
-def options(setting: Setting) -> list[Option]:
-    """Return all options under a setting."""
-    of_laws = [option for name, law in laws(setting).items() for option in sampled(law, name)]
-    return [*filters(), *of_laws]
-
-
 def cases(scene: Requirements) -> Iterator[Case]:
     """Yield the ends of all ranges: dark and light skin, far and near, flat and as curved as it gets.
 
@@ -102,11 +95,11 @@ def cases(scene: Requirements) -> Iterator[Case]:
     (near, far), path = scene.pixel, max(high / low for low, high in scene.mfp)
     steps = math.ceil(math.log(path * far / near) / math.log(STRIDE)) if path * far / near > 1.001 else 0
     for way in np.linspace(0.0, 1.0, steps + 1).tolist():
-        mfp = _three(tuple(_between(one, way) for one in scene.mfp))
+        mfp = tuple(_between(one, way) for one in scene.mfp)
         pixel = _between((far, near), way)
         columns, rows = scene.resolution
         window = (0.5 * columns * pixel, 0.5 * rows * pixel)
-        for reflectance in sorted({_three(tuple(one[end] for one in scene.reflectance)) for end in (0, 1)}):
+        for reflectance in sorted({tuple(one[end] for one in scene.reflectance) for end in (0, 1)}):
             yield Case(reflectance, mfp, pixel, math.inf, kernel, window)
             if SEEN * pixel <= scene.radius < math.inf:
                 yield Case(reflectance, mfp, pixel, scene.radius, kernel, window)
@@ -114,36 +107,27 @@ def cases(scene: Requirements) -> Iterator[Case]:
 
 def middle(scene: Requirements) -> Case:
     """Return the middle of all ranges, on a plane: what one filter for the whole picture is made for."""
-    reflectance = _three(tuple(0.5 * (low + high) for low, high in scene.reflectance))
-    return Case(reflectance, _three(tuple(_between(one, 0.5) for one in scene.mfp)), _between(scene.pixel, 0.5))
-
-
-def worst(option: Option, scene: Requirements) -> Error:
-    """Return the option's error in the scene's worst case."""
-    light = reference_light(scene.setting)
-    return max((error(option, case, light, scene.within) for case in cases(scene)), key=lambda one: one.total)
+    reflectance = tuple(0.5 * (low + high) for low, high in scene.reflectance)
+    return Case(reflectance, tuple(_between(one, 0.5) for one in scene.mfp), _between(scene.pixel, 0.5))
 
 
 def choose(scene: Requirements, ratios: Ratios, track: Track = iter) -> Choice:
     """Predict all options whose cost was measured, and choose."""
-    budget = scene.budget
+    budget, light = scene.budget, ReferenceLight(scene.setting)
+    of_laws = [option for name, law in laws(scene.setting).items() for option in sampled(law, name)]
     priced = {
         option: milliseconds(option, ratios, budget.gpu, budget.screen_share, math.prod(scene.resolution))
-        for option in options(scene.setting)
+        for option in (*filters(), *of_laws)
         if ratios.knows(option)
     }
     predicted: list[Predicted] = []
     for option in track(sorted(priced, key=lambda option: priced[option].estimate)):
-        predicted.append(Predicted(option, priced[option], worst(option, scene)))
-        if _is_settled(predicted, scene.tolerance):  # what is dearer still need not be known
+        errors = (error(option, case, light, scene.within) for case in cases(scene))
+        predicted.append(Predicted(option, priced[option], max(errors, key=lambda one: one.total)))
+        serving = next((one for one in predicted if one.error.total <= scene.tolerance), None)
+        if serving and predicted[-1].error.total < serving.error.total:  # what is dearer still need not be known
             break
     return chosen(scene, predicted)
-
-
-def _is_settled(predicted: list[Predicted], tolerance: float) -> bool:
-    """Return whether one serves, and a dearer one that is more accurate is known."""
-    serving = next((one for one in predicted if one.error.total <= tolerance), None)
-    return serving is not None and predicted[-1].error.total < serving.error.total
 
 
 def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
@@ -152,22 +136,15 @@ def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
     good = [one for one in every if one.error.total <= scene.tolerance]
     paid = [one for one in every if affordable(one, scene)]
     both = [one for one in good if affordable(one, scene)]
-    nearest = (both or good)[0] if good else _most_accurate(paid or list(every))
+    if good:
+        nearest = (both or good)[0]
+    else:  # the cheapest that is as good as any, within the accuracy of a prediction
+        least = min(one.error.total for one in paid or every)
+        nearest = next(one for one in paid or every if one.error.total <= AS_GOOD * least)
     place = every.index(nearest)
     cheaper = min(every[:place], key=lambda one: one.error.total, default=None)
     dearer = next((one for one in every[place + 1 :] if one.error.total < nearest.error.total), None)
     return Choice(scene, every, both[0] if both else None, nearest, cheaper, dearer)
-
-
-def _most_accurate(some: list[Predicted]) -> Predicted:
-    """Return the cheapest that is as good as any, within the accuracy of a prediction."""
-    least = min(one.error.total for one in some)
-    return next(one for one in some if one.error.total <= AS_GOOD * least)
-
-
-def _three(values: tuple[float, ...]) -> tuple[float, float, float]:
-    red, green, blue = values
-    return red, green, blue
 
 
 def _between(ends: Range, way: float) -> float:

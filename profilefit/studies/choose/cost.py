@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 
@@ -122,13 +122,6 @@ def shipped() -> Ratios:
     own = ratios.base + ratios.fixed["burley"] + ratios.each["burley"] * YARDSTICK_TAPS
     hardware = np.divide(PUBLISHED["burley"], PUBLISHED["separable"])
     return replace(ratios, spread=float(np.max(hardware - 1.0)) / (own - 1.0))
-
-
-def as_json(ratios: Ratios) -> str:
-    """Return ratios as the JSON that `shipped` reads."""
-    content = asdict(ratios)
-    del content["spread"]
-    return json.dumps(content, indent=1) + "\n"
 
 
 def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tuple[int, int] = SIZE) -> Ratios:

@@ -110,11 +110,7 @@ def _is_solved(stack: Medium) -> bool:
 
 
 def of_each_colour(
-    stack: LayerStack,
-    tolerance: float,
-    within: Within,
-    progress: bool | None = None,
-    illumination: str = "searchlight",
+    stack: LayerStack, tolerance: float, within: Within, progress: bool | None = None, illumination: str = "searchlight"
 ) -> tuple[OneLayer, ...]:
     """Return `one_layer` of red, green and blue, equal ones traced once; of one alone where all three are equal."""
     layers = {

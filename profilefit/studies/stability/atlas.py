@@ -10,32 +10,19 @@ from functools import partial
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws import MAPS
-from profilefit.laws.entry import EVERYWHERE
+from profilefit.laws.base import EVERYWHERE
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
-from profilefit.shader.check import validity
-from profilefit.studies.stability import (
-    exact_cells,
-    fit_cases,
-    fur,
-    gradients,
-    heart,
-    law_cells,
-    map_cells,
-    misuse,
-    sea,
-    stacks,
-)
-from profilefit.studies.stability.cells import Cells
+from profilefit.shader.check import bounds
+from profilefit.studies.stability import exact_cells, fit_cases, gradients, law_cells, map_cells, misuse, scenes, stacks
+from profilefit.studies.stability.cells import QUANTITIES, TEXT16, TEXT32, Cells, Region, regions_of
 from profilefit.studies.stability.fit_cases import FitCase
-from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.map_cells import map_label
-from profilefit.studies.stability.regions import Region, regions_of
 
-EXACT, CONVERT, SOLVER, STACKS, HEART, SEA, FUR = "exact", "convert", "solver", "stacks", "heart", "sea", "fur"
-IF_NAMED = (HEART, SEA, FUR)  # one needs OpenGL, and none is of a law
+IF_NAMED = ("heart", "sea", "fur")  # one needs OpenGL, and none is of a law
 SETTINGS = (Setting(), Setting("diffuse"))
+PROFILE, CDF, SAMPLE, PDF = QUANTITIES
 WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
 # Laws whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
 DERIVED: dict[str, tuple[str, ...]] = {
@@ -50,7 +37,7 @@ DERIVED_IF_NAMED = {"hazard": (PDF,)}  # ten seconds
 DERIVED_MAPS = ("albedo-rational", "albedo-liang", "van_de_hulst, published", "chiang, published")
 # Law, objective and lanes of the fits.
 FITTED = (("rational", "reflectance", 16), ("burley", "relative", 16), ("hazard", "relative", 6))
-LONGEST = (SOLVER, STACKS, "hazard", "quantile")  # started first, so that no core waits at the end
+LONGEST = ("solver", "stacks", "hazard", "quantile")  # started first, so that no core waits at the end
 # A look in seconds: what the paper prints, and what is ours; of profile laws their texts, which need no compiling.
 QUICK_ARITHMETICS = (TEXT32, TEXT16)
 QUICK = ("liang, published", "hazard", "albedo-rational", "map liang, published")
@@ -93,17 +80,12 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
             todo.append((one.label, partial(_of_law, one, records, quick, more)))
     todo += [(map_label(one), partial(_of_map, one, records, quick)) for one in albedos if chosen(one, map_label(one))]
     usual = () if requested or quick else set(FUNCTIONS) - set(IF_NAMED)
-    todo += [
-        (name, partial(of, records, quick)) for name, of in FUNCTIONS.items() if name in requested or name in usual
-    ]
-    known = {
-        *(name for name, _ in todo),
-        *FUNCTIONS,
-        *(n for one in (*profiles, *albedos) for n in (one.name, *one.records)),
-    }
+    todo += [(name, partial(of, records, quick)) for name, of in FUNCTIONS.items() if name in {*requested, *usual}]
+    every = [*profiles, *albedos]
+    known = {*FUNCTIONS, *(name for name, _ in todo), *(n for one in every for n in (one.name, *one.records))}
     unknown = [name for name in requested if name not in known]
     if unknown or not todo:
-        accepted = f"({', '.join(sorted({one.name for one in (*profiles, *albedos)}))}) or {', '.join(FUNCTIONS)}"
+        accepted = f"({', '.join(sorted({one.name for one in every}))}) or {', '.join(FUNCTIONS)}"
         got = repr(unknown[0]) if unknown else "none"
         raise InputError(f"name must be a law, map or record {accepted}, got {got}")
     return todo
@@ -135,7 +117,7 @@ def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Findings:
     text = map_cells.in_reduced(named)
     cells = [*map_cells.cells_of(named, folder), *misuse.of_map(text)]
     if named.label in DERIVED_MAPS and not quick:
-        cells += gradients.of_map(text, validity.of_map(named, folder))
+        cells += gradients.of_map(text, bounds.valid_map(named, folder))
     return _findings(map_label(named), cells)
 
 
@@ -144,7 +126,7 @@ def _of_exact(folder: Records, quick: bool) -> Findings:
     cells = [each for s in settings for each in exact_cells.half_space_cells(s, catalogue.normalisation(s, folder))]
     if not quick:
         cells += exact_cells.refracting_cells()
-    return _findings(EXACT, [*cells, *misuse.of_exact()])
+    return _findings("exact", [*cells, *misuse.of_exact()])
 
 
 def _of_solver(folder: Records, quick: bool) -> Findings:
@@ -153,17 +135,17 @@ def _of_solver(folder: Records, quick: bool) -> Findings:
         law = (catalogue.albedo_law if name in MAPS else catalogue.load)(name, folder=folder)
         cases += fit_cases.fits_of(law, objective, name, lanes)
     start = catalogue.load("liang", "corrected", folder=folder)
-    return Findings(SOLVER, (), (), (*cases, *fit_cases.trimmed_fits(start)))  # type: ignore[arg-type]
+    return Findings("solver", (), (), (*cases, *fit_cases.trimmed_fits(start)))  # type: ignore[arg-type]
 
 
 FUNCTIONS: dict[str, Callable[[Records, bool], Findings]] = {
-    EXACT: _of_exact,
-    CONVERT: lambda *_: _findings(CONVERT, [*map_cells.conversion_cells(), *misuse.of_convert()]),
-    SOLVER: _of_solver,
-    STACKS: lambda folder, _: _findings(STACKS, stacks.cells_of(folder.folder)),
-    HEART: lambda *_: _findings(HEART, heart.cells_of()),
-    SEA: lambda *_: _findings(SEA, sea.cells_of()),
-    FUR: lambda *_: _findings(FUR, fur.cells_of()),
+    "exact": _of_exact,
+    "convert": lambda *_: _findings("convert", [*map_cells.conversion_cells(), *misuse.of_convert()]),
+    "solver": _of_solver,
+    "stacks": lambda folder, _: _findings("stacks", stacks.cells_of(folder.folder)),
+    "heart": lambda *_: _findings("heart", scenes.heart_cells()),
+    "sea": lambda *_: _findings("sea", scenes.sea_cells()),
+    "fur": lambda *_: _findings("fur", scenes.fur_cells()),
 }
 
 

@@ -9,36 +9,24 @@ absorbed, thick ones are the half space, thin ones scatter once; and their profi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, Setting, exact
-from mcml_sim.exact import hankel
-from mcml_sim.exact.by_albedo import by_alpha
+from mcml_sim.exact import by_albedo
 from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.transform import Transform
 from profilefit.laws.rational import Normalisation
-from profilefit.studies.stability import layout
-from profilefit.studies.stability.cells import (
-    DIMMEST,
-    Cells,
-    Mask,
-    absolute,
-    judged_cells,
-    relative,
-    steps_down,
-    steps_up,
-)
-from profilefit.studies.stability.layout import CDF, FLOAT64, LENGTHS, PROFILE, REFLECTANCE_OF, SAMPLE, ArgumentAxis
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import ArgumentAxis, Cells, Mask, absolute, axis, relative, steps_down, steps_up
 
 Floats = NDArray[np.float64]
 DECAY = "κ(α)"
 # What its own docstring promises of profile and cdf, and of a map that is fitted to A.
-BOUNDS = {PROFILE: 1e-6, CDF: 1e-9, SAMPLE: 1e-9, REFLECTANCE_OF: 1e-5, DECAY: 1e-10}
+BOUNDS = {cells.PROFILE: 1e-6, cells.CDF: 1e-9, cells.SAMPLE: 1e-9, cells.REFLECTANCE_OF: 1e-5, DECAY: 1e-10}
 SURE_ALPHA, SURE_X = 0.05, (1e-6, 100.0)
 NO_LIMIT = "closer than 1e-6 mfp under diffuse light R_d's limit is not known"
 NEAR_SOURCE = 1e-4  # relative, of R_d closer than 1e-6 mfp, where its limit stands for it
@@ -47,9 +35,9 @@ NEAR_SOURCE = 1e-4  # relative, of R_d closer than 1e-6 mfp, where its limit sta
 def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator[Cells]:
     """Yield every function of a matched half space. Errors are those that more nodes show, or those of an identity."""
     name = "exact" if setting.illumination == "searchlight" else "exact, diffuse light"
-    alpha, x, xi = layout.alpha(np.float64), layout.radius(np.float64), layout.share(np.float64)
-    low, high = LENGTHS[np.float64]
-    mfp = ArgumentAxis("l", "length", np.array([low, 1.0, high]))
+    alpha, x, xi = cells.alpha_axis(np.float64), cells.radius_axis(np.float64), cells.share_axis(np.float64)
+    low, high = cells.LENGTHS[np.float64]
+    mfp = axis("l", (low, 1.0, high), "length")
     a = alpha.values[:, None, None]
     with np.errstate(all="ignore"):
         r = x.values[:, None] * mfp.values
@@ -59,14 +47,14 @@ def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator
         yield _profile(name, setting, (alpha, x, mfp), profile)
     finer = finer_cdf(x.values, alpha.values, setting)
     falls = steps_down(cdf, 1, np.float64, 1.0)
-    yield _cells(name, CDF, (alpha, x, mfp), cdf, finer, absolute(cdf, finer), wrong_way=falls)
+    yield _cells(name, cells.CDF, (alpha, x, mfp), cdf, finer, absolute(cdf, finer), wrong_way=falls)
     missed = absolute(np.asarray(within), np.broadcast_to(xi.values[None, :, None], drawn.shape))
     falls, below = steps_down(drawn, 1, np.float64, drawn), xi.values[None, :, None] < 1.0
-    yield _cells(name, SAMPLE, (alpha, xi, mfp), drawn, drawn, missed, inside=below, wrong_way=falls)
+    yield _cells(name, cells.SAMPLE, (alpha, xi, mfp), drawn, drawn, missed, inside=below, wrong_way=falls)
     value = np.asarray(exact.reflectance(alpha.values, setting))
     near = np.asarray(normalisation.reflectance(alpha.values))
     rise = steps_down(value, 0, np.float64, 1.0)
-    yield _cells(name, REFLECTANCE_OF, (alpha,), value, near, absolute(value, near), wrong_way=rise)
+    yield _cells(name, cells.REFLECTANCE_OF, (alpha,), value, near, absolute(value, near), wrong_way=rise)
     kappa = np.asarray(exact.decay_rate(alpha.values))
     with np.errstate(all="ignore"):
         left = np.where(alpha.values > 0, kappa - np.tanh(kappa / np.maximum(alpha.values, 1e-300)), kappa - 1.0)
@@ -75,11 +63,7 @@ def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator
 
 def finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
     """Return the cdf by more nodes, (alphas, radii, 1)."""
-    return np.asarray(by_alpha(_share_within, x, alpha[:, None], setting, FINER))[..., None]
-
-
-def _share_within(transform: Transform, alpha: Array, x: Array) -> Array:
-    return hankel.cdf(transform, x)
+    return np.asarray(by_albedo.by_alpha(by_albedo.cdf, x, alpha[:, None], setting, FINER))[..., None]
 
 
 def _profile(name: str, setting: Setting, places: tuple[ArgumentAxis, ...], value: Floats) -> Cells:
@@ -95,13 +79,13 @@ def _profile(name: str, setting: Setting, places: tuple[ArgumentAxis, ...], valu
     with np.errstate(all="ignore"):
         stated = np.asarray(exact.error_estimate(x.values, alpha.values[:, None], setting=setting))[..., None]
     at_limit = near < SURE_X[0]
-    error = np.where(at_limit, relative(value, limit) * BOUNDS[PROFILE] / NEAR_SOURCE, stated)
-    inside = at_limit | ((a >= SURE_ALPHA) & (near <= SURE_X[1])) | ~(error > BOUNDS[PROFILE])
+    error = np.where(at_limit, relative(value, limit) * BOUNDS[cells.PROFILE] / NEAR_SOURCE, stated)
+    inside = at_limit | ((a >= SURE_ALPHA) & (near <= SURE_X[1])) | ~(error > BOUNDS[cells.PROFILE])
     reference = np.where(at_limit, limit, value)
-    lost = ((near > 0) & (near < 4.0 * np.finfo(float).tiny)) | (a < DIMMEST[np.float64])
+    lost = ((near > 0) & (near < 4.0 * np.finfo(float).tiny)) | (a < cells.DIMMEST[np.float64])
     depth = np.abs(np.log(np.maximum(value * mfp.values**2, 1e-300)))
     rise = steps_up(value, 1, np.float64, value * depth + 1e-9 * value)
-    return _cells(name, PROFILE, places, value, reference, error, inside=inside, dim=lost, wrong_way=rise)
+    return _cells(name, cells.PROFILE, places, value, reference, error, inside=inside, dim=lost, wrong_way=rise)
 
 
 def _cells(
@@ -113,21 +97,17 @@ def _cells(
     error: Floats,
     bound: float | None = None,
     inside: Mask | bool = True,
-    dim: Mask | bool = False,
-    wrong_way: Mask | None = None,
+    **more: Any,
 ) -> Cells:
-    bound = BOUNDS[quantity] if bound is None else bound
-    judge = np.asarray(inside)
-    return judged_cells(
-        name, True, quantity, FLOAT64, axes, value, reference, error, bound, inside, judge=judge, dim=dim,
-        wrong_way=wrong_way, unjudged=NO_LIMIT if quantity == PROFILE else "",
-    )  # fmt: skip
+    given = axes, value, reference, error, BOUNDS[quantity] if bound is None else bound, inside
+    more["unjudged"] = NO_LIMIT if quantity == cells.PROFILE else ""
+    return Cells(name, True, quantity, cells.FLOAT64, *given, judge=inside, **more)
 
 
 BARELY = 1.0 + 1e-9  # an index that hardly refracts
 SETTINGS = (Setting(n=BARELY), Setting(n=1.4), Setting("diffuse", n=3.0))
 # What the docstrings of `exact` and of `exact.solve` promise where surfaces refract.
-REFRACTING = {PROFILE: 1e-7, CDF: 2e-7, REFLECTANCE_OF: 1e-7}
+REFRACTING = {cells.PROFILE: 1e-7, cells.CDF: 2e-7, cells.REFLECTANCE_OF: 1e-7}
 REFRACTING_ALPHA, REFRACTING_X = (0.05, 0.999), (1e-3, 15.0)
 PLATE_ALPHA = (0.0, 0.05, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0)
 THICKNESS = (1e-3, 0.03, 0.5, 3.0, 30.0, 1e3)  # [mfp]
@@ -148,10 +128,10 @@ def refracting_cells() -> Iterator[Cells]:
 
 def _refracting(setting: Setting) -> Iterator[Cells]:
     name = f"exact, n = {setting.n:.10g}" + ("" if setting.illumination == "searchlight" else ", diffuse light")
-    alpha, x = layout.alpha(np.float64), layout.radius(np.float64)
+    alpha, x = cells.alpha_axis(np.float64), cells.radius_axis(np.float64)
     a, r = alpha.values[:, None], x.values[None]
     closed, barely = Setting(setting.illumination), setting.n == BARELY
-    bound = REFRACTING[PROFILE]
+    bound = REFRACTING[cells.PROFILE]
     with np.errstate(all="ignore"):
         profile = np.asarray(exact.profile(r, a, setting=setting))
         if barely:
@@ -163,21 +143,21 @@ def _refracting(setting: Setting) -> Iterator[Cells]:
     near = (r < SURE_X[0]) & sure
     error = np.where(near, relative(profile, limit) * bound / NEAR_SOURCE, error)
     reference, inside = np.where(near, limit, profile), near | sure & _within(r, REFRACTING_X)
-    yield _cells(name, PROFILE, (alpha, x), profile, reference, error, 1e-6 if barely else bound, inside)
+    yield _cells(name, cells.PROFILE, (alpha, x), profile, reference, error, 1e-6 if barely else bound, inside)
     cdf = np.asarray(exact.cdf(r, a, setting=setting))
     if barely:
         finer = np.asarray(exact.cdf(r, a, setting=closed))
     else:
         finer = finer_cdf(x.values, alpha.values, setting)[..., 0]
-    bound = REFRACTING[CDF]
+    bound = REFRACTING[cells.CDF]
     falls = steps_down(cdf, 1, np.float64, bound / np.finfo(float).eps / 16.0)
-    yield _cells(name, CDF, (alpha, x), cdf, finer, absolute(cdf, finer), bound, sure, wrong_way=falls)
+    yield _cells(name, cells.CDF, (alpha, x), cdf, finer, absolute(cdf, finer), bound, sure, wrong_way=falls)
 
 
 def plates(n: float) -> Cells:
     """Return A of one layer, judged by what holds without its equation."""
-    alpha = ArgumentAxis("α", "-", np.array(PLATE_ALPHA))
-    thickness = ArgumentAxis("thickness", "mfp", np.array(THICKNESS))
+    alpha = axis("α", PLATE_ALPHA)
+    thickness = axis("thickness", THICKNESS, "mfp")
     solved = [[exact.solve(plate(a, d, n)) for d in THICKNESS] for a in PLATE_ALPHA]
     finer = [[exact.solve(plate(a, d, n), nodes=solution.FINE) for d in THICKNESS] for a in PLATE_ALPHA]
     value, reference = (np.array([[one.reflectance for one in row] for row in all]) for all in (solved, finer))
@@ -191,8 +171,8 @@ def plates(n: float) -> Cells:
         thin = value[:, 0] - np.array(PLATE_ALPHA) * THICKNESS[0] / 2
         error[:, 0] = np.maximum(error[:, 0], np.where(np.abs(thin) > 0.02 * value[:, 0], np.abs(thin), 0.0))
     falls = steps_down(value, 0, np.float64) | steps_down(value, 1, np.float64) & (n == 1.0)
-    name, bound = f"stack, n = {n:g}", REFRACTING[REFLECTANCE_OF]
-    return _cells(name, REFLECTANCE_OF, (alpha, thickness), value, reference, error, bound, wrong_way=falls)
+    name, bound = f"stack, n = {n:g}", REFRACTING[cells.REFLECTANCE_OF]
+    return _cells(name, cells.REFLECTANCE_OF, (alpha, thickness), value, reference, error, bound, wrong_way=falls)
 
 
 def plate(alpha: float, thickness: float, n: float) -> Medium:
@@ -201,7 +181,7 @@ def plate(alpha: float, thickness: float, n: float) -> Medium:
 
 
 def _plate_profiles() -> Cells:
-    x, thickness = ArgumentAxis("r/l", "-", np.array(PLATE_X)), ArgumentAxis("thickness", "mfp", np.array(PROFILED))
+    x, thickness = axis("r/l", PLATE_X), axis("thickness", PROFILED, "mfp")
     media = [plate(0.9, d, 1.4) for d in PROFILED]
     value, finer = (
         np.array([exact.solve(one, nodes=nodes).profile(PLATE_X) for one in media])
@@ -210,7 +190,7 @@ def _plate_profiles() -> Cells:
     seen = finer > SEEN * finer[:, [PLATE_X.index(1.0)]]
     error = relative(value, finer) * np.where(thickness.values[:, None] < THIN, PROFILE_BOUND / THIN_BOUND, 1.0)
     inside = seen & (x.values >= REFRACTING_X[0]) | (x.values == 0)
-    return _cells("stack, n = 1.4", PROFILE, (thickness, x), value, finer, error, PROFILE_BOUND, inside)
+    return _cells("stack, n = 1.4", cells.PROFILE, (thickness, x), value, finer, error, PROFILE_BOUND, inside)
 
 
 def _within(values: Floats, ends: tuple[float, float]) -> Mask:

@@ -10,38 +10,31 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.estimate import ResidualFunction, judged
-from profilefit.fitting.objectives import NO_LIMITS, Rings
+from profilefit.fitting.estimate import NO_LIMITS, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.fitting.staged import fit_per_albedo
 from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.laws.liang import Liang
-from profilefit.recipes.starts import spread_out
+from profilefit.recipes.checks import spread_out
 
 Floats = NDArray[np.float64]
 ALBEDOS, RINGS = 8, 40
-ORDINARY = tuple(float(one) for one in np.linspace(0.2, 0.95, ALBEDOS))
-DARK = tuple(float(one) for one in np.geomspace(1e-4, 0.02, ALBEDOS))
-WHITE = tuple(float(one) for one in 1.0 - np.geomspace(1e-6, 1e-3, ALBEDOS))
+ORDINARY = tuple(np.linspace(0.2, 0.95, ALBEDOS).tolist())
+DARK = tuple(np.geomspace(1e-4, 0.02, ALBEDOS).tolist())
+WHITE = tuple((1.0 - np.geomspace(1e-6, 1e-3, ALBEDOS)).tolist())
 LAST = 8.0  # mfp, of ordinary rings
 SEED = 20
 SAME_COST = 1e-6  # relative: solutions that are one optimum
-STARTS, BINS, NOISE, ALBEDO, NONSENSE, TRIMMING = (
-    "random starts",
-    "bin width",
-    "noise",
-    "albedos",
-    "nonsense",
-    "trimming",
-)
+STARTS, BINS, NOISE = "random starts", "bin width", "noise"
+ALBEDO, NONSENSE, TRIMMING = "albedos", "nonsense", "trimming"
 
 
 @dataclass(frozen=True)
@@ -135,7 +128,7 @@ def merged_rings(rings: Rings, count: int) -> Rings:
     wide[:, ::count] = energy.reshape(len(energy), -1, count).sum(axis=-1)
     used = np.zeros_like(energy)
     used[:, ::count] = 1.0
-    return _replaced(rings, r_edges=np.append(0.0, np.repeat(edges[count::count], count)), energy=wide, used=used)
+    return replace(rings, r_edges=np.append(0.0, np.repeat(edges[count::count], count)), energy=wide, used=used)
 
 
 def _noisy(rings: Rings, photons: float, lane: int) -> Rings:
@@ -143,12 +136,7 @@ def _noisy(rings: Rings, photons: float, lane: int) -> Rings:
     normal = np.random.default_rng((SEED, lane)).standard_normal((2, *np.shape(rings.energy)))
     energy = np.abs(np.asarray(rings.energy) + normal[0] * np.sqrt(np.asarray(rings.energy) / photons))
     beyond = np.abs(np.asarray(rings.beyond) + normal[1, :, 0] * np.sqrt(np.asarray(rings.beyond) / photons))
-    return _replaced(rings, energy=energy, beyond=beyond)
-
-
-def _replaced(rings: Rings, **changed: Any) -> Rings:
-    fields = {name: getattr(rings, name) for name in Rings.__dataclass_fields__}
-    return Rings(**{**fields, **changed})
+    return replace(rings, energy=energy, beyond=beyond)
 
 
 def _stacked(law: Constants, data: list[Rings]) -> Any:
@@ -165,16 +153,8 @@ def _case(
     best = [one for one in done if one.cost <= least * (1.0 + SAME_COST) + 1e-20]
     spread, worst = _spread(np.array([one.parameters for one in (done if case == NOISE else best)]), names, start)
     results = Counter(re.split("[,:]", one.result)[0] for one in solutions)
-    return FitCase(
-        label,
-        case,
-        value,
-        len(done) / len(solutions),
-        len(best) / len(solutions),
-        spread,
-        worst,
-        tuple(results.most_common()),
-    )
+    shares = len(done) / len(solutions), len(best) / len(solutions)
+    return FitCase(label, case, value, *shares, spread, worst, tuple(results.most_common()))
 
 
 def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) -> tuple[float, str]:
@@ -189,14 +169,15 @@ def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) ->
     return float(relative[worst]), names[worst]
 
 
+def _one_albedo(rings: Rings) -> Rings:
+    changed: dict[str, Any] = {}
+    for name in ("alpha", "energy", "beyond", "used", "weight"):
+        changed[name] = np.repeat(np.asarray(getattr(rings, name))[-1:], ALBEDOS, axis=0)
+    return replace(rings, **changed)
+
+
 NONSENSES: dict[str, Callable[[Rings], Rings]] = {
-    "NaN in the data": lambda rings: _replaced(rings, energy=np.full_like(np.asarray(rings.energy), np.nan)),
-    "all zeros": lambda rings: _replaced(
-        rings, energy=np.zeros_like(np.asarray(rings.energy)), beyond=np.zeros_like(np.asarray(rings.beyond))
-    ),
-    "one albedo only": lambda rings: _replaced(
-        rings,
-        **{name: np.tile(np.asarray(getattr(rings, name))[-1:], (ALBEDOS, *[1] * (np.ndim(getattr(rings, name)) - 1)))
-           for name in ("alpha", "energy", "beyond", "used", "weight")},
-    ),
-}  # fmt: skip
+    "NaN in the data": lambda rings: replace(rings, energy=np.full_like(rings.energy, np.nan)),
+    "all zeros": lambda rings: replace(rings, energy=np.zeros_like(rings.energy), beyond=np.zeros_like(rings.beyond)),
+    "one albedo only": _one_albedo,
+}

@@ -17,24 +17,15 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from profilefit.laws.base import Range
 from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.shader.check.validity import Range
-from profilefit.studies.stability.cells import Cells, judged_cells
-from profilefit.studies.stability.layout import (
-    ALPHA_OF,
-    CDF,
-    FLOAT64,
-    PDF,
-    PROFILE,
-    REFLECTANCE_OF,
-    SAMPLE,
-    ArgumentAxis,
-)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import Cells, Mask, axis
 from profilefit.studies.stability.map_cells import map_label
 
 Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Triple = tuple[Floats, Floats, Floats]
+Axes = tuple[cells.ArgumentAxis, ...]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)
 RADIUS = (0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1e6, np.inf)
 SHARE = (0.0, 1e-12, 1e-6, 1e-3, 0.008, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
@@ -51,55 +42,52 @@ INSIDE = "differentiate inside, alpha < 1, r > 0 and xi > 0, or by sqrt(1 - alph
 UNSURE = "differences are rounding there: only whether the derivative is a number is looked at"
 Function = Callable[[Any, Array, Array, Array], Array]
 FUNCTIONS: dict[str, Function] = {
-    PROFILE: lambda law, r, alpha, mfp: law.profile(r, alpha, mfp),
-    CDF: lambda law, r, alpha, mfp: law.cdf(r, alpha, mfp),
-    SAMPLE: lambda law, xi, alpha, mfp: law.sampler.sample(xi, alpha, mfp),
-    PDF: lambda law, r, alpha, mfp: law.sampler.pdf(r, alpha, mfp),
+    cells.PROFILE: lambda law, r, alpha, mfp: law.profile(r, alpha, mfp),
+    cells.CDF: lambda law, r, alpha, mfp: law.cdf(r, alpha, mfp),
+    cells.SAMPLE: lambda law, xi, alpha, mfp: law.sampler.sample(xi, alpha, mfp),
+    cells.PDF: lambda law, r, alpha, mfp: law.sampler.pdf(r, alpha, mfp),
 }
 MAPS: dict[str, Function] = {
-    ALPHA_OF: lambda law, a, _, __: law.alpha(a),
-    REFLECTANCE_OF: lambda law, alpha, _, __: law.reflectance(alpha),
+    cells.ALPHA_OF: lambda law, a, _, __: law.alpha(a),
+    cells.REFLECTANCE_OF: lambda law, alpha, _, __: law.reflectance(alpha),
 }
 
 
 def of_law(named: LoadedLaw, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
     """Yield the derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
-    alpha = ArgumentAxis("α", "-", np.array(ALPHA))
+    alpha = axis("α", ALPHA)
     for name in names:
-        symbol = "ξ" if name == SAMPLE else "r"
-        first = ArgumentAxis(symbol if name == SAMPLE else "r/l", "-", np.array(SHARE if name == SAMPLE else RADIUS))
+        symbol = "ξ" if name == cells.SAMPLE else "r"
+        first = axis(symbol, SHARE) if symbol == "ξ" else axis("r/l", RADIUS)
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
         sure = valid & _within(symbol, u) & _within("α", a)
         derivatives = _derivatives(FUNCTIONS[name], named.law, u, a, symbol, named.law.constant_names() != ())
         for by, triple in derivatives.items():
-            yield _cells(named.label, named.law.entry.own, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
+            yield _cells(named, named.label, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
 
 
 def of_map(named: LoadedLaw, spans: tuple[Range, Range]) -> Iterator[Cells]:
     """Yield the derivatives of both directions of a map."""
-    ways = ((ALPHA_OF, "A", REFLECTANCE), (REFLECTANCE_OF, "α", ALPHA))
+    ways = ((cells.ALPHA_OF, "A", REFLECTANCE), (cells.REFLECTANCE_OF, "α", ALPHA))
     for (name, symbol, values), span in zip(ways, spans, strict=True):
-        axis = ArgumentAxis(symbol, "-", np.array(values))
-        u = axis.values
+        at = axis(symbol, values)
+        u = at.values
         derivatives = _derivatives(MAPS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
         sure = valid & _within(symbol, u)
         for by in (symbol, "constants"):
-            quantity = f"∂{name}/∂{by}"
-            yield _cells(map_label(named), named.law.entry.own, quantity, (axis,), derivatives[by], valid, sure)
+            yield _cells(named, map_label(named), f"∂{name}/∂{by}", (at,), derivatives[by], valid, sure)
 
 
-def _within(symbol: str, values: Floats) -> NDArray[np.bool_]:
+def _within(symbol: str, values: Floats) -> Mask:
     low, high = SURE[symbol]
     return (values >= low) & (values <= high)
 
 
-def _cells(
-    label: str, own: bool, quantity: str, axes: tuple[ArgumentAxis, ...], triple: Triple, valid: Mask, sure: Mask
-) -> Cells:
+def _cells(named: LoadedLaw, label: str, quantity: str, axes: Axes, triple: Triple, valid: Mask, sure: Mask) -> Cells:
     """Return the cells of a derivative, its difference, and value over argument."""
-    shape = tuple(axis.values.size for axis in axes)
+    shape = tuple(one.values.size for one in axes)
     value, difference, scale = (each.reshape(shape) for each in triple)
     valid, sure = valid.reshape(shape), sure.reshape(shape)
     with np.errstate(all="ignore"):
@@ -107,11 +95,8 @@ def _cells(
     error = np.where(sure & (scale > 0), error, np.nan)
     reference = np.where(sure, difference, np.nan)
     sizes = np.where(np.isnan(value), np.nan, np.abs(value))
-    cells = judged_cells(
-        label, own, quantity, FLOAT64, axes, sizes, reference, error, BOUND, valid, judge=valid, unjudged=UNSURE,
-        advice=INSIDE,
-    )  # fmt: skip
-    return replace(cells, value=value)
+    given = label, named.law.entry.own, quantity, cells.FLOAT64, axes, sizes, reference, error, BOUND, valid
+    return replace(Cells(*given, judge=valid, unjudged=UNSURE, advice=INSIDE), value=value)
 
 
 def _derivatives(function: Function, law: Any, u: Floats, a: Floats, symbol: str, constants: bool) -> dict[str, Triple]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import jax
@@ -24,41 +24,13 @@ from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
-from profilefit.shader.check import bounds, dense_grid, validity
+from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ROUNDING_SHARE
-from profilefit.studies.stability.cells import (
-    DIMMEST,
-    EXTENDED,
-    Cells,
-    Mask,
-    RoundedText,
-    absolute,
-    judged_cells,
-    relative,
-    steps_down,
-    steps_up,
-)
-from profilefit.studies.stability.layout import (
-    ARITHMETICS,
-    CDF,
-    DTYPES,
-    FLOAT32,
-    FLOAT64,
-    HALF_BOUND,
-    HELD,
-    MODEL,
-    PDF,
-    PROFILE,
-    QUANTITIES,
-    SAMPLE,
-    STORED16,
-    TEXT16,
-    ArgumentAxis,
-    ArgumentGrid,
-)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import ArgumentGrid, Cells, Mask, RoundedText, absolute, axis, relative
 
 Floats = NDArray[np.float64]
-Values = dict[str, Floats]
+Axes = tuple[cells.ArgumentAxis, ...]
 # Of laws without a record: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
 MEASURED: dict[str, dict[str, float]] = {
     "burley_diffuse_mfp": {"rel": 0.156, "ks": 0.0658},
@@ -67,7 +39,7 @@ MEASURED: dict[str, dict[str, float]] = {
 }
 NO_BOUND = "its record states no error of this quantity"
 BEYOND_TEXT = "beyond the radius at which shader sources stop, where no energy is left"
-COMPUTED = tuple(one for one in ARITHMETICS if one != MODEL)
+COMPUTED = tuple(one for one in cells.ARITHMETICS if one != cells.MODEL)
 # What helps where the formula of a law leaves the half space.
 OF_LIANG = (
     "take alpha >= 1e-6, b0 = 0.0641 (constants `corrected`) and |g| with the density of that map; hazard and quantile "
@@ -85,9 +57,9 @@ OF_MODELS = {
 
 def advice_of(named: LoadedLaw, arithmetic: str) -> str:
     """Return what helps where a law is red; that of the arithmetic, an empty text, where it is no law's own."""
-    if arithmetic == MODEL:
+    if arithmetic == cells.MODEL:
         return OF_MODELS.get(named.name.partition(":")[0], "")
-    return OF_LIANG if isinstance(named.law, Liang) and arithmetic in HELD else ""
+    return OF_LIANG if isinstance(named.law, Liang) and arithmetic in cells.HELD else ""
 
 
 @dataclass(frozen=True)
@@ -95,91 +67,92 @@ class Limits:
     """Bounds of one law's errors by quantity, and where it holds."""
 
     of: dict[str, float]
-    valid: validity.Validity
+    valid: bounds.Validity
 
     def bound(self, quantity: str, dtype: type) -> float:
         """Return a tenth of the model's own error; in half not less than what keeping a number costs."""
         own = self.of.get(quantity, np.inf)
-        return max(own, HALF_BOUND) if dtype is np.float16 else own
+        return max(own, cells.HALF_BOUND) if dtype is np.float16 else own
 
 
 def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
     """Return a tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
-    model = MEASURED.get(named.name) or bounds.of_profile(named, folder).values
+    model = MEASURED.get(named.name) or bounds.model_of_profile(named, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
-    errors = {PROFILE: rel, PDF: rel, CDF: ks, SAMPLE: drawn}
+    errors = {cells.PROFILE: rel, cells.PDF: rel, cells.CDF: ks, cells.SAMPLE: drawn}
     known = {name: ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
-    return Limits(known, validity.of_profile(named, folder))
+    return Limits(known, bounds.valid_profile(named, folder))
 
 
 def cells_of(named: LoadedLaw, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
     """Yield all quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
-        yield from computed(named, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
+        at = ArgumentGrid.of(cells.DTYPES[arithmetic], arithmetic != cells.FLOAT64)
+        yield from computed(named, limits, arithmetic, at)
 
 
 def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
     """Yield all quantities of a law in one arithmetic on a grid."""
-    nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else dense_grid.LEAST_X
-    stored = arithmetic == STORED16
+    nearest = 0.0 if arithmetic in (cells.FLOAT64, cells.FLOAT32) else dense_grid.LEAST_X
+    stored = arithmetic == cells.STORED16
     albedo = _stored_albedo(RoundedText(named.law, np.float32), at.arguments[2]) if stored else None
     reference = Reference(named.law, at, albedo, nearest)
     for name, value in _values(named.law, arithmetic, at).items():
-        places = (at.alpha, at.xi if name == SAMPLE else at.x, at.mfp)
+        places = (at.alpha, at.xi if name == cells.SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
         value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
-        inside = np.broadcast_to(_inside(name, limits.valid, at), shape)
-        bound = limits.bound(name, at.dtype)
-        if name == SAMPLE:
+        inside, bound = _inside(name, limits.valid, at), limits.bound(name, at.dtype)
+        if name == cells.SAMPLE:
             error = reference.misplaced(value)
         else:
-            error = absolute(value, exactly) if name == CDF else relative(value, exactly)
-        yield judged_cells(
-            named.label, named.law.entry.own, name, arithmetic, places, value, exactly, error, bound,
-            inside & (arithmetic in HELD), judge=inside, dim=reference.dim(name, exactly),
-            wrong_way=_wrong_way(name, value, reference), unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
-            advice=advice_of(named, arithmetic),
-        )  # fmt: skip
+            error = absolute(value, exactly) if name == cells.CDF else relative(value, exactly)
+        yield _judged(
+            *(named, name, arithmetic, places, value, exactly, error, bound, inside & (arithmetic in cells.HELD)),
+            judge=inside,
+            dim=reference.dim(name, exactly),
+            wrong_way=_wrong_way(name, value, reference),
+            unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
+        )
 
 
-def _inside(name: str, valid: validity.Validity, at: ArgumentGrid) -> Mask:
+def _inside(name: str, valid: bounds.Validity, at: ArgumentGrid) -> Mask:
     """Return where the law says that the quantity holds; a uniform number is below 1."""
     albedos, shares = at.alpha.values, at.xi.values
-    profiled, drawn = validity.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
-    if name == SAMPLE:
+    profiled, drawn = bounds.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
+    if name == cells.SAMPLE:
         return drawn & at.accepted
-    return (np.any(drawn, axis=1, keepdims=True) if name == PDF else profiled) & at.accepted
+    return (np.any(drawn, axis=1, keepdims=True) if name == cells.PDF else profiled) & at.accepted
 
 
 def _wrong_way(name: str, value: Floats, reference: Reference) -> Mask | None:
     """Return where R_d rises with r, or the cdf or a radius falls. e^-t has as many roundings as t."""
     at = reference.at
     with np.errstate(all="ignore"):
-        if name == PROFILE:
+        if name == cells.PROFILE:
             depth = np.abs(np.log(np.abs(value * at.mfp.values**2)))
-            return steps_up(value, 1, at.dtype, np.abs(value) * np.where(np.isfinite(depth), depth, 0.0))
-        if name == CDF:
-            return steps_down(value, 1, at.dtype, 1.0)
-        if name != SAMPLE:
+            return cells.steps_up(value, 1, at.dtype, np.abs(value) * np.where(np.isfinite(depth), depth, 0.0))
+        if name == cells.CDF:
+            return cells.steps_down(value, 1, at.dtype, 1.0)
+        if name != cells.SAMPLE:
             return None
-        falls = steps_down(value, 1, at.dtype, np.abs(value[:, value.shape[1] // 2, None]))
+        falls = cells.steps_down(value, 1, at.dtype, np.abs(value[:, value.shape[1] // 2, None]))
     # Where another part of the light begins, radii begin anew.
     xi, ulp = at.xi.values[:, None], float(np.finfo(at.dtype).eps)
     falls[:, 1:] &= (xi[1:] < reference.jump - ulp) | (reference.jump + ulp < xi[:-1])
     return falls
 
 
-def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> Values:
-    if arithmetic == FLOAT64:
+def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> dict[str, Floats]:
+    if arithmetic == cells.FLOAT64:
         values = _of_law(law, *at.arguments)
-    elif arithmetic == FLOAT32:
+    elif arithmetic == cells.FLOAT32:
         with np.errstate(over="ignore"):
             single = (jnp.asarray(each, jnp.float32) for each in at.arguments)
         values = _of_law(jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law), *single)
     else:
         values = _of_text(law, arithmetic, *at.arguments)
-    return dict(zip(QUANTITIES, (np.asarray(each, float) for each in values), strict=True))
+    return dict(zip(cells.QUANTITIES, (np.asarray(each, float) for each in values), strict=True))
 
 
 def _of_law(law: ProfileLaw, r, xi, alpha, mfp) -> tuple:
@@ -189,12 +162,12 @@ def _of_law(law: ProfileLaw, r, xi, alpha, mfp) -> tuple:
 
 
 def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
-    text = RoundedText(law, np.float16 if arithmetic == TEXT16 else np.float32)
-    if arithmetic == STORED16:
+    text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
+    if arithmetic == cells.STORED16:
         alpha = _stored_albedo(text, alpha)
     calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
     values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
-    if arithmetic != STORED16:
+    if arithmetic != cells.STORED16:
         return values
     with np.errstate(over="ignore"):
         return tuple(each.astype(np.float16) for each in values)
@@ -207,7 +180,7 @@ def _stored_albedo(text: RoundedText, alpha: Floats) -> Floats:
 
 
 HALVINGS = 70  # of a bracket of 90 in ln t
-NOWHERE = np.finfo(EXTENDED).tiny ** EXTENDED(0.4)  # r/l that stands for 0 in a quotient
+NOWHERE = np.finfo(cells.EXTENDED).tiny ** cells.EXTENDED(0.4)  # r/l that stands for 0 in a quotient
 
 
 class Reference:
@@ -220,35 +193,35 @@ class Reference:
     def __init__(self, law: ProfileLaw, at: ArgumentGrid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
         self.at, self._nearest = at, nearest
         self._finite_source = law.is_finite_at_source
-        self._text = RoundedText(law, EXTENDED)
+        self._text = RoundedText(law, cells.EXTENDED)
         if isinstance(law, Quantile):  # its few steps do not settle for albedos that only float64 has
             self._text.replace("depth", self._depth)
-        r, xi, alpha, mfp = (each.astype(EXTENDED) for each in at.arguments)
+        r, xi, alpha, mfp = (each.astype(cells.EXTENDED) for each in at.arguments)
         self._x, self._mfp, self._xi = r / mfp, mfp, xi
-        self._shape = self._text.call("shape", alpha if albedo is None else albedo.astype(EXTENDED))
+        self._shape = self._text.call("shape", alpha if albedo is None else albedo.astype(cells.EXTENDED))
 
     def of(self, name: str) -> Floats:
         """Return the quantity, in its own unit, as a float64: infinite where it is beyond that."""
         with np.errstate(all="ignore"):
-            if name == PROFILE:
+            if name == cells.PROFILE:
                 return np.asarray(self._known_at(self._scaled_profile()) / self._mfp**2, float)
-            if name == CDF:
+            if name == cells.CDF:
                 return np.asarray(self._text.call("cumulated", self._x, self._shape), float)
-            if name == SAMPLE:
+            if name == cells.SAMPLE:
                 return np.asarray(self._radius() * self._mfp, float)
             density = self._text.call("radius_density", self._x, self._shape)
             return np.asarray(self._known_at(density) / self._mfp, float)
 
     def dim(self, name: str, reference: Floats) -> Mask:
         """Return where a number in units of l has left the format before the unit of length enters."""
-        if name not in (PROFILE, PDF):
+        if name not in (cells.PROFILE, cells.PDF):
             return np.zeros((1, 1, 1), bool)
-        least = DIMMEST[self.at.dtype]
+        least = cells.DIMMEST[self.at.dtype]
         with np.errstate(all="ignore"):
-            scaled = reference * self.at.mfp.values ** (2 if name == PROFILE else 1)
+            scaled = reference * self.at.mfp.values ** (2 if name == cells.PROFILE else 1)
         # A is a factor, and may be too small itself; a denormal r/l is 0 where denormals are.
         tiny = float(np.finfo(self.at.dtype).tiny)
-        if name == PDF:  # next to the source laws take it at the root of the least number
+        if name == cells.PDF:  # next to the source laws take it at the root of the least number
             return (np.abs(scaled) < least) & (reference != 0) | (self._x < 4.0 * tiny**0.5)
         lost = (self.at.arguments[2] < least) | ((self._x > 0) & (self._x < 4.0 * tiny))
         return ((np.abs(scaled) < least) | lost) & (reference != 0)
@@ -262,7 +235,7 @@ class Reference:
     def misplaced(self, value: Floats) -> Floats:
         """Return the share of the energy between a drawn radius and the reference [-], of the part that both are of."""
         with np.errstate(all="ignore"):
-            x = np.where(value >= 0, value, np.inf).astype(EXTENDED) / self._mfp
+            x = np.where(value >= 0, value, np.inf).astype(cells.EXTENDED) / self._mfp
             here, there = (self._undone(each) for each in (x, self._radius()))
             return np.asarray(np.abs(here - there), float)
 
@@ -280,15 +253,15 @@ class Reference:
         return np.where((self._x > FARTHEST) & (value != 0), np.nan, value)
 
     def _scaled_profile(self) -> NDArray:
-        x = np.maximum(self._x, EXTENDED(self._nearest))
+        x = np.maximum(self._x, cells.EXTENDED(self._nearest))
         near = np.maximum(x, NOWHERE)
         density = self._text.call("density", near, self._shape)
-        profile = self._text.call("reflectance", self._shape) * density / (2.0 * EXTENDED(np.pi) * near)
+        profile = self._text.call("reflectance", self._shape) * density / (2.0 * cells.EXTENDED(np.pi) * near)
         return profile if self._finite_source else np.where((x > 0) | (profile == 0), profile, np.inf)
 
     def _depth(self, radius: NDArray, shape: Any) -> NDArray:
         """Return t at x of the quantile law: a bracket halved, in ln t."""
-        x = np.clip(radius, EXTENDED(NEAREST), EXTENDED(FARTHEST))
+        x = np.clip(radius, cells.EXTENDED(NEAREST), cells.EXTENDED(FARTHEST))
         low, high = np.full_like(x, -65.0), np.full_like(x, 25.0) + 0.0 * shape.kappa
         low = low + 0.0 * high
         for _ in range(HALVINGS):
@@ -304,12 +277,12 @@ class Reference:
 def _of_part(shape: Any, share: float) -> Any:
     """Return the shape of a law whose light is all of its first part, or of its second."""
     part = copy(shape)
-    part.share, part.rest = EXTENDED(share), EXTENDED(1.0 - share)
+    part.share, part.rest = cells.EXTENDED(share), cells.EXTENDED(1.0 - share)
     return part
 
 
 # What a picture shows at once: R_d off by a third, three hundredths of the light in the wrong place.
-MODEL_BOUNDS = {PROFILE: 1.0 / 3.0, CDF: 0.03, SAMPLE: 0.03}
+MODEL_BOUNDS = {cells.PROFILE: 1.0 / 3.0, cells.CDF: 0.03, cells.SAMPLE: 0.03}
 ALPHA = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.995, 0.999, 0.9999, 1.0 - 1e-6, 1.0)
 RADIUS = tuple(float(one) for one in np.geomspace(quality.NEAREST, 300.0, 19))
 SHARE = (1e-3, 5e-3, 0.0099, 0.0101, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.995, 0.999)
@@ -327,7 +300,7 @@ def model_cells(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
 
 
 def _against_exact(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
-    alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
+    alpha, x, xi = (axis("α", ALPHA), axis("r/l", RADIUS), axis("ξ", SHARE))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
     law, setting = named.law.in_reduced(), named.setting
     own = np.asarray(unreduced(albedo, setting.g))  # of the medium that has this reduced albedo, and l* = 1
@@ -343,55 +316,38 @@ def _against_exact(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
     held, draws = (_holds(span, albedo) for span in (limits.valid.alpha, limits.valid.drawn))
     seen = (within <= quality.ENERGY_WITHIN) & law.entry.profile.holds(albedo)
     for name, places, value, reference, error, inside in (
-        (PROFILE, (alpha, x), profile, truth, relative(profile, truth), held & seen),
-        (CDF, (alpha, x), cdf, within, absolute(cdf, within), held),
-        (SAMPLE, (alpha, xi), drawn, drawn, absolute(reached, np.broadcast_to(share, drawn.shape)), draws),
+        (cells.PROFILE, (alpha, x), profile, truth, relative(profile, truth), held & seen),
+        (cells.CDF, (alpha, x), cdf, within, absolute(cdf, within), held),
+        (cells.SAMPLE, (alpha, xi), drawn, drawn, absolute(reached, np.broadcast_to(share, drawn.shape)), draws),
     ):
-        yield judged_cells(
-            named.label, named.law.entry.own, name, MODEL, places, value, reference, error, MODEL_BOUNDS[name], inside,
-            judge=inside, advice=advice_of(named, MODEL),
-        )  # fmt: skip
+        yield _judged(named, name, cells.MODEL, places, value, reference, error, MODEL_BOUNDS[name], inside)
 
 
-def _holds(span: validity.Range | None, alpha: Floats) -> Mask:
+def _judged(named: LoadedLaw, name: str, arithmetic: str, axes: Axes, *given: Any, **more: Any) -> Cells:
+    """Return cells of a law, given value, reference, error, bound and where they count."""
+    known = {"judge": given[-1], "advice": advice_of(named, arithmetic), **more}
+    return Cells(named.label, named.law.entry.own, name, arithmetic, axes, *given, **known)
+
+
+def _holds(span: bounds.Range | None, alpha: Floats) -> Mask:
     return span.holds(alpha) if span else np.zeros(alpha.shape, bool)
 
 
 def unclipped(named: LoadedLaw, limits: Limits) -> Cells:
     """Return g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
-    axes = (
-        ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
-        ArgumentAxis("ξ", "-", np.array((0.0, 1e-6, 1e-4, *SHARE))),
-    )
+    axes = axis("α", (0.0, *ALPHA)), axis("ξ", (0.0, 1e-6, 1e-4, *SHARE))
     alpha = axes[0].values[:, None]
     with np.errstate(all="ignore"):
         value = np.asarray(named.law.sampler.unclipped(axes[1].values[None], alpha))
     error, inside = np.where(value < 0, np.abs(value), 0.0), _holds(limits.valid.alpha, alpha)
-    cells = judged_cells(
-        named.label,
-        False,
-        INVERSE,
-        FLOAT64,
-        axes,
-        value,
-        np.abs(value),
-        error,
-        0.0,
-        inside,
-        judge=inside,
-        advice=OF_LIANG,
-    )
-    return replace(cells, reference=value)
+    return _judged(named, INVERSE, cells.FLOAT64, axes, value, value, error, 0.0, inside)
 
 
 def own_energy(named: LoadedLaw, limits: Limits) -> Cells:
     """Return cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
-    alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
+    alpha = axis("α", (0.0, *ALPHA))
     with np.errstate(all="ignore"):
         whole = np.asarray(named.law.unscaled_energy(np.inf, alpha.values))
         value = whole / np.asarray(named.law.albedo.reflectance(alpha.values))
     error, inside = absolute(value, np.ones_like(value)), _holds(limits.valid.alpha, alpha.values)
-    return judged_cells(
-        named.label, False, ENERGY, MODEL, (alpha,), value, np.ones(()), error, ENERGY_BOUND, inside, judge=inside,
-        advice=OF_LIANG,
-    )  # fmt: skip
+    return _judged(named, ENERGY, cells.MODEL, (alpha,), value, np.ones(()), error, ENERGY_BOUND, inside)

@@ -15,36 +15,13 @@ from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
-from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.base import AlbedoLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
-from profilefit.shader.check import bounds, validity
+from profilefit.shader.check import bounds
 from profilefit.shader.check.bounds import ROUNDING_SHARE
-from profilefit.shader.check.validity import Range
-from profilefit.studies.stability import layout
-from profilefit.studies.stability.cells import (
-    EXTENDED,
-    Cells,
-    RoundedText,
-    Verdict,
-    absolute,
-    judged_cells,
-    steps_down,
-)
-from profilefit.studies.stability.layout import (
-    ALPHA_OF,
-    DTYPES,
-    FLOAT32,
-    FLOAT64,
-    HALF_BOUND,
-    HELD,
-    MODEL,
-    REFLECTANCE_OF,
-    STORED16,
-    TEXT16,
-    TEXT32,
-    ArgumentAxis,
-)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import ArgumentAxis, Cells, RoundedText, Verdict, absolute, axis, steps_down
 
 Floats = NDArray[np.float64]
 FACTOR = 1.5  # of what a record states
@@ -52,7 +29,7 @@ FACTOR = 1.5  # of what a record states
 MODEL_BOUND = 0.02
 ROOT_STORED = "A(√(1−α))"
 # Measure of a map in records, and the function of its shader source.
-WAYS = {ALPHA_OF: ("delta_alpha", "alpha"), REFLECTANCE_OF: ("delta_A", "map_reflectance")}
+WAYS = {cells.ALPHA_OF: ("delta_alpha", "alpha"), cells.REFLECTANCE_OF: ("delta_A", "map_reflectance")}
 OF_MAPS = (
     "use the rational map, which rises to alpha(1) = 1 and misses A by 3e-6; others need A clamped below their fold"
 )
@@ -61,11 +38,18 @@ UNSTATED = "no record states the error of this direction"
 
 def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
-    text, model, spans = in_reduced(named), bounds.of_map(named, folder), validity.of_map(named, folder)
+    text, model, spans = in_reduced(named), bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
-        for arithmetic in (FLOAT64, FLOAT32, TEXT32, TEXT16):
-            yield _computed(text, name, arithmetic, limit, span)
+        for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
+            dtype = cells.DTYPES[arithmetic]
+            at = cells.reflectance_axis(dtype) if name == cells.ALPHA_OF else cells.alpha_axis(dtype)
+            value, reference = (
+                _value(text.law, name, arithmetic, at),
+                _text_value(text.law, cells.EXTENDED, name, at.values),
+            )
+            own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
+            yield _cells(text, name, arithmetic, at, value, reference, own, span)
     yield from _kept_in_half(text, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
@@ -76,19 +60,11 @@ def in_reduced(named: LoadedLaw) -> LoadedLaw:
     return replace(named, law=named.law.in_reduced())
 
 
-def _computed(named: LoadedLaw, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
-    dtype = DTYPES[arithmetic]
-    axis = layout.reflectance(dtype) if name == ALPHA_OF else layout.alpha(dtype)
-    value, reference = _value(named.law, name, arithmetic, axis), _reference(named.law, name, axis)
-    limit = max(limit, HALF_BOUND) if dtype is np.float16 else limit
-    return _cells(named, name, arithmetic, axis, value, reference, limit, span)
-
-
 def _cells(
     named: LoadedLaw,
     name: str,
     arithmetic: str,
-    axis: ArgumentAxis,
+    at: ArgumentAxis,
     value: Floats,
     reference: Floats,
     limit: float,
@@ -96,11 +72,11 @@ def _cells(
     error: Floats | None = None,
 ) -> Cells:
     """Return the cells of one direction; the error is |value - reference| by default."""
-    inside, held = span.holds(axis.values), arithmetic in HELD
-    return judged_cells(
-        map_label(named), named.law.entry.own, name, arithmetic, (axis,), value, reference,
+    inside, held, dtype = span.holds(at.values), arithmetic in cells.HELD, cells.DTYPES[arithmetic]
+    return Cells(
+        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference,
         absolute(value, reference) if error is None else error, limit, inside & held, judge=inside,
-        wrong_way=steps_down(value, 0, DTYPES[arithmetic], 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
+        wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
     )  # fmt: skip
 
 
@@ -109,30 +85,30 @@ def map_label(named: LoadedLaw) -> str:
     return named.label if named.records else f"map {named.label}"
 
 
-def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: ArgumentAxis) -> Floats:
-    given: Any = axis.values
-    if arithmetic in (TEXT32, TEXT16):
-        return np.asarray(RoundedText(law, DTYPES[arithmetic]).call(WAYS[name][1], given), float)
-    if arithmetic == FLOAT32:
+def _value(law: AlbedoLaw, name: str, arithmetic: str, at: ArgumentAxis) -> Floats:
+    given: Any = at.values
+    if arithmetic in (cells.TEXT32, cells.TEXT16):
+        return _text_value(law, cells.DTYPES[arithmetic], name, given)
+    if arithmetic == cells.FLOAT32:
         law = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law)
         given = jnp.asarray(given, jnp.float32)
     with np.errstate(all="ignore"):
-        return np.asarray(law.alpha(given) if name == ALPHA_OF else law.reflectance(given), float)
+        return np.asarray(law.alpha(given) if name == cells.ALPHA_OF else law.reflectance(given), float)
 
 
-def _reference(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
-    return np.asarray(RoundedText(law, EXTENDED).call(WAYS[name][1], axis.values), float)
+def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Any) -> Floats:
+    return np.asarray(RoundedText(law, dtype).call(WAYS[name][1], given), float)
 
 
 def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
     """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
-    axis = layout.alpha(np.float32)
-    text, reference = RoundedText(named.law, np.float32), _reference(named.law, REFLECTANCE_OF, axis)
-    half = axis.values.astype(np.float16).astype(np.float32)
-    root = np.sqrt(1.0 - axis.values).astype(np.float16).astype(np.float32)
-    for name, alpha in ((REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
-        value = np.asarray(text.call(WAYS[REFLECTANCE_OF][1], alpha), float)
-        yield _cells(named, name, STORED16, axis, value, reference, HALF_BOUND, span)
+    at = cells.alpha_axis(np.float32)
+    reference = _text_value(named.law, cells.EXTENDED, cells.REFLECTANCE_OF, at.values)
+    half = at.values.astype(np.float16).astype(np.float32)
+    root = np.sqrt(1.0 - at.values).astype(np.float16).astype(np.float32)
+    for name, alpha in ((cells.REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
+        value = _text_value(named.law, np.float32, cells.REFLECTANCE_OF, alpha)
+        yield _cells(named, name, cells.STORED16, at, value, reference, cells.HALF_BOUND, span)
 
 
 def _against_exact(
@@ -140,17 +116,19 @@ def _against_exact(
 ) -> Iterator[Cells]:
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
-    alpha = ArgumentAxis("α", "-", 1.0 - root**2)
+    alpha = axis("α", 1.0 - root**2)
     own = unreduced(alpha.values, named.setting.g)
-    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(own, setting=named.setting)))
+    reflectance = axis("A", np.asarray(exact.reflectance(own, setting=named.setting)))
     law = named.law.in_reduced()
     with np.errstate(all="ignore"):
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
-    stated = model.get(WAYS[REFLECTANCE_OF][0]) or np.nan
+    stated = model.get(WAYS[cells.REFLECTANCE_OF][0]) or np.nan
     bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(named, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha)
+    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, alpha, there, reflectance.values, bound, of_alpha)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    yield _cells(named, ALPHA_OF, MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error)
+    yield _cells(
+        named, cells.ALPHA_OF, cells.MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error
+    )
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.
@@ -167,16 +145,15 @@ def conversion_cells() -> Iterator[Cells]:
 
 def _length(name: str) -> Cells:
     """Return l = 1 there and back: infinite lengths, where nothing is absorbed, are refused by name on the way back."""
-    axis = layout.alpha(np.float64)
+    at = cells.alpha_axis(np.float64)
     with np.errstate(all="ignore"):
-        value = np.asarray(Optical(axis.values, np.array(1.0)).length(name))
-        back = np.array([_returned(name, one, a) for one, a in zip(value, axis.values, strict=True)])
-    infinite = np.isinf(value) & (axis.values == 1.0)
-    error = np.where(infinite, 0.0, np.abs(back - 1.0))
-    reference = np.where(infinite, np.inf, value)
-    cells = judged_cells("convert", False, name, FLOAT64, (axis,), value, reference, error, RETURN_BOUND)
-    cells.codes[(value == 0) | np.isnan(back)] = Verdict.NOT_FINITE
-    return cells
+        value = np.asarray(Optical(at.values, np.array(1.0)).length(name))
+        back = np.array([_returned(name, one, a) for one, a in zip(value, at.values, strict=True)])
+    infinite = np.isinf(value) & (at.values == 1.0)
+    error, reference = np.where(infinite, 0.0, np.abs(back - 1.0)), np.where(infinite, np.inf, value)
+    made = Cells("convert", False, name, cells.FLOAT64, (at,), value, reference, error, RETURN_BOUND)
+    made.codes[(value == 0) | np.isnan(back)] = Verdict.NOT_FINITE
+    return made
 
 
 def _returned(name: str, value: float, alpha: float) -> float:
@@ -195,14 +172,11 @@ def _albedo(reflectance: float, light: str) -> float:
 
 
 def _colour(light: str) -> Cells:
-    axis = layout.reflectance(np.float64)
-    value = np.array([_albedo(one, light) for one in axis.values])
+    at = cells.reflectance_axis(np.float64)
+    value = np.array([_albedo(one, light) for one in at.values])
     raised = np.isnan(value)
-    error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - axis.values)
-    wrong_way = steps_down(value, 0, np.float64, 1.0)
-    name = f"{ALPHA_OF}, {light}"
-    cells = judged_cells(
-        "convert", False, name, FLOAT64, (axis,), value, value, error, COLOUR_BOUND, wrong_way=wrong_way
-    )
-    cells.codes[raised] = Verdict.RAISES
-    return cells
+    error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - at.values)
+    given = "convert", False, f"{cells.ALPHA_OF}, {light}", cells.FLOAT64, (at,), value, value, error, COLOUR_BOUND
+    made = Cells(*given, wrong_way=steps_down(value, 0, np.float64, 1.0))
+    made.codes[raised] = Verdict.RAISES
+    return made

@@ -12,18 +12,8 @@ from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.recipes.catalogue import LoadedLaw
+from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Cells, RoundedText, Verdict
-from profilefit.studies.stability.layout import (
-    ALPHA_OF,
-    CDF,
-    FLOAT64,
-    PDF,
-    PROFILE,
-    REFLECTANCE_OF,
-    SAMPLE,
-    TEXT32,
-    ArgumentAxis,
-)
 from profilefit.studies.stability.map_cells import map_label
 
 NAN, INF = float("nan"), float("inf")
@@ -34,8 +24,8 @@ Call = Callable[[str, float], Any]
 SHARES: tuple[float, ...] = (-0.1, 1.1, NAN, INF, -INF)
 LENGTHS: tuple[float, ...] = (0.0, -0.0, -1.0, NAN, INF)
 RADII: tuple[float, ...] = (-1.0, NAN, -INF)
-ALBEDO, LENGTH = ("α", "alpha", SHARES), ("l", "mfp", LENGTHS)
-FIRST = {**dict.fromkeys((PROFILE, CDF, PDF), ("r", "r", RADII)), SAMPLE: ("ξ", "xi", SHARES)}
+ALBEDO, LENGTH, COLOUR = ("α", "alpha", SHARES), ("l", "mfp", LENGTHS), ("A", "reflectance", SHARES)
+FIRST = {**dict.fromkeys((cells.PROFILE, cells.CDF, cells.PDF), ("r", "r", RADII)), cells.SAMPLE: ("ξ", "xi", SHARES)}
 ORDINARY = {"r": 1.0, "xi": 0.5, "alpha": 0.5, "mfp": 1.0}
 CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in Python does: a shader refuses nothing"
 
@@ -43,9 +33,9 @@ CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in 
 def of_law(named: LoadedLaw) -> Iterator[Cells]:
     """Yield each function of a profile law, in Python and by its shader source."""
     law: ProfileLaw = named.law
-    functions = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
     text = RoundedText(law, np.float32)
-    for name, function in functions.items():
+    functions = (law.profile, law.cdf, law.sampler.sample, law.sampler.pdf)
+    for name, function in zip(cells.QUANTITIES, functions, strict=True):
         cases = cases_of(name)
         yield refusals(named.label, law.entry.own, name, cases, _with_keyword(function, name))
         yield _clamped(named.label, law.entry.own, name, cases, text)
@@ -54,18 +44,15 @@ def of_law(named: LoadedLaw) -> Iterator[Cells]:
 def of_map(named: LoadedLaw) -> Iterator[Cells]:
     """Yield both directions of a map."""
     law: AlbedoLaw = named.law
-    for name, symbol, key, call in (
-        (ALPHA_OF, "A", "reflectance", law.alpha),
-        (REFLECTANCE_OF, "α", "alpha", law.reflectance),
-    ):
-        yield refusals(map_label(named), law.entry.own, name, _cases((symbol, key, SHARES)), _alone(call))
+    for name, argument, call in ((cells.ALPHA_OF, COLOUR, law.alpha), (cells.REFLECTANCE_OF, ALBEDO, law.reflectance)):
+        yield refusals(map_label(named), law.entry.own, name, _cases(argument), _alone(call))
 
 
 def of_exact() -> Iterator[Cells]:
     """Yield each function of the exact half space."""
-    for name, function in {PROFILE: exact.profile, CDF: exact.cdf, SAMPLE: exact.quantile}.items():
+    for name, function in zip(cells.QUANTITIES[:3], (exact.profile, exact.cdf, exact.quantile), strict=True):
         yield refusals("exact", True, name, cases_of(name), _with_keyword(function, name))
-    yield refusals("exact", True, REFLECTANCE_OF, _cases(ALBEDO), _alone(exact.reflectance))
+    yield refusals("exact", True, cells.REFLECTANCE_OF, _cases(ALBEDO), _alone(exact.reflectance))
 
 
 def of_convert() -> Iterator[Cells]:
@@ -74,14 +61,13 @@ def of_convert() -> Iterator[Cells]:
     calls: list[tuple[str, list[Case], Call]] = [
         ("medium", _cases(ALBEDO), lambda _, value: Optical(np.array(value), one)),
         ("medium of l", _cases(LENGTH), lambda _, value: Optical(np.array(0.5), np.array(value))),
-        (ALPHA_OF, _cases(("A", "reflectance", SHARES)), lambda _, value: alpha_of(value, "diffuse")),
+        (cells.ALPHA_OF, _cases(COLOUR), lambda _, value: alpha_of(value, "diffuse")),
         *(
             (name, _cases((name, name, LENGTHS)), lambda key, value: Optical.from_length(key, value, 0.5))
             for name in BY_NAME
         ),
     ]
-    for name, cases, call in calls:
-        yield refusals("convert", False, name, cases, call)
+    yield from (refusals("convert", False, *call) for call in calls)
 
 
 def _with_keyword(function: Callable[..., Any], name: str) -> Call:
@@ -108,7 +94,7 @@ def _given(name: str, key: str, value: float) -> dict[str, float]:
 def refusals(subject: str, own: bool, name: str, cases: list[Case], call: Call) -> Cells:
     """Return cells that are red where no error comes, or another than InputError that names the argument."""
     codes = np.array([_outcome(call, key, value) for _, key, value in cases], np.int8)
-    return _cells(subject, own, name, FLOAT64, cases, codes, np.full(len(cases), np.nan))
+    return _cells(subject, own, name, cells.FLOAT64, cases, codes, np.full(len(cases), np.nan))
 
 
 def _outcome(call: Call, key: str, value: float) -> Verdict:
@@ -123,19 +109,15 @@ def _outcome(call: Call, key: str, value: float) -> Verdict:
 
 def _clamped(subject: str, own: bool, name: str, cases: list[Case], text: RoundedText) -> Cells:
     """Return cells of a text, which cannot refuse: it owes a number, but for NaN, which comes back as such."""
-    function = "profile" if name == PROFILE else name
+    function = "profile" if name == cells.PROFILE else name
     given = [np.array(list(_given(name, key, value).values()))[:, None] for _, key, value in cases]
     results = np.array([float(text.call(function, *each)[0]) for each in given])
-    values = np.array([value for _, _, value in cases])
-    codes = np.where(np.isfinite(results), Verdict.OUTSIDE, Verdict.NOT_FINITE).astype(np.int8)
-    codes[np.isnan(values) & np.isnan(results)] = Verdict.OUTSIDE
-    return _cells(subject, own, name, TEXT32, cases, codes, results)
+    is_fine = np.isfinite(results) | np.isnan([value for *_, value in cases]) & np.isnan(results)
+    codes = np.where(is_fine, Verdict.OUTSIDE, Verdict.NOT_FINITE).astype(np.int8)
+    return _cells(subject, own, name, cells.TEXT32, cases, codes, results)
 
 
-def _cells(subject: str, own: bool, name: str, arithmetic: str, cases: list[Case], codes, value) -> Cells:
-    labels = tuple(f"{symbol} = {value:g}" for symbol, _, value in cases)
-    axes = (ArgumentAxis("of", "-", np.arange(len(cases), dtype=float), labels),)
-    nothing, held = np.full(len(cases), np.nan), np.full(len(cases), arithmetic == FLOAT64)
-    return Cells(
-        subject, own, f"{name}, misused", arithmetic, axes, value, nothing, nothing, np.inf, held, codes, advice=CHECK
-    )
+def _cells(subject: str, own: bool, name: str, arithmetic: str, cases: list[Case], codes: Any, value: Any) -> Cells:
+    axes = (cells.labelled("of", (f"{symbol} = {value:g}" for symbol, _, value in cases)),)
+    given = value, np.array(np.nan), np.array(np.nan), np.inf, arithmetic == cells.FLOAT64, codes
+    return Cells(subject, own, f"{name}, misused", arithmetic, axes, *given, advice=CHECK)

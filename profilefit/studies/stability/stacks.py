@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,23 +21,13 @@ from profilefit.recipes.kinds.stack import load
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.stack_text import single_text, stack_text
-from profilefit.studies.stability.cells import (
-    DIMMEST,
-    EXTENDED,
-    NAME,
-    Cells,
-    Mask,
-    RoundedText,
-    absolute,
-    judged,
-    judged_cells,
-    relative,
-    steps_down,
-)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import Cells, Mask, RoundedText, absolute, axis, relative, steps_down
 from profilefit.studies.stability.law_cells import MODEL_BOUNDS
-from profilefit.studies.stability.layout import CDF, DTYPES, FLOAT64, MODEL, PDF, PROFILE, SAMPLE, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
+PROFILE, CDF, SAMPLE, PDF = cells.QUANTITIES
+FLOAT64, TEXT32, MODEL = cells.FLOAT64, cells.TEXT32, cells.MODEL
 TOTAL, ENERGY, ONCE = "A(d)", "energy", "L, once"
 ROUNDINGS = 16.0  # units in the last place that the largest term of a sum may be off by
 BACKWARD = -0.5  # g short of which the text of light scattered once loses digits in float32
@@ -46,13 +37,13 @@ OF_LAWS = (
 )
 OF_BORROWER = "fit the constants to these layers: stack_law, or profilefit regenerate STACK.toml"
 OF_ONCE = "keep g at -0.5 or above; nothing known scatters farther back"
-ARITHMETICS = (FLOAT64, TEXT32)
+BOTH = (FLOAT64, TEXT32)
 CALLED = {PROFILE: "profile", CDF: "cdf", TOTAL: "total", SAMPLE: "sample", PDF: "pdf"}
 UNDRAWN = (PROFILE, CDF, TOTAL)  # of recorded laws in float64: samplers of each of their settings compile for seconds
 THICKNESS = (0.0, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6)  # [mfp of the first layer]
 RADIUS = (1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 300.0, 1e3)
 SHARE = (0.0, 1e-6, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
-CHANGES = tuple(float(one) for one in np.geomspace(1e-7, 1.0, 15))  # of xi that another radius may be worth
+CHANGES = tuple(np.geomspace(1e-7, 1.0, 15).tolist())  # of xi that another radius may be worth
 # What is promised: R_d of all but this share of the light, which is as far as records judge it; densities of radii but
 # for this share next to the source as well; all but of what is darker than a thousandth of white.
 SEEN, NEXT_TO_SOURCE, DARKEST = 0.995, 1e-4, 1e-3
@@ -117,10 +108,15 @@ class StackCase:
     @cached_property
     def reference(self) -> RoundedText:
         """Shader source of the law in extended precision."""
-        return self.text(EXTENDED)
+        return self.text(cells.EXTENDED)
 
     def text(self, dtype: type) -> RoundedText:
-        return RoundedText(stack_text([self.law] * len(CHANNELS), "python", NAME), dtype)
+        return RoundedText(stack_text([self.law] * len(CHANNELS), "python", cells.NAME), dtype)
+
+    def judged(self, name: str, arithmetic: str, *given: Any, **more: Any) -> Cells:
+        """Return cells over the arguments of a quantity, given value, reference, error, bound and inside."""
+        advice = OF_LAWS if self.own else OF_BORROWER
+        return Cells(self.label, self.own, name, arithmetic, _axes(name), *given, **{"advice": advice, **more})
 
 
 def cells_of(folder: Path) -> Iterator[Cells]:
@@ -132,12 +128,12 @@ def cells_of(folder: Path) -> Iterator[Cells]:
         yield from of_law(one, TEXT32)
     for one in (*ends, borrower()):
         yield energies(one)
-        for arithmetic in ARITHMETICS:
+        for arithmetic in BOTH:
             yield from of_law(one, arithmetic)
     for group in (recorded, ends):
         if group:
             yield from stated(group, promised=group is recorded)
-    yield from (once(n, arithmetic) for n in INDICES for arithmetic in ARITHMETICS)
+    yield from (once(n, arithmetic) for n in INDICES for arithmetic in BOTH)
 
 
 def recorded_stacks(folder: Path) -> Iterator[StackCase]:
@@ -176,7 +172,7 @@ def cancelled(law: StackLaw, thickness: Floats, radius: Floats, value: Floats, b
     largest = _largest(law, thickness, radius)
     with np.errstate(divide="ignore"):
         depth = np.abs(np.log(largest * law.top.mfp**2))  # e^-t has as many roundings as t
-    rounded = (ROUNDINGS + np.where(np.isfinite(depth), depth, 0.0)) * float(np.finfo(EXTENDED).eps) * largest
+    rounded = (ROUNDINGS + np.where(np.isfinite(depth), depth, 0.0)) * float(np.finfo(cells.EXTENDED).eps) * largest
     lost: Mask = np.abs(value) * bound < rounded
     return lost
 
@@ -196,12 +192,12 @@ def _largest(law: StackLaw, d: Floats | float, r: Floats) -> Floats:
 
 def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
     """Yield quantities over thickness and radius or uniform number."""
-    dtype, law, channel = DTYPES[arithmetic], case.law, np.zeros(1)
+    dtype, law, unit, channel = cells.DTYPES[arithmetic], case.law, case.law.top.mfp, np.zeros(1)
 
     def rounded(values: Sequence[float], scale: float = 1.0) -> Floats:
         return (np.array(values) * scale).astype(dtype).astype(float)
 
-    d, r, xi = rounded(THICKNESS, law.top.mfp)[:, None], rounded(RADIUS, law.top.mfp), rounded(SHARE)
+    d, r, xi = rounded(THICKNESS, unit)[:, None], rounded(RADIUS, unit), rounded(SHARE)
     text = case.text(np.float32) if arithmetic == TEXT32 else None
     python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
     whole, within = (np.asarray(case.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
@@ -220,11 +216,8 @@ def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED
         else:
             error = absolute(value, reference) if name == CDF else relative(value, reference)
         if name == PROFILE:  # NaN where extended precision has no digits of it
-            unit = law.top.mfp
-            lost = cancelled(
-                law, unit * np.array(THICKNESS)[:, None], unit * np.array(RADIUS), reference, case.bound(name)
-            )
-            error[lost] = np.nan
+            places = unit * np.array(THICKNESS)[:, None], unit * np.array(RADIUS)
+            error[cancelled(law, *places, reference, case.bound(name))] = np.nan
         yield _cells(case, name, arithmetic, (value, reference, error), whole, within)
 
 
@@ -232,32 +225,28 @@ def _cells(
     case: StackCase, name: str, arithmetic: str, triple: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
 ) -> Cells:
     """Return cells of value, reference and error; whole is A (thicknesses, 1), within the cdf (thicknesses, radii)."""
-    dtype, bound, (value, reference, error) = DTYPES[arithmetic], case.bound(name), triple
+    dtype, (value, reference, _) = cells.DTYPES[arithmetic], triple
     first, below = (float(each.whole()) for each in (case.law.top, case.law.below))
     seen = within <= SEEN if name in (PROFILE, PDF) else np.ones(value.shape, bool)
     bright = (whole[:, 0] if name == TOTAL else whole) >= DARKEST
     inside = seen & bright & case.holds & (within >= NEXT_TO_SOURCE if name == PDF else True)
-    dim: Mask | bool = False
-    wrong_way = None
+    more: dict[str, Any] = {"judge": seen if name == PDF else True, "unjudged": NO_DIGITS}
     if name in (PROFILE, PDF):
         scaled = np.abs(reference) * case.law.top.mfp ** (2 if name == PROFILE else 1)
-        dim = (scaled < DIMMEST[dtype]) & (reference != 0)
+        more["dim"] = (scaled < cells.DIMMEST[dtype]) & (reference != 0)
     elif name == CDF:  # light over A: A may be far less than what it is the difference of
-        wrong_way = steps_down(value, 1, dtype, max(first, below) / np.maximum(whole, np.finfo(dtype).tiny))
+        scale = max(first, below) / np.maximum(whole, np.finfo(dtype).tiny)
+        more["wrong_way"] = steps_down(value, 1, dtype, scale)
     elif name == TOTAL:
-        wrong_way = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
-    return judged_cells(
-        case.label, case.own, name, arithmetic, _axes(name), value, reference, error, bound, inside,
-        judge=seen if name == PDF else None, dim=dim, wrong_way=wrong_way, unjudged=NO_DIGITS,
-        advice=OF_LAWS if case.own else OF_BORROWER,
-    )  # fmt: skip
+        more["wrong_way"] = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
+    return case.judged(name, arithmetic, *triple, case.bound(name), inside, **more)
 
 
-def _axes(name: str) -> tuple[ArgumentAxis, ...]:
-    first = ArgumentAxis("d/l", "-", np.array(THICKNESS))
+def _axes(name: str) -> tuple[cells.ArgumentAxis, ...]:
+    first = axis("d/l", THICKNESS)
     if name in (TOTAL, ENERGY):
         return (first,)
-    return first, ArgumentAxis("ξ" if name == SAMPLE else "r/l", "-", np.array(SHARE if name == SAMPLE else RADIUS))
+    return first, axis("ξ", SHARE) if name == SAMPLE else axis("r/l", RADIUS)
 
 
 def _misplaced(reference: RoundedText, value: Floats, xi: Floats, d: Floats) -> Floats:
@@ -285,38 +274,27 @@ def energies(case: StackCase) -> Cells:
     light = (np.sum(ring, axis=1) - 0.5 * (ring[:, 0] + ring[:, -1])) * step
     value = np.where(whole > 0, light / np.where(whole > 0, whole, 1.0), reference)
     error, inside = absolute(value, reference), (whole >= DARKEST) & case.holds
-    return judged_cells(
-        case.label, case.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside,
-        advice=OF_LAWS if case.own else OF_BORROWER,
-    )  # fmt: skip
+    return case.judged(ENERGY, FLOAT64, value, reference, error, ENERGY_BOUND, inside)
 
 
 def stated(group: Sequence[StackCase], promised: bool) -> Iterator[Cells]:
     """Yield what laws state of themselves against exact light, at thicknesses that were not fitted."""
-    axis = ArgumentAxis("of", "-", np.arange(len(group), dtype=float), tuple(one.label for one in group))
-    for name, bound, error in zip((PROFILE, CDF, TOTAL), BOUNDS, np.array([o.errors for o in group]).T, strict=True):
-        codes = judged(error, np.ones_like(error), error, bound, np.ones(error.shape, bool), np.float64)
-        inside = np.full(error.shape, promised)
-        yield Cells(
-            "stacks", True, name, MODEL, (axis,), error, np.zeros_like(error), error, bound, inside, codes,
-            advice=OF_LAWS,
-        )  # fmt: skip
+    axes = (cells.labelled("of", (one.label for one in group)),)
+    errors = np.array([one.errors for one in group]).T
+    for name, bound, error in zip((PROFILE, CDF, TOTAL), BOUNDS, errors, strict=True):
+        yield Cells("stacks", True, name, MODEL, axes, error, np.zeros(()), error, bound, promised, advice=OF_LAWS)
 
 
 def once(n: float, arithmetic: str) -> Cells:
     """Return light scattered once: over g, what lies below, thickness, both directions and the angle between them."""
-    dtype = DTYPES[arithmetic]
+    dtype = cells.DTYPES[arithmetic]
     values = [np.array(each).astype(dtype).astype(float) for each in (DEPTHS, COSINES, COSINES, TURNED)]
-    axes = (
-        ArgumentAxis("g", "-", np.array(FORWARD)),
-        ArgumentAxis("α below", "-", np.array(BELOW)),
-        *map(ArgumentAxis, ("d/l", "cos in", "cos out", "turned"), "----", values),
-    )
+    axes = axis("g", FORWARD), axis("α below", BELOW), *map(axis, ("d/l", "cos in", "cos out", "turned"), values)
     depth, into, out, turned = np.meshgrid(*values, indexing="ij", sparse=True)
-    value, reference = np.empty((2, *(axis.values.size for axis in axes)))
+    value, reference = np.empty((2, *(one.values.size for one in axes)))
     for i, g in enumerate(FORWARD):
-        source = single_text([_two(n, g, alpha, 1.0) for alpha in BELOW], "python", NAME)
-        extended, text = RoundedText(source, EXTENDED), RoundedText(source, np.float32)
+        source = single_text([_two(n, g, alpha, 1.0) for alpha in BELOW], "python", cells.NAME)
+        extended, text = RoundedText(source, cells.EXTENDED), RoundedText(source, np.float32)
         for j, alpha in enumerate(BELOW):
             given = (np.array(float(j)), depth, into, out, turned)  # a channel an albedo
             reference[i, j] = extended.call("radiance", *given)
@@ -326,10 +304,8 @@ def once(n: float, arithmetic: str) -> Cells:
             for k, d in enumerate(DEPTHS):
                 value[i, j, k] = single_scattering(_two(n, g, alpha, d), into[0], out[0], np.arccos(turned[0]))
     forward = np.array(FORWARD).reshape(-1, *[1] * (len(axes) - 1)) >= BACKWARD
-    return judged_cells(
-        f"light scattered once, n = {n:g}", True, ONCE, arithmetic, axes, value, reference,
-        relative(value, reference), ONCE_BOUNDS[arithmetic], forward | (arithmetic != TEXT32), advice=OF_ONCE,
-    )  # fmt: skip
+    given = (value, reference, relative(value, reference), ONCE_BOUNDS[arithmetic], forward | (arithmetic != TEXT32))
+    return Cells(f"light scattered once, n = {n:g}", True, ONCE, arithmetic, axes, *given, advice=OF_ONCE)
 
 
 def _two(n: float, g: float, below: float, depth: float) -> Medium:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
 from typing import Any
 
@@ -32,7 +32,7 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
-from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
 Floats = NDArray[np.float64]
@@ -42,6 +42,12 @@ RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]
 TRIMMED, EPSILON = "r R_d", 0.005  # (6), as in the recipe liang-as-published
 HELD = ("a3", "c2")  # exponents that trade against their amplitudes; so held in the recipe too
 ALL_AT_ONCE, TWO_STAGES, EMCEE = "least squares", "two stages", "emcee"
+ERROR = "relative change of the annuli's energies by noise [-]"
+# Name, title, and whose time is the cost.
+PANELS = (
+    ("fit", "the fit alone, simulation given", "the fit"),
+    ("whole", "with the order-resolved run it is fitted to", "simulation and fit"),
+)
 
 
 @dataclass(frozen=True)
@@ -92,36 +98,23 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     compiling: dict[str, float] = {}
     for seed in track(range(sizes.seeds + 1), "fits"):  # the first compiles
         for photons in sizes.photons:
-            profiles, light = _light(photons, 1000 * seed + 700)
+            begin = time.perf_counter()
+            run = simulate_orders(Grid.from_edges(r=EDGES), photons, 1000 * seed + 700, workers=1, progress=False)
+            profiles = Profiles.from_orders(run, ALPHAS)
+            light = time.perf_counter() - begin
             for name in [name for name in ways if name != EMCEE or photons in sizes.chained]:
                 trial = _trial(ways[name], profiles, seed, light, limits[name], start)
                 if seed == 0:
                     compiling[name] = max(compiling.get(name, 0.0), trial.fit_seconds)
                 else:
                     trials.setdefault((name, photons), []).append(trial)
-    panels = tuple(
-        Panel(
-            name,
-            title,
-            f"time of {what}, one core [s]",
-            "relative change of the annuli's energies by noise [-]",
-            tuple(point_of(name, *key, group) for key, group in trials.items()),
-            joined=True,
-        )
-        for name, title, what in (
-            ("fit", "the fit alone, simulation given", "the fit"),
-            ("whole", "with the order-resolved run it is fitted to", "simulation and fit"),
-        )
-    )
+    panels = tuple(_panel(trials, *words) for words in PANELS)
     return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
 
 
-def _light(photons: int, seed: int) -> tuple[Profiles, float]:
-    """Return profiles with their covariance, and the time it took [s]."""
-    begin = time.perf_counter()
-    run = simulate_orders(Grid.from_edges(r=EDGES), photons, seed, workers=1, progress=False)
-    profiles = Profiles.from_orders(run, ALPHAS)
-    return profiles, time.perf_counter() - begin
+def _panel(trials: Mapping[tuple[str, int], Sequence[Trial]], name: str, title: str, timed: str) -> Panel:
+    points = tuple(point_of(name, *key, group) for key, group in trials.items())
+    return Panel(name, title, f"time of {timed}, one core [s]", ERROR, points, joined=True)
 
 
 def _ways(start: Any, max_chain: int) -> dict[str, Way]:
@@ -138,13 +131,14 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
 
     def two_stages(profiles: Profiles, _: int) -> FittedConstants:
         points = staged.fit_per_albedo(profiles, start, 1.0, TRIMMED, EPSILON)
-        laws = staged.fit_coefficient_laws(points, start, HELD).values()
-        constants = {n: float(v) for law in laws for n, v in zip(law.names, law.solution.parameters, strict=True)}
-        errors = {
-            n: e for law in laws if law.covariance is not None for n, e in _errors(law.names, law.covariance).items()
-        }
-        results = {*points.results, *(law.solution.result for law in laws)} - {"converged"}
-        return FittedConstants(constants, errors, next(iter(sorted(results)), "converged"))
+        constants: dict[str, float] = {}
+        errors: dict[str, float] = {}
+        results = set(points.results)
+        for law in staged.fit_coefficient_laws(points, start, HELD).values():
+            constants |= dict(zip(law.names, map(float, law.solution.parameters), strict=True))
+            errors |= {} if law.covariance is None else _errors(law.names, law.covariance)
+            results.add(law.solution.result)
+        return FittedConstants(constants, errors, min(results - {"converged"}, default="converged"))
 
     def emcee(profiles: Profiles, seed: int) -> FittedConstants:
         chain = posterior(fitted(profiles), "statistical", seed, max_chain)
@@ -204,26 +198,25 @@ def standardised(result: FittedConstants, limit: FittedConstants) -> float:
 
 def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Point:
     """Return the point of one fit method at a number of photons, over all its trials."""
-    rows = np.array([(t.fit_seconds, t.light_seconds, t.rms, t.worst, t.standardised) for t in trials])
-    of_fit, light, rms, worst, away = rows.T
+    of_fit, light, rms, worst, away, done = np.array([astuple(one) for one in trials], float).T
     facts: dict[str, float | int | str] = {
         "photons": photons,
         "standardised": float(np.median(away)),
         "light_seconds": float(np.median(light)),
         "seeds": len(trials),
-        "converged": sum(t.converged for t in trials),
+        "converged": int(done.sum()),
     }
     seconds = of_fit if panel == "fit" else of_fit + light
-    label = f"{photons:.0e}".replace("e+0", "e") + " photons"
-    return Point(panel, name, label, WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst), facts)
+    known = WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst)
+    return Point(panel, name, photons_text(photons), *known, facts)
 
 
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
     """Return notes on fits that did not converge, and on the time of first fits."""
     failed = [
-        f"{sum(not t.converged for t in group)} of {len(group)} did not converge: {name}, {photons:.0e} photons"
+        f"{missed} of {len(group)} did not converge: {name}, {photons:.0e} photons"
         for (name, photons), group in trials.items()
-        if not all(t.converged for t in group)
+        if (missed := sum(not one.converged for one in group))
     ]
     compiled = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
     return (*failed, f"first fits, which compile, not in the times [s]: {compiled}")

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from mcml_sim.files.text_file import as_json, read_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
-from profilefit.studies.tradeoff import fits, fur, laws, samplers, sea, truth
+from profilefit.studies.tradeoff import fits, laws, samplers, scenes, truth
 from profilefit.studies.tradeoff.points import TradeoffPart
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
-Content = dict[str, Any]
 SAME = ("version", "sha256", "machine")  # of `made`: what parts beside each other have in common
 IF_NAMED = ("sea", "fur")  # they need OpenGL, and are of no law
 OF_RECORDS = ("laws", "samplers")
-# Each measures by `measure(sizes, track)`, those of records with their folder, and has sizes FULL and QUICK.
-PARTS: dict[str, ModuleType] = {
-    **{"truth": truth, "laws": laws, "samplers": samplers, "fits": fits},
-    **{"sea": sea, "fur": fur},
+# Each measures by a function of sizes and track, those of records with their folder: function, all of it, a quick look.
+PARTS: dict[str, tuple[Callable[..., TradeoffPart], Any, Any]] = {
+    "truth": (truth.measure, truth.FULL, truth.QUICK),
+    "laws": (laws.measure, laws.FULL, laws.QUICK),
+    "samplers": (samplers.measure, samplers.FULL, samplers.QUICK),
+    "fits": (fits.measure, fits.FULL, fits.QUICK),
+    "sea": (scenes.measure_sea, scenes.SEA, scenes.QUICK_SEA),
+    "fur": (scenes.measure_fur, scenes.FUR, scenes.QUICK_FUR),
 }
 
 
@@ -34,9 +36,8 @@ def chosen(names: list[str]) -> list[str]:
 
 def measured(name: str, quick: bool = False, folder: Path | None = None, track: Track = silent) -> TradeoffPart:
     """Run one part."""
-    part, given = PARTS[name], {"folder": folder} if name in OF_RECORDS else {}
-    measured: TradeoffPart = part.measure(part.QUICK if quick else part.FULL, track=track, **given)
-    return measured
+    measure, full, few = PARTS[name]
+    return measure(few if quick else full, track=track, **({"folder": folder} if name in OF_RECORDS else {}))
 
 
 def keep(file: Path, new: Mapping[str, Any]) -> None:
@@ -45,7 +46,7 @@ def keep(file: Path, new: Mapping[str, Any]) -> None:
     `new` holds "made" and "machine" of this run, and by its name each part measured so far, which has both, too.
     """
     before = read(file)
-    kept: Content = {}
+    kept: dict[str, Any] = {}
     if is_comparable(before, new):
         own = {key: before[key] for key in ("made", "machine") if key in before}
         kept = {name: {**own, **before[name]} for name in PARTS if isinstance(before.get(name), dict)}
@@ -54,7 +55,7 @@ def keep(file: Path, new: Mapping[str, Any]) -> None:
     write_whole(file, as_json({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
 
 
-def read(file: Path) -> Content:
+def read(file: Path) -> dict[str, Any]:
     """Return the content of a tradeoff.json, nothing if it is damaged or absent: it is only added to, or replaced."""
     try:
         content = read_json(file)

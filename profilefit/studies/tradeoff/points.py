@@ -87,6 +87,11 @@ class TradeoffPart:
         return tuple(point for panel in self.panels for point in panel.points)
 
 
+def photons_text(number: int) -> str:
+    """Return the number of photons as people write it, for example 1e5 photons."""
+    return f"{number:.0e}".replace("e+0", "e") + " photons"
+
+
 def standings(points: Sequence[Point]) -> list[str]:
     """Return where each point stands among those of one panel.
 
@@ -109,20 +114,11 @@ def front(points: Sequence[Point]) -> list[int]:
 def _standing(point: Point, among: Sequence[Point]) -> str:
     rivals = [other for other in among if other is not point]
     cheaper = [other.cost.is_below(point.cost) for other in rivals]
-    nearer = [_is_nearer(other, point) for other in rivals]
+    nearer = [all(a.is_below(b) for a, b in zip(other.errors, point.errors, strict=False)) for other in rivals]
     if any(c and n for c, n in zip(cheaper, nearer, strict=True)):
         return BEATEN
     for other, c, n in zip(rivals, cheaper, nearer, strict=True):
-        if (c and not _is_farther_off(other, point)) or (n and not point.cost.is_below(other.cost)):
+        farther = any(b.is_below(a) for a, b in zip(other.errors, point.errors, strict=False))
+        if (c and not farther) or (n and not point.cost.is_below(other.cost)):
             return TIED
     return FRONT
-
-
-def _is_nearer(point: Point, other: Point) -> bool:
-    """Return whether all errors that both have are smaller by more than their spread."""
-    return all(a.is_below(b) for a, b in zip(point.errors, other.errors, strict=False))
-
-
-def _is_farther_off(point: Point, other: Point) -> bool:
-    """Return whether any error is larger by more than its spread."""
-    return any(b.is_below(a) for a, b in zip(point.errors, other.errors, strict=False))

@@ -36,8 +36,7 @@ from profilefit.scenes.stage.step_edge import (
     random_points,
 )
 from profilefit.studies.tradeoff import laws, stopwatch
-from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders
-from profilefit.studies.tradeoff.counting import count
+from profilefit.studies.tradeoff.laws import SPECS, YARDSTICK, Contender, contenders, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
 
@@ -54,6 +53,12 @@ LIKE_OTHERS = (
     "normalized diffusion, by its own mfp",
     "Liang, printed",
     "4 Gaussians",
+)
+COST = "time of a radius and its weight, one core, float32 [ns]"
+# Name, title and axis of error of each panel.
+PANELS = (
+    ("noise", f"{SAMPLES} samples by a step edge", "mean square error over the exact quantile's [-]"),
+    ("bias", "bias that no number of samples takes away", "error of light beyond an edge, share of A [-]"),
 )
 
 
@@ -113,7 +118,9 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
     quick = sizes.trials <= QUICK.trials
     specs = [one for one in SPECS if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
     contestants, left_out = contenders(folder, specs)
-    contestants += [_uniform(one) for one in contestants if isinstance(one.law, Hazard) and not one.another]
+    hazards = [one.law for one in contestants if isinstance(one.law, Hazard) and not one.another]
+    uniform = [(law, UniformSampler(law), law.shape) for law in hazards]
+    contestants += [Contender("uniform radii, hazard", *each, another=True) for each in uniform]
     counted = {one.name: laws.counts(one)["both"].transcendental for one in contestants}
     timed = [one for one in contestants if counted[one.name] <= laws.TOO_MANY]
     dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in contestants if one not in timed]
@@ -126,28 +133,10 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
     rates = stopwatch.take_turns(works, sizes.turns, track, "samplers")
     points = [point for one in judged for point in points_of(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
     panels = tuple(
-        Panel(
-            name,
-            title,
-            "time of a radius and its weight, one core, float32 [ns]",
-            error,
-            tuple(p for p in points if p.panel == name),
-        )
-        for name, title, error in (
-            ("noise", f"{SAMPLES} samples by a step edge", "mean square error over the exact quantile's [-]"),
-            ("bias", "bias that no number of samples takes away", "error of light beyond an edge, share of A [-]"),
-        )
+        Panel(name, title, COST, error, tuple(p for p in points if p.panel == name)) for name, title, error in PANELS
     )
-    notes = tuple([*(f"left out: {line}" for line in left_out), *dear])
+    notes = (*(f"left out: {line}" for line in left_out), *dear)
     return TradeoffPart("samplers", "Samplers: time of a radius against noise and bias", panels, notes)
-
-
-def _uniform(hazard: Contender) -> Contender:
-    law = hazard.law
-    if not isinstance(law, Hazard):
-        raise TypeError(f"hazard must be the contender of that law, got {hazard.name!r}")
-    sampler = UniformSampler(law)
-    return Contender("uniform radii, hazard", law, sampler, law.shape, sampler, another=True)
 
 
 def ways_of(contender: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
@@ -155,15 +144,11 @@ def ways_of(contender: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
     sampler = contender.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
-    own = WeighedSampler(contender.name, contender, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)
-    if not apart or isinstance(sampler, UniformSampler):
-        return [own]
-    return [
-        own,
-        WeighedSampler(
-            f"{contender.name}, law's density", contender, noise_ratios(unweighted, sampler, sizes), biases[..., 1]
-        ),
-    ]
+    found = [WeighedSampler(contender.name, contender, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)]
+    if apart and not isinstance(sampler, UniformSampler):
+        by_own, name = noise_ratios(unweighted, sampler, sizes), f"{contender.name}, law's density"
+        found.append(WeighedSampler(name, contender, by_own, biases[..., 1]))
+    return found
 
 
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:

@@ -18,23 +18,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
-from mcml_sim.exact import hankel, refracting
-from mcml_sim.exact.by_albedo import by_alpha, forget
+from mcml_sim.exact import by_albedo, refracting
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
-from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
 Floats = NDArray[np.float64]
+RingEnergies = tuple[Floats, Floats | None]
+"""Ring energies (albedos, rings) [-], and the relative error (albedos, rings) that the method states itself."""
+Method = Callable[[int], RingEnergies]
+"""Seed -> ring energies."""
 ALPHAS = np.array([0.2, 0.5, 0.8, 0.95, 0.99])
 # The scalar tracer's rings are even, so all rings are unions of those: thirty, near even in ln r to 10 mfp.
 WIDTH, EVEN = 0.01, 1024
 BREAKS = np.append(0, np.unique(np.round(np.geomspace(1, EVEN, 31)).astype(int)))
 EDGES = BREAKS * WIDTH
 MIDDLES = 0.5 * (EDGES[1:] + EDGES[:-1])
+GRID = Grid.from_edges(r=EDGES)
 FINEST = 3.0, 1.5  # times the standard nodes: what all errors are against, where n is 1 and else
 LAYERS = Medium((Layer(1.4, 0.2, 1.8, 0.0, 0.3), Layer(1.4, 0.02, 0.98, 0.0, 1.0), Layer(1.4, 0.3, 1.2, 0.0)))
 
@@ -73,12 +77,12 @@ class Annuli:
 
 def half_spaces(setting: Setting, rule: Rule) -> Floats:
     """Return the energy within EDGES at ALPHAS from the table of n alone: no transform is kept between calls."""
-    forget()
-    return by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
+    by_albedo.forget()
+    return by_albedo.by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
 
 
 def _energy_within(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
-    return alpha * transform.reflectance * hankel.cdf(transform, x)
+    return alpha * transform.reflectance * by_albedo.cdf(transform, alpha, x)
 
 
 def stack(nodes: Nodes) -> Floats:
@@ -91,18 +95,14 @@ def _of_half_space(panel: str, setting: Setting, finest: float) -> Annuli:
     title = f"{EDGES.size - 1} annuli of a half space with n = {setting.n:g}, g = 0"
     reference = partial(half_spaces, setting, STANDARD.scaled(finest))
     media = tuple(half_space(float(alpha), n=float(setting.n)) for alpha in ALPHAS)
-    return Annuli(
-        panel, title, media, setting, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None]
-    )
+    whole = partial(exact.reflectance, ALPHAS, setting)
+    return Annuli(panel, title, media, setting, reference, lambda: np.asarray(whole())[:, None])
 
 
 MATCHED = _of_half_space("rings", exact.SEARCHLIGHT, FINEST[0])
 REFRACTING = _of_half_space("refracting", Setting(n=1.4), FINEST[1])
 STACK = Annuli(
-    "stack",
-    f"{EDGES.size - 1} annuli of three layers with n = 1.4, g = 0",
-    (LAYERS,),
-    Setting(n=1.4),
+    *("stack", f"{EDGES.size - 1} annuli of three layers with n = 1.4, g = 0", (LAYERS,), Setting(n=1.4)),
     partial(stack, solution.FINE),
     lambda: np.array([[exact.solve(LAYERS).reflectance]]),
 )
@@ -119,13 +119,9 @@ STACK_AXES = "time, one core [s]", AXES[1]
 class TruthSizes:
     """Sizes of a comparison of ways to compute ring energies.
 
-    Attributes:
-        scalar: photons of the runs of the scalar tracer.
-        simulate: photons of the runs of `simulate`.
-        orders: photons of the runs of `simulate_orders`.
-        turns: number of timed turns.
-        rules: names in `RULES` of the exact solution's numbers of nodes.
-        estimate: whether the exact solution's own estimate of its error is given, for which it compiles anew.
+    scalar, simulate, orders  photons of the runs of each tracer;  turns  that are timed
+    rules     names in `RULES` of the exact solution's numbers of nodes
+    estimate  whether the exact solution's own estimate of its error is given, for which it compiles anew
     """
 
     scalar: tuple[int, ...] = (10_000, 100_000, 300_000)
@@ -136,22 +132,8 @@ class TruthSizes:
     estimate: bool = True
 
 
-FULL, QUICK = (
-    TruthSizes(),
-    TruthSizes((2_000, 20_000), (50_000, 500_000), (50_000, 500_000), 3, (AS_IS,), estimate=False),
-)
-
-
-@dataclass(frozen=True)
-class RingEnergies:
-    """Ring energies (albedos, rings) [-], and the relative error (albedos, rings) that the method states itself."""
-
-    energy: Floats
-    stated: Floats | None
-
-
-Method = Callable[[int], RingEnergies]
-"""Seed -> ring energies."""
+FULL = TruthSizes()
+QUICK = TruthSizes((2_000, 20_000), (50_000, 500_000), (50_000, 500_000), 3, (AS_IS,), estimate=False)
 
 
 @dataclass(frozen=True)
@@ -174,14 +156,11 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
     every, notes = contestants(sizes)
     energies: dict[str, list[RingEnergies]] = {one.key: [] for one in every}
 
-    def work(contestant: Contestant) -> stopwatch.Work:
-        def run(seed: int) -> int:
-            energies[contestant.key].append(contestant.run(seed))
-            return 1
+    def run(contestant: Contestant, seed: int) -> int:
+        energies[contestant.key].append(contestant.run(seed))
+        return 1
 
-        return run
-
-    rates = stopwatch.take_turns({one.key: work(one) for one in every}, sizes.turns, track, "truths")
+    rates = stopwatch.take_turns({one.key: partial(run, one) for one in every}, sizes.turns, track, "truths")
     points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in every)
     compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(every, rates).items())
     title = f"Energies of annuli at {ALPHAS.size} albedos, and of a stack: seconds against error"
@@ -196,30 +175,30 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
 def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     """Return every method at every effort, and a line for what is left out."""
-    contestants, notes = [], []
+    each: list[tuple[Annuli, str, int | str, Method]] = []
     trace = scalar.compiled()
-    if trace is None:
-        notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
-    else:
-        for n in sizes.scalar:
-            contestants.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
-    for case in (MATCHED, REFRACTING, STACK):
-        for n in sizes.simulate:
-            contestants.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
-    for case in (MATCHED, REFRACTING):
-        contestants += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
-    for label in sizes.rules:
-        contestants.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
-    contestants.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
-    contestants.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
-    contestants += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
-    return contestants, notes
+    if trace is not None:
+        each += [(MATCHED, SCALAR, n, partial(scalar_tracer, trace, n)) for n in sizes.scalar]
+    cases = (MATCHED, REFRACTING, STACK)
+    each += [(case, SIMULATE, n, partial(_simulated, case, n)) for case in cases for n in sizes.simulate]
+    each += [(case, ORDERS, n, partial(by_orders, case, n)) for case in cases[:2] for n in sizes.orders]
+    each += [(MATCHED, EXACT, rule, _exact(MATCHED, STANDARD.scaled(RULES[rule]))) for rule in sizes.rules]
+    each += [(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD))]
+    each += [(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True))]
+    each += [(STACK, EXACT, label, partial(_exact_stack, nodes)) for label, nodes in STACK_NODES.items()]
+    found = []
+    for case, method, effort, run in each:
+        number = 0 if isinstance(effort, str) else effort * (1 if method == ORDERS else len(case.media))
+        label = effort if isinstance(effort, str) else photons_text(effort)
+        found.append(Contestant(case, method, label, run, number))
+    return found, [] if trace else [f"left out: the {SCALAR} {scalar.ABSENT}"]
 
 
 def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
-    middle, worst = zip(*(contestant.annuli.errors(each.energy) for each in energies), strict=True)
-    stated = [each.stated[contestant.annuli.judged] for each in energies if each.stated is not None]
-    if estimate and (contestant.annuli, contestant.method, contestant.label) == (MATCHED, EXACT, AS_IS):
+    case, method, label = contestant.annuli, contestant.method, contestant.label
+    middle, worst = zip(*(case.errors(energy) for energy, _ in energies), strict=True)
+    stated = [each[case.judged] for _, each in energies if each is not None]
+    if estimate and (case, method, label) == (MATCHED, EXACT, AS_IS):
         stated = [np.asarray(exact.error_estimate(MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
     facts: dict[str, float | int | str] = {
         "photons": contestant.photons,
@@ -227,15 +206,7 @@ def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], e
         "stated": float(np.sqrt(np.mean(np.square(stated)))) if stated else "",
     }
     seconds = WithSpread.of(rates.seconds(contestant.key))
-    return Point(
-        contestant.annuli.panel,
-        contestant.method,
-        contestant.label,
-        seconds,
-        WithSpread.of(middle),
-        WithSpread.of(worst),
-        facts,
-    )
+    return Point(case.panel, method, label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
 
 
 def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
@@ -248,45 +219,29 @@ def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
     return first
 
 
-def scalar_tracer(trace: Callable, photons: int) -> Method:
-    """Return the method that runs the scalar tracer at each albedo."""
-
-    def run(seed: int) -> RingEnergies:
-        rows = []
-        for i, alpha in enumerate(ALPHAS):
-            reflected = np.zeros(EVEN + 1)
-            trace(1000 * seed + i, photons, 1.0 - alpha, alpha, WIDTH, reflected)
-            rows.append(np.add.reduceat(reflected[:-1], BREAKS[:-1]) / photons)
-        return RingEnergies(np.array(rows), None)
-
-    return run
+def scalar_tracer(trace: Callable, photons: int, seed: int) -> RingEnergies:
+    """Run the scalar tracer at each albedo."""
+    rows = []
+    for i, alpha in enumerate(ALPHAS):
+        reflected = np.zeros(EVEN + 1)
+        trace(1000 * seed + i, photons, 1.0 - alpha, alpha, WIDTH, reflected)
+        rows.append(np.add.reduceat(reflected[:-1], BREAKS[:-1]) / photons)
+    return np.array(rows), None
 
 
-def _simulated(case: Annuli, photons: int) -> Method:
-    grid = Grid.from_edges(r=EDGES)
-
-    def run(seed: int) -> RingEnergies:
-        runs = [
-            simulate(medium, grid, photons, 1000 * seed + i, workers=1, progress=False).reflectance_r
-            for i, medium in enumerate(case.media)
-        ]
-        energy = np.array([np.asarray(one.value) for one in runs]) * grid.r_areas
-        error = np.array([np.asarray(one.standard_error) for one in runs]) * grid.r_areas
-        return RingEnergies(energy, error / case.reference)
-
-    return run
+def _simulated(case: Annuli, photons: int, seed: int) -> RingEnergies:
+    energy, error = np.empty((2, len(case.media), EDGES.size - 1))
+    for i, medium in enumerate(case.media):
+        run = simulate(medium, GRID, photons, 1000 * seed + i, workers=1, progress=False).reflectance_r
+        energy[i], error[i] = run.value * GRID.r_areas, run.standard_error * GRID.r_areas
+    return energy, error / case.reference
 
 
-def by_orders(case: Annuli, photons: int) -> Method:
-    """Return the method that traces photons by scattering order, and weights the orders for every albedo."""
-    grid = Grid.from_edges(r=EDGES)
-
-    def run(seed: int) -> RingEnergies:
-        orders = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
-        energy = orders.energy(ALPHAS)
-        return RingEnergies(np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference)
-
-    return run
+def by_orders(case: Annuli, photons: int, seed: int) -> RingEnergies:
+    """Trace photons by scattering order, and weight the orders for every albedo."""
+    orders = simulate_orders(GRID, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
+    energy = orders.energy(ALPHAS)
+    return np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference
 
 
 def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
@@ -295,15 +250,10 @@ def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
     def run(_: int) -> RingEnergies:
         if anew:
             refracting.new_table(float(case.setting.n), rule)
-        return RingEnergies(np.diff(half_spaces(case.setting, rule), axis=1), None)
+        return np.diff(half_spaces(case.setting, rule), axis=1), None
 
     return run
 
 
-def _exact_stack(nodes: exact.Nodes) -> Method:
-    return lambda _: RingEnergies(np.diff(stack(nodes), axis=1), None)
-
-
-def _photons(number: int) -> str:
-    """Return the number of photons as people write it, for example 1e5 photons."""
-    return f"{number:.0e}".replace("e+0", "e") + " photons"
+def _exact_stack(nodes: Nodes, _: int) -> RingEnergies:
+    return np.diff(stack(nodes), axis=1), None

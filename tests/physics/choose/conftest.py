@@ -8,8 +8,8 @@ import profilefit
 from mcml_sim import Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.error import ReferenceLight, beyond
 from profilefit.studies.choose.requirements import Budget, Requirements
-from profilefit.studies.choose.response import ReferenceLight, beyond
 
 DIFFUSE = Setting("diffuse")
 COLOUR, MFP = (0.6, 0.4, 0.2), (1.0, 0.7, 0.5)

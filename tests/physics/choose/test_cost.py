@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from benchmarks.choose import ratios_json
 from profilefit.errors import InputError
 from profilefit.recipes import catalogue
 from profilefit.studies.choose import cost
@@ -56,7 +57,7 @@ def test_order(hazard):
 
 def test_what_was_measured_is_kept():
     made = Ratios("a device", 0.5, {"separable": 0.1}, {"separable": 0.01})
-    assert Ratios(**json.loads(cost.as_json(made))) == made
+    assert Ratios(**json.loads(ratios_json(made))) == made
     assert made.of(NOTHING) == 0.5
     assert made.of(Option("gaussians", 10, 3)) == pytest.approx(0.5 + 3 * 0.2)
 

@@ -1,17 +1,37 @@
-"""What an error is made of."""
+"""Error of an option and what it is made of; light of filters, against sums, and of gathers, against plain loops."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.special import ndtr
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.skin.law import Separable
+from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points, step_response
 from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
 from profilefit.studies.choose.choice import laws
-from profilefit.studies.choose.error import error
-from profilefit.studies.choose.response import reference_light
+from profilefit.studies.choose.error import (
+    FARTHEST,
+    LEAST_COSINE,
+    NEAR,
+    OWN,
+    Beyond,
+    OneGaussian,
+    ReferenceLight,
+    beyond,
+    drawn,
+    error,
+    estimates,
+    filtered,
+    fitted,
+    passes,
+    response,
+)
+from tests.physics.choose.conftest import DIFFUSE, MFP
 
 WITHIN = Within()
 
@@ -40,7 +60,7 @@ def test_own_law_has_noise_only(light, case, hazard):
 def test_light_under_a_surface_is_exact():
     """The law of its index misses what its record says of it; one of a matched surface ten times that."""
     setting, case = Setting("diffuse", n=1.37), Case((0.6, 0.4, 0.2), (1.0, 0.7, 0.5), pixel=0.25)
-    light, found = reference_light(setting), laws(setting)
+    light, found = ReferenceLight(setting), laws(setting)
     own, matched = (
         error(Option("sampled", 64, law=found[name]), case, light, WITHIN)
         for name in ("hazard-diffuse-refracting", "quantile-diffuse")
@@ -50,9 +70,9 @@ def test_light_under_a_surface_is_exact():
     np.testing.assert_allclose(
         light.beyond(0.6)(x), 1.0 - step_response(x, light.alpha(0.6), setting=setting), atol=2e-5
     )
-    assert reference_light(setting).alpha(1.0) == 1.0  # no surface that refracts is white
+    assert ReferenceLight(setting).alpha(1.0) == 1.0  # no surface that refracts is white
     with pytest.raises(InputError, match=r"index must be a refractive index in \[1, 1.6\], got 1.61"):
-        reference_light(Setting(n=1.61))
+        ReferenceLight(Setting(n=1.61))
 
 
 def test_large_pixels_and_curves_are_named(light, case):
@@ -72,3 +92,110 @@ def test_places():
         Within(mfp=0)
     with pytest.raises(InputError, match=r"within.pixels must be a whole number in 1 ... 100, got 1000"):
         Within(pixels=1000)
+
+
+X = np.array([0.125, 0.625, 1.625])
+DEPTH = np.arcsinh(FARTHEST / NEAR)
+
+
+def test_gaussians_are_found_again():
+    weight, sigma = np.array([0.3, 0.7]), np.array([2.0, 0.4])
+    u = np.linspace(0.0, DEPTH, 400)
+    tail = ndtr(-NEAR * np.sinh(u)[:, None] / sigma) @ weight
+    found = fitted(Beyond(CubicSpline(u, np.log(np.maximum(tail, 1e-15)))), 2)
+    order = np.argsort(found[1])
+    np.testing.assert_allclose(found[0][order], [0.7, 0.3], rtol=1e-3)
+    np.testing.assert_allclose(found[1][order], [0.4, 2.0], rtol=1e-3)
+
+
+def test_taps_of_a_gaussian():
+    taps = OneGaussian(sigma=(2.0, 1.0, 0.5)).taps(33, np.array([2.0, 1.0, 0.5]))
+    np.testing.assert_allclose(taps[:, :3].sum(axis=0), 1.0, rtol=1e-6)
+    spread = np.sqrt(taps[:, 3] ** 2 @ taps[:, :3])
+    np.testing.assert_allclose(spread, [2.0, 1.0, 0.5], rtol=0.05)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_more_gaussians_are_nearer(light, case, count):
+    """On a plane; of so many taps that they do not matter."""
+
+    def missed(number):
+        share = light.beyond(case.reflectance[0])
+        found = filtered(Option("gaussians", 255, number), case, light, 0, X)
+        return np.max(np.abs(found - response(share, X, 1.0, np.inf)))
+
+    assert missed(count) < missed(1)
+    assert missed(count) < (0.02, 0.006, 0.004)[count - 2]
+
+
+@pytest.mark.slow
+def test_the_separable_kernel_is_as_wide_as_the_stage_makes_it(light, case):
+    """At its quartile a step edge has risen to 3/4, within what 255 taps tell."""
+    ((_, kernel, stretches),) = passes(Option("separable", 255), case, light)
+    assert isinstance(kernel, Separable)
+    alpha = np.array([light.alpha(a) for a in case.reflectance])
+    np.testing.assert_allclose(stretches, kernel.stretches(alpha, np.array(case.mfp)), rtol=3e-3)
+    quartile = np.array([light.beyond(case.reflectance[0]).quartile])
+    assert filtered(Option("separable", 255), case, light, 0, quartile) == pytest.approx(0.75, abs=0.02)
+
+
+def test_taps_are_lost_with_depth(light, case):
+    """Light from around the cylinder is replaced by the point's own."""
+    option = Option("separable", 33)
+    flat = filtered(option, case, light, 0, X)
+    wide = filtered(option, replace(case, radius=1e4), light, 0, X)
+    narrow = filtered(option, replace(case, radius=2.0), light, 0, X)
+    np.testing.assert_allclose(wide, flat, atol=1e-3)
+    assert np.all(narrow >= flat)
+    assert np.max(narrow - flat) > 0.01
+
+
+ALPHA = (0.9, 0.8, 0.7)
+SAMPLES = 16
+
+
+@pytest.mark.slow
+def test_plane_is_the_plain_estimator(hazard, case):
+    """Root mean square error of the longest channel; 4 % is what 1024 estimates tell."""
+    x = np.array([0.2, 0.9, 2.0])
+    found = estimates(hazard, ALPHA, SAMPLES, case, 0, x)
+    plain = edge_estimate(by_law(hazard, 0.9), shifted_points(SAMPLES, 1024, 7), x, 0.9, DIFFUSE)
+    truth = response(beyond(0.9, DIFFUSE, hazard), x, 1.0, np.inf)
+    noise = np.sqrt(np.mean((found - truth[:, None]) ** 2))
+    expected = np.sqrt(np.mean(plain.rmse**2))
+    assert abs(noise / expected - 1.0) < 0.12  # three deviates of both
+    fewer = estimates(hazard, ALPHA, 8, case, 0, x)
+    assert abs(np.sqrt(np.mean((fewer - truth[:, None]) ** 2)) / expected - 1.0) > 0.12
+
+
+@pytest.mark.slow
+def test_cylinder_is_the_obvious_loop(hazard, case):
+    curved = replace(case, radius=3.0, window=(20.0, 2.0))
+    x, channel = 0.625, 1
+    found = estimates(hazard, ALPHA, SAMPLES, curved, channel, np.array([x]))[0, 5]
+    radii, known, angle = (one[5] for one in drawn(hazard, ALPHA[0], SAMPLES))
+    lit, total = OWN * SAMPLES, OWN * SAMPLES
+    for r, p, phi in zip(radii, known, angle, strict=True):
+        across, up = x + r * math.cos(phi), r * math.sin(phi)
+        middle = (math.floor(across / 0.25) + 0.5) * 0.25
+        if abs(middle) >= 3.0 or abs(up) >= 2.0:
+            continue
+        normal = (
+            np.array([middle, math.sqrt(9.0 - middle**2)]) / 3.0
+        )  # of the pixel's plane, and how high a ray meets it
+        height = 3.0 * normal[1] - (across - middle) * normal[0] / normal[1]
+        distance = math.hypot(r, height - math.sqrt(9.0 - x**2))
+        profile = float(hazard.profile(distance, ALPHA[channel], MFP[channel])) * 2.0 * math.pi * r
+        share = float(hazard.cdf(1e6, ALPHA[channel]))
+        weight = profile / share / p / max(normal[1], LEAST_COSINE)
+        weight /= float(hazard.albedo.reflectance(ALPHA[channel]))
+        lit, total = lit + weight * (across > 0), total + weight
+    assert abs(found - lit / total) < 1e-4
+
+
+def test_short_paths_fade_to_lambert(hazard, case):
+    """Below a twentieth of a pixel nothing is blurred; between that and a tenth a part is."""
+    x = np.array([10.0])
+    for pixel, is_blurred in ((30.0, False), (12.0, True)):
+        found = estimates(hazard, ALPHA, 4, replace(case, pixel=pixel), 0, 0.05 * x)
+        assert np.any(found < 1.0) == is_blurred

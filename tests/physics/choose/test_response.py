@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.stage.step_edge import step_response
-from profilefit.studies.choose.response import averaged, beyond, response
+from profilefit.studies.choose.error import averaged, beyond, response
 from tests.physics.choose.conftest import DIFFUSE
 
 ALPHA = 0.85

@@ -5,9 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks import harmonic_system as system
+from benchmarks import harmonics, high_orders
 from mcml_sim import Grid, Setting, exact, simulate_orders
-from mcml_sim.exact import cone
-from mcml_sim.exact.anisotropic import harmonics, high_orders, system
+from mcml_sim.exact import cone, forwards
 from mcml_sim.exact.single_scattering import entered
 
 N = 1.4
@@ -77,7 +78,7 @@ def test_what_enters_comes_out_where_nothing_is_absorbed():
 
 def test_the_line_starts_where_light_decays():
     alphas = np.array([0.2, 0.7, 0.9, 0.99, 0.9999])
-    kappas = [high_orders.decay_rate(alpha, 0.0) for alpha in alphas]
+    kappas = [forwards.decay_rate(alpha, 0.0) for alpha in alphas]
     np.testing.assert_allclose(kappas[1:], exact.decay_rate(alphas[1:]), rtol=1e-10)
     found = high_orders.lines(alphas, 0.9)
     assert sorted(np.concatenate([own for _, own in found])) == list(range(5))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Setting, SettingError, exact
-from mcml_sim.exact.by_albedo import by_alpha
-from mcml_sim.exact.hankel import profile
+from mcml_sim.exact.by_albedo import by_alpha, profile
 from mcml_sim.exact.transform import STANDARD, Rule
 
 BOTH = pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=["searchlight", "diffuse"])

@@ -9,8 +9,7 @@ from scipy import stats
 from benchmarks import half_spaces
 from mcml_sim import Setting, exact
 from mcml_sim.errors import InputError, SettingError
-from mcml_sim.exact import single_scattering
-from mcml_sim.exact.anisotropic import forward_table
+from mcml_sim.exact import forwards, single_scattering
 from mcml_sim.exact.light import unreduced
 
 ALPHAS = np.array([0.3, 0.9, 0.99, 0.9995])
@@ -175,9 +174,7 @@ def test_what_another_table_would_change_is_small():
 
 
 @pytest.mark.parametrize(
-    "setting",
-    [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)],
-    ids=str,
+    "setting", [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)], ids=str
 )
 def test_outside_the_table_the_tracer_is_named(setting):
     assert not setting.is_solved
@@ -186,15 +183,15 @@ def test_outside_the_table_the_tracer_is_named(setting):
 
 
 def test_a_damaged_table_is_named(monkeypatch, tmp_path):
-    content = forward_table.FILE.read_bytes()
+    content = forwards.FILE.read_bytes()
     bad = tmp_path / "half_space.npz"
-    arrays = dict(np.load(forward_table.FILE))
+    arrays = dict(np.load(forwards.FILE))
     np.savez(bad, **{**arrays, "share": arrays["share"] * 1.001})
-    monkeypatch.setattr(forward_table, "FILE", bad)
-    forward_table.light.cache_clear(), forward_table._table.cache_clear()
+    monkeypatch.setattr(forwards, "FILE", bad)
+    forwards.light.cache_clear(), forwards._table.cache_clear()
     with pytest.raises(InputError, match="is damaged: its numbers are not those that were written"):
         exact.reflectance(0.9, TISSUE)
     monkeypatch.undo()
-    forward_table.light.cache_clear(), forward_table._table.cache_clear()
+    forwards.light.cache_clear(), forwards._table.cache_clear()
     assert exact.reflectance(0.9, TISSUE) > 0
-    assert content == forward_table.FILE.read_bytes()
+    assert content == forwards.FILE.read_bytes()

@@ -10,8 +10,8 @@ from scipy.special import erfc, j0
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate_orders
 from mcml_sim.errors import Notice
-from mcml_sim.exact import cone, hankel, refracting
-from mcml_sim.exact.by_albedo import by_alpha
+from mcml_sim.exact import cone, refracting
+from mcml_sim.exact.by_albedo import by_alpha, profile
 from mcml_sim.exact.single_scattering import entered, transform_density
 from mcml_sim.exact.transform import STANDARD
 from tests.fixtures import slow
@@ -223,5 +223,5 @@ def changed(path):
 def test_fewer_nodes_are_seen():
     """Negative control of the error estimate."""
     where = Setting(n=1.4)
-    coarse = by_alpha(hankel.profile, RADII, ALPHAS, where, STANDARD.scaled(0.5))
+    coarse = by_alpha(profile, RADII, ALPHAS, where, STANDARD.scaled(0.5))
     assert np.abs(coarse / exact.profile(RADII, ALPHAS, setting=where) - 1).max() > 1e-6

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space, simulate
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.stack import depths, fluence, solution
+from mcml_sim.exact.stack import fluence, quadrature, solution
 from mcml_sim.exact.stack.solution import STANDARD
 from tests.fixtures import slow
 from tests.physics.tracing import adding_doubling
@@ -64,7 +64,7 @@ def random_stack(rng, white=False):
 
 def absorbed(medium, illumination):
     """Integrals of mu_a phi over layers that all scatter and end."""
-    here = depths.stack(medium, 0.0, STANDARD)
+    here = quadrature.stack(medium, 0.0, STANDARD)
     light = here.absorbs * fluence.solve(here, 0.0, STANDARD).phi[illumination]
     return np.bincount(np.searchsorted(medium.z_edges[1:-1], here.z), light, minlength=len(medium.layers))
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from profilefit.fitting.estimate import fit
-from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.estimate import fit, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.summary import by_width, discretisation_error, widened
+from profilefit.recipes.checks import by_width, discretisation_error, widened
 
 pytestmark = pytest.mark.slow
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Setting
-from profilefit.fitting import objectives
-from profilefit.fitting.objectives import OBJECTIVES, Rings, rings_of
+from profilefit.fitting import estimate as objectives
+from profilefit.fitting.estimate import OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 
 ALPHAS = np.array([0.3, 0.6, 0.9])
 EDGES = np.concatenate([[0.0], np.geomspace(0.05, 6.0, 20)])

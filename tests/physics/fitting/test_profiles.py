@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.refits import drawn_noise
 from mcml_sim import Grid, InputError, Setting, SettingError, exact, simulate_orders
 from profilefit.fitting.profiles import COVARIANCE_RANK, FEWEST_EFFECTIVE_SAMPLES, Covariance, Profiles
 
@@ -147,7 +148,7 @@ def test_draws_have_the_covariance_between_rings_too(sidak):
     """Ten thousand draws against the closed form, pair by pair (Wishart)."""
     one, dense = dense_covariance()
     number, closed = 10_000, dense.reshape(6, 6)
-    drawn = one.draws(number, seed=3).reshape(number, 6)
+    drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
     error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
     assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
     assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
@@ -162,7 +163,7 @@ def test_draws_scatter_as_the_sandwich_where_many_rings_hold_few_photons(white_r
     gain = np.zeros((3, 20, 26))
     gain[0], gain[1, 19], gain[2, 5, 3:9] = 1.0, 1.0, 1.0
     number = 4000
-    sums = np.einsum("pai,rai->rp", gain, one.draws(number, seed=4))
+    sums = np.einsum("pai,rai->rp", gain, drawn_noise(one, number, seed=4))
     # A standard deviation of 4000 is known to 1.1 %: four of these.
     np.testing.assert_allclose(sums.std(axis=0) / np.sqrt(np.diag(one.sandwich(gain))), 1.0, atol=0.045)
 

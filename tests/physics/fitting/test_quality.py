@@ -7,7 +7,7 @@ import pytest
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import albedo_quality, profile_quality, r_squared
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 
 ALPHAS = [0.3, 0.9]
 

@@ -94,13 +94,6 @@ def test_no_minimum_is_a_result():
     assert found.steps == MAX_STEPS
 
 
-@pytest.mark.slow
-def test_not_a_number_is_a_result():
-    found = least_squares(lambda p, d: jnp.log(p - d), [1.0], np.array([2.0]))
-    assert not found.converged
-    assert found.result.startswith("the residual is not finite there: start nearer to the data")
-
-
 def test_one_bad_problem_leaves_the_others_of_its_batch_alone():
     good, bad = solve_batch(lambda p, d: jnp.log(p) - d, [[1.0], [-1.0]], np.array([[0.5], [0.5]]))
     assert good.converged
@@ -122,10 +115,6 @@ def test_condition_number_of_a_known_jacobian(scale):
 
 def test_condition_number_of_a_blind_constant_is_infinite():
     assert solution([[1.0, 0.0], [1.0, 0.0]]).condition_number > 1e15
-
-
-def test_cost_is_the_sum_of_squares():
-    assert solution(np.eye(2)).cost == 25.0
 
 
 @pytest.mark.slow

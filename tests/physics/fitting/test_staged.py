@@ -1,5 +1,7 @@
 """The paper's protocol on data that it fits without error, and the passage of errors from stage to stage."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -122,30 +124,11 @@ def test_errors_of_the_stages_are_those_of_refitting(liang):
     factor = np.zeros((base.energy.shape[1], 9, 9))
     factor[:, np.arange(9), np.arange(9)] = size.T
     huge = 10**12  # so that the terms between rings vanish
-    one = fit_per_albedo(
-        Profiles(
-            *(
-                base.alpha,
-                base.r_edges,
-                base.energy,
-                size,
-                base.effective_samples,
-                base.beyond,
-                "made",
-                Setting(),
-                huge,
-            ),
-            Covariance(factor, base.energy, huge, 0.0),
-        ),
-        liang,
-        1.0,
-        "none",
-        0.005,
-    )
+    known = replace(base, standard_error=size, photons=huge, covariance=Covariance(factor, base.energy, huge, 0.0))
+    one = fit_per_albedo(known, liang, 1.0, "none", 0.005)
     scattered, constants = [], []
     for _ in range(60):
-        noisy = base.energy + size * rng.standard_normal(size.shape)
-        again = Profiles(base.alpha, base.r_edges, noisy, size, base.effective_samples, base.beyond, "made", Setting())
+        again = replace(base, energy=base.energy + size * rng.standard_normal(size.shape), standard_error=size)
         points = fit_per_albedo(again, liang, 1.0, "none", 0.005)
         scattered.append(points.values.ravel())
         constants.append(fit_coefficient_laws(points, liang, held=("a3",))["c"].solution.parameters)

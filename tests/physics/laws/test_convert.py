@@ -12,10 +12,9 @@ from profilefit.convert import (
     LENGTHS,
     Optical,
     alpha_of,
-    blender,
     colour,
+    engine,
     lengths,
-    maps,
     reflectance_of,
 )
 from profilefit.errors import InputError, SettingError
@@ -235,18 +234,20 @@ def test_engines_with_g_walk_through_the_medium(g):
     c, radius = typed("cycles_legacy", medium)
     np.testing.assert_allclose(4 * np.pi / radius / (1 - g), extinction, rtol=1e-12)
     if g >= 0:
-        np.testing.assert_allclose([maps.wrenninge_alpha(x, g) for x in c], albedo, rtol=1e-10)
+        np.testing.assert_allclose([colour.wrenninge_alpha(x, g) for x in c], albedo, rtol=1e-10)
         c, radius = typed("cycles_skin", medium)
-        path = radius * np.sqrt(3 * (1 - blender.skin_alpha(c)))
+        path = radius * np.sqrt(3 * (1 - engine.skin_alpha(c)))
         np.testing.assert_allclose(1 / path / (1 - g), extinction, rtol=1e-12)
     assert medium.length("mfp_unreduced") == pytest.approx(1 / extinction)
 
 
 def test_wrenninge_s_fit_by_hand():
-    np.testing.assert_allclose([maps.wrenninge_alpha(c) for c in COLOURS], wrenninge(COLOURS), rtol=1e-14)
-    np.testing.assert_allclose(maps.wrenninge_colour(np.array([0.0, 1.0])), [0.0, 0.9182], atol=1e-4)  # passes 1 there
+    np.testing.assert_allclose([colour.wrenninge_alpha(c) for c in COLOURS], wrenninge(COLOURS), rtol=1e-14)
+    np.testing.assert_allclose(
+        colour.wrenninge_colour(np.array([0.0, 1.0])), [0.0, 0.9182], atol=1e-4
+    )  # passes 1 there
     for g in (0.0, 0.4, 0.9):
-        steps = np.diff([maps.wrenninge_alpha(c, g) for c in np.linspace(0, 1, 501)])
+        steps = np.diff([colour.wrenninge_alpha(c, g) for c in np.linspace(0, 1, 501)])
         assert np.all(steps > 0), "its inverse is unique"
 
 
@@ -274,10 +275,10 @@ def test_blender_s_burley_draws_d_of_radius_over_4_pi():
 def test_cycles_skin_radius_is_a_classical_diffuse_mean_free_path():
     """radius sqrt(3 (1 - alpha')) = l, with alpha' where the dipole has the typed colour, to twelve halvings."""
     for a in (0.05, 0.4, 0.8):
-        medium = Optical(maps.wrenninge_alpha(a), 1.0)
-        alpha = float(blender.skin_alpha(a))
+        medium = Optical(colour.wrenninge_alpha(a), 1.0)
+        alpha = float(engine.skin_alpha(a))
         assert 1 / medium.length("cycles_skin_radius") ** 2 == pytest.approx(3 * (1 - alpha), rel=1e-9)
-        root = brentq(lambda x, a=a: blender.dipole_reflectance(x, 1.4) - a, 0.0, 1.0)
+        root = brentq(lambda x, a=a: engine.dipole_reflectance(x, 1.4) - a, 0.0, 1.0)
         assert abs(alpha - root) <= 2.0**-12
         assert alpha != root
         assert (alpha * 2**12) % 1 == 0, "a midpoint of the last halving"
@@ -287,12 +288,12 @@ def test_dipole_reflectance_by_hand():
     """IOR 1: F = .668 + .0636 + .71 - 1.44 = .0016; alpha' = 2/3: s = 1, A = (1 + e^(-4/3 K)) / (3 e)."""
     k = 1.0016 / 0.9984
     expected = (1 + np.exp(-4 / 3 * k)) / (3 * np.e)
-    assert blender.dipole_reflectance(2 / 3, 1.0) == pytest.approx(expected, rel=1e-12)
-    assert blender.dipole_reflectance(1.0, 1.4) == 1.0
+    assert engine.dipole_reflectance(2 / 3, 1.0) == pytest.approx(expected, rel=1e-12)
+    assert engine.dipole_reflectance(1.0, 1.4) == 1.0
 
 
 def test_cycles_clamps_the_darkest_and_the_brightest_colours():
-    np.testing.assert_array_equal(blender.skin_alpha([0.0, 9e-5, 0.995, 1.0]), [0, 0, 0.999999, 0.999999])
+    np.testing.assert_array_equal(engine.skin_alpha([0.0, 9e-5, 0.995, 1.0]), [0, 0, 0.999999, 0.999999])
 
 
 def test_hdrp_has_997_thousandths_within_its_radius():

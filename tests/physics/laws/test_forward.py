@@ -7,9 +7,8 @@ import pytest
 
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.exact import single_scattering
-from profilefit.laws.forward import ForwardHalfSpace
-from profilefit.recipes.stack import photons
-from profilefit.recipes.stack.fit import stack_law
+from profilefit.laws.two_parts import ForwardHalfSpace
+from profilefit.recipes.stack.fit import Tracing, ring_edges, stack_law, traced, traced_half_space
 
 G = 0.9
 # Constants as a fit to tissue gives them.
@@ -60,8 +59,8 @@ def test_radii_have_the_density_that_is_said():
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
 def test_a_fitted_half_space_is_light_that_it_was_not_fitted_to(light):
     setting = Setting(light, n=1.4)
-    law = photons.half_space(TISSUE, setting, photons.Tracing(photons=2**20))
-    fresh = photons.traced(Medium((TISSUE,)), light, photons.ring_edges(TISSUE, (TISSUE,)), 2**20, seed=2)
+    law = traced_half_space(TISSUE, setting, Tracing(1, 2**20))
+    fresh = traced(Medium((TISSUE,)), light, ring_edges(TISSUE, (TISSUE,)), 2**20, seed=2)
     counts = (fresh.weight > 0) & (fresh.edges[:-1] > 0.1 * law.mfp)
 
     def off(one):
@@ -83,7 +82,7 @@ def test_a_stack_that_scatters_forward_is_light_that_it_was_not_fitted_to():
     """Heart muscle, green, under its epicardium: the similar stack's A is a sixth too high."""
     medium = Medium((Layer(1.38, 0.2, 22.0, G, 0.3), Layer(1.38, 0.8, 12.0, G)))
     law = stack_law(medium)
-    fresh = photons.traced(medium, "searchlight", photons.ring_edges(medium.layers[0], medium.layers), 2**21, seed=3)
+    fresh = traced(medium, "searchlight", ring_edges(medium.layers[0], medium.layers), 2**21, seed=3)
     counts = (fresh.weight > 0) & (fresh.edges[:-1] > 0.1 * law.top.mfp)
     within = np.asarray(law.cdf(fresh.edges)) * law.reflectance
     off = np.diff(within)[counts] / fresh.energy[counts] - 1

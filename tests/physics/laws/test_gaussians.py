@@ -7,8 +7,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import ResidualFunction
-from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.estimate import ResidualFunction, rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import least_squares
 from profilefit.laws.gaussians import Gaussians, law_class

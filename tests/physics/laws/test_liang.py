@@ -20,11 +20,9 @@ def test_coefficients_by_hand(liang_printed, x64):
     assert a == pytest.approx(-0.0032, abs=1e-14)
     assert b == pytest.approx(0.461 * math.exp(-2.608375 * math.log(2)), rel=1e-14)
     assert b == pytest.approx(0.0755965, rel=1e-5)
+    assert float(liang_printed.source_strength(jnp.asarray(0.5))) == pytest.approx(2 * math.pi * b / c, rel=1e-14)
     assert c == pytest.approx(0.2452118, abs=1e-7)
-
-
-def test_the_correction_of_a_acts_at_alpha_1_only(liang_printed, x64):
-    """(11): k2 0.1^(-30 (alpha - 1)) is k2 itself at 1, a tenth of it at 1 - 1/30, and nothing at 0.9."""
+    # (11): k2 0.1^(-30 (alpha - 1)) is k2 itself at 1, a tenth of it at 1 - 1/30, and nothing at 0.9.
     for alpha, share in ((1.0, 1.0), (1 - 1 / 30, 0.1), (0.9, 1e-3)):
         a = float(liang_printed.coefficients(jnp.asarray(alpha))[0])
         assert a + 0.0064 * alpha == pytest.approx(0.00316 * share, rel=1e-12)
@@ -54,6 +52,9 @@ def test_nothing_beyond_the_largest_radius(liang):
         assert liang.profile(farthest * (1 + 1e-9), alpha) == 0
         assert liang.cdf(farthest, alpha) == pytest.approx(1.0, abs=1e-15)
         assert liang.profile(0.999 * farthest, alpha) < 1e-2 * liang.profile(0.5 * farthest, alpha)
+    # r_max = 0/0: the docstring keeps alpha = 0 out, and nobody gets a plausible wrong value there.
+    assert math.isnan(liang.cdf(1.0, 0.0))
+    assert not liang.profile(1.0, 0.0) > 0
 
 
 def test_b0_as_printed_breaks_the_energy_and_a_seventh_of_it_does_not(liang, liang_printed):
@@ -69,17 +70,6 @@ def test_largest_radii(liang, liang_printed):
     found = np.asarray(liang.largest_radius(ALPHAS))
     np.testing.assert_allclose(found * 0.461 / 0.0641, liang_printed.largest_radius(ALPHAS), rtol=1e-12)
     np.testing.assert_allclose(found[[0, -1]], [2.339, 12.72], rtol=1e-3)
-
-
-def test_source_strength_is_2_pi_b_over_c(liang, x64):
-    _, b, c = liang.coefficients(jnp.asarray(0.6))
-    assert float(liang.source_strength(jnp.asarray(0.6))) == pytest.approx(2 * math.pi * float(b / c), rel=1e-14)
-
-
-def test_at_no_albedo_there_is_no_shape(liang):
-    """r_max = 0/0: the docstring keeps alpha = 0 out, and nobody gets a plausible wrong value there."""
-    assert math.isnan(liang.cdf(1.0, 0.0))
-    assert not liang.profile(1.0, 0.0) > 0
 
 
 # The inverse cdf
@@ -106,21 +96,15 @@ def test_the_radius_is_negative_below_eps_and_its_size_is_drawn(liang, x64):
     assert liang.sampler.sample(0.01, 0.7) == pytest.approx(0.0, abs=1e-15)
 
 
-def test_the_clip_is_an_atom_at_the_largest_radius(liang):
+def test_the_clip_is_an_atom_at_the_largest_radius(liang, liang_printed):
     xi = (np.arange(100_000) + 0.5) / 100_000
     for alpha in (0.1, 0.9, 0.95):
         drawn = liang.sampler.sample(xi, alpha)
         farthest = float(liang.largest_radius(alpha))
         assert drawn.max() == farthest
-        share = np.mean(drawn == farthest)
-        assert share > 1e-3
-        # Even xi count an interval to within one of 1e5.
-        assert liang.sampler.atom(alpha) == pytest.approx(share, abs=1.1e-5)
-
-
-def test_no_clip_no_atom(liang, liang_printed):
-    assert liang.sampler.atom(0.5) == pytest.approx(0.0, abs=1e-15)
-    np.testing.assert_allclose(liang_printed.sampler.atom(ALPHAS), 0.0, atol=1e-15)
+        assert np.mean(drawn == farthest) > 1e-3
+    for law, alphas in ((liang, 0.5), (liang_printed, ALPHAS)):  # no clip, no atom
+        assert np.all(law.sampler.unclipped(1.0, alphas) < law.largest_radius(alphas))
 
 
 def test_the_sampler_has_no_density_beyond_its_reach(liang):

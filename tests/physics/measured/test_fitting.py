@@ -109,7 +109,7 @@ def test_failures_have_names():
     bright = fit(rings(), scale=0.3)  # no medium reflects more than all of the light
     assert "alpha runs to 1" in bright.minimum.result
     with pytest.raises(InputError, match=r"made up: expected more than 3 rows, one more than is free, got 3"):
-        fit(rings().chosen(np.arange(24) < 3))
+        fit(rings().within(None, EDGES[3]))
 
 
 def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
@@ -237,7 +237,11 @@ def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled
     point = found["point"]
     value = light(np.array([point.inner]), np.array([point.outer]), 3.0)[0]
     assert value == pytest.approx(point.value, rel=1e-5)
-    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.spec)
+    data, row = unscaled.data, (point.inner, point.outer, value, point.error, np.inf)
+    names = ("inner", "outer", "value", "sigma", "freedom")
+    at = int(np.searchsorted(data.inner, point.inner))
+    more = {name: np.insert(getattr(data, name), at, one) for name, one in zip(names, row, strict=True)}
+    with_point = fitted(replace(data, **more), unscaled.spec)
     assert relative_errors(with_point, with_point.total_covariance) == pytest.approx(point.relative, rel=0.02)
     assert max(point.relative.values()) > max(real.values())
     four = fit(rings(error=0.01, scale=3.0))

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import half_spaces, own_data
 from mcml_sim import Layer, Medium, Setting
-from mcml_sim.exact.anisotropic import forward_table
+from mcml_sim.exact import forwards
 from profilefit.measured import fit
 from profilefit.measured.data import Measured
 from profilefit.measured.model import exact_light
@@ -71,7 +71,7 @@ def test_what_is_open_widens_the_errors(ranges):
 def test_light_goes_on_beyond_the_table(alpha):
     """Beyond its farthest radius light of a fit is the table's, which decays on without a step."""
     setting = Setting(n=1.4, g=0.8)
-    light, whole = exact_light(setting), forward_table.light(setting)
+    light, whole = exact_light(setting), forwards.light(setting)
     x = float(whole.farthest) * np.array([1.0 - 1e-9, 1.0 + 1e-9, 1.5])
     with jax.enable_x64(True):
         found, right = (np.asarray(one.ring_density(x, np.array(alpha))) for one in (light, whole))

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.tracing import layered_event, pool, rng
 from profilefit.errors import InputError
-from profilefit.measured import fit, oblique
+from profilefit.measured import fit
+from profilefit.measured import model as oblique
 from profilefit.measured.model import u_of
 
 ANGLE = 45.0

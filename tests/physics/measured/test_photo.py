@@ -13,16 +13,14 @@ from profilefit.errors import InputError
 from profilefit.fitting.solver import CONVERGED, Solution, lowest
 from profilefit.measured import model
 from profilefit.measured.model import exact_light, u_of
-from profilefit.measured.photo import bracket, medium, rings, simulated, spot, workflow
-from profilefit.measured.photo.bracket import Picture
-from profilefit.measured.photo.exposure import BayerPlane, Exposure
-from profilefit.measured.photo.glare import halo, ring_means, ring_weights
-from profilefit.measured.photo.medium import Beliefs, Card, Shot
-from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
-from profilefit.measured.photo.rings import SpotRings
+from profilefit.measured.photo import exposure as bracket
+from profilefit.measured.photo import medium, rings, simulated, workflow
+from profilefit.measured.photo.exposure import BayerPlane, Exposure, Picture
+from profilefit.measured.photo.medium import Beliefs, Card, Shot, halo, ring_means, ring_weights
+from profilefit.measured.photo.rings import PixelScale, SpotRings, pixel_scale
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.report.tables.photo_tables import photo_lines
+from profilefit.report.tables.fit_tables import photo_lines
 from tests.fixtures import slow
 
 SETTING = bench.SETTING
@@ -143,7 +141,7 @@ def test_a_spots_centre_is_found(shots):
     exposures, _ = shots
     times, _ = bracket.times(exposures)
     greens = bracket.merged(exposures, times, bracket.sensor(exposures, times))[1:3]
-    found = spot.spot(greens, exposures[0].sides, SQUARE, "shot")
+    found = rings.spot(greens, exposures[0].sides, SQUARE, "shot")
     assert found.centre == pytest.approx((399.5 + 13.3, 299.5 - 7.7), abs=0.5)
 
 
@@ -163,7 +161,7 @@ def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, s
     r = 2.0 * PITCH * np.hypot(row - 150.0, column - 200.0)
     picture = change(np.interp(r, *light).astype(np.float32))
     with pytest.raises(InputError, match=said) as caught:
-        spot.spot([bracket.Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
+        rings.spot([bracket.Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
     assert "\n" not in str(caught.value)
 
 
@@ -171,7 +169,7 @@ def test_a_stuck_pixel_elsewhere_is_left_out(light):
     row, column = np.indices((300, 400))
     picture = np.interp(2.0 * PITCH * np.hypot(row - 150.0, column - 200.0), *light).astype(np.float32)
     picture[np.hypot(row - 40.0, column - 90.0) <= 2.0] = np.nan
-    found = spot.spot([Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
+    found = rings.spot([Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
     assert found.centre == pytest.approx((400.0, 300.0), abs=0.1)
 
 

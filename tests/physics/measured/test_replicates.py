@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from profilefit.fitting.misfit import gaussianised, likelihood, own_degrees_of_freedom, scatter_chance
+from profilefit.fitting.misfit import gaussianised, likelihood, scatter_chance
 from profilefit.measured.data import moderated_variances, trend_freedom, widening
 
 ROWS, COUNT = 40, 3
@@ -88,9 +88,7 @@ def test_chi_square_has_its_chance(spread):
     below, too_sure = 0, 0
     for one in samples:
         found = moderated_variances(one)
-        residuals = gaussianised(
-            (found.value - mean) / found.sigma, own_degrees_of_freedom(found.freedom, found.pooled)
-        )
+        residuals = gaussianised((found.value - mean) / found.sigma, found.freedom, found.pooled)
         below += scatter_chance(residuals @ residuals, ROWS, found.pooled) < 0.05
         too_sure += scatter_chance(residuals @ residuals, ROWS, np.inf) < 0.05
     low, high = stats.binom.ppf([5e-4, 1 - 5e-4], len(samples), 0.05)

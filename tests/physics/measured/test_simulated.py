@@ -10,8 +10,7 @@ import pytest
 
 from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.reading import read
-from profilefit.measured.simulated_file import FEWEST_PHOTONS, NARROWEST, merged
+from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
 
 DATA = Path(__file__).parents[3] / "examples"
 
@@ -101,15 +100,12 @@ def test_light_that_no_run_gives_is_one_line(tmp_path):
     assert read(changed("reflectance_r", 1)).photons > 2
 
 
-def test_rows_can_be_chosen_and_added():
+def test_rows_can_be_chosen():
     data = read(DATA / "phantom.csv")
     near = data.within(None, 1.0)
     assert near.r.max() <= 1.0
     assert near.notes == ("12 of 20 rows left out, by `r_min` and `r_max`",)
     assert data.within(0.1, 100.0) is data
-    more = near.with_row(0.5, 0.5, 7.0, 0.1)
-    np.testing.assert_array_equal(np.diff(more.inner) > 0, True)
-    assert more.value[more.inner == 0.5] == 7.0
     with pytest.raises(InputError, match=r"no row is left between `r_min` and `r_max`: r goes from 0.2 to 12"):
         data.within(20.0, None)
     assert dataclasses.replace(data, unit="m").relative_error == pytest.approx(0.02, rel=0.1)

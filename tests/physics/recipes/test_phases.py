@@ -1,6 +1,6 @@
 """Phase functions fitted to tables: Petzold's mean, one that is known, bad tables, and the shipped record."""
 
-import json
+import shutil
 from pathlib import Path
 
 import jax
@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, backscattered, haltrin
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import phase as record
-from profilefit.recipes.phases.data import read_phase
-from profilefit.recipes.phases.fit import MOMENTS, fit_phase
-from profilefit.recipes.run import RecipeRun, alone
-from tests.fixtures import slow
+from profilefit.recipes.phases import MOMENTS, fit_phase, read_phase
+from profilefit.recipes.run import RecipeRun
+from tests.fixtures import recorded, slow
+from tests.unit.recipes.stack.test_record import GONE, refused, spoil
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = shipped("fits") / "phases"
@@ -86,8 +86,8 @@ def test_every_form_is_a_phase_function(name):
 def test_a_table_of_any_scale_with_a_row_at_zero(tmp_path, factor, unit, line):
     degrees, path = np.arange(181.0), tmp_path / "table.csv"
     values = factor * HenyeyGreenstein(0.8).pdf(np.cos(np.radians(degrees)))
-    rows = (f"{a:g}, {value:.12g}" for a, value in zip(degrees, values, strict=True))
-    path.write_text("\n".join([f"angle [deg], value{unit}, sigma", *(f"{row}, {factor * 1e-3}" for row in rows)]))
+    rows = (f"{a:g}, {value:.12g}, {factor * 1e-3}\n" for a, value in zip(degrees, values, strict=True))
+    path.write_text(f"angle [deg], value{unit}, sigma\n" + "".join(rows))
     data = read_phase(path)
     assert data.integral == pytest.approx(factor, rel=1e-3)
     assert data.mean_cosine == pytest.approx(0.8, abs=1e-3)
@@ -113,14 +113,17 @@ def test_shares_of_angles_without_rows(tmp_path):
     named = [(0.0, 1.0), (40.0, 60.5), (85.0, 115.0), (140.0, 180.0)]
     for phase in (HenyeyGreenstein(0.0), HenyeyGreenstein(0.7), KNOWN):
         data = read_phase(table(tmp_path / "table.csv", phase, degrees=degrees))
-        assert [(span.low, span.high) for span in data.spans] == [pytest.approx(one) for one in named]
+        assert [(span["low"], span["high"]) for span in data.spans] == [pytest.approx(one) for one in named]
         for span in data.spans:
-            ends = np.cos(np.radians([span.low, span.high]))
+            ends = np.cos(np.radians([span["low"], span["high"]]))
             share = float(np.ptp(phase.invert(ends))) / data.integral
             if phase.mean_cosine == 0:
-                assert (span.share, span.other) == (pytest.approx(share, rel=1e-5), pytest.approx(share, rel=1e-5))
+                assert (span["share"], span["other"]) == (
+                    pytest.approx(share, rel=1e-5),
+                    pytest.approx(share, rel=1e-5),
+                )
             else:
-                assert min(span.share, span.other) * 0.99 < share < max(span.share, span.other) * 1.01
+                assert min(span["share"], span["other"]) * 0.99 < share < max(span["share"], span["other"]) * 1.01
 
 
 @pytest.mark.parametrize(("last", "other"), [(0.09, pytest.approx(0.0759, rel=0.05)), (1e300, 1e3)])
@@ -128,7 +131,7 @@ def test_a_last_row_that_is_noise(tmp_path, last, other):
     """Two rows side by side do not decide what lies beyond, and no share is infinite."""
     path = tmp_path / "table.csv"
     path.write_text(HEAD + "".join(f"{a}, 0.08\n" for a in range(1, 151)) + f"150.01, {last}\n")
-    assert read_phase(path).spans[-1].other == other
+    assert read_phase(path).spans[-1]["other"] == other
 
 
 def test_the_lines_of_the_guide(tmp_path):
@@ -145,11 +148,11 @@ def test_a_first_gap_under_a_row_at_zero(tmp_path):
     """A peak that 5 degrees do not resolve: the scale is 30 % off, and the difference of both rules says so."""
     data = read_phase(table(tmp_path / "table.csv", HenyeyGreenstein(0.95), degrees=np.arange(0.0, 181, 5)))
     (span,) = data.spans
-    assert (span.low, span.high) == (0.0, pytest.approx(5.0))
+    assert (span["low"], span["high"]) == (0.0, pytest.approx(5.0))
     assert data.integral == pytest.approx(1.325, abs=1e-3)
     right = 1 - HenyeyGreenstein(0.95).invert(np.cos(np.radians(5.0)))
-    assert span.other * data.integral < right < span.share * data.integral
-    assert abs(data.integral - 1) < (span.share - span.other) * data.integral
+    assert span["other"] * data.integral < right < span["share"] * data.integral
+    assert abs(data.integral - 1) < (span["share"] - span["other"]) * data.integral
 
 
 def test_a_known_function_comes_back(tmp_path):
@@ -220,7 +223,7 @@ def test_shipped_record():
 @pytest.mark.slow
 def test_the_record_comes_out_again(tmp_path):
     said = []
-    again = record.load(alone(record.fit(FOLDER / "petzold.csv", RUN), tmp_path, say=said.append))
+    again = record.load(recorded(record.fit(FOLDER / "petzold.csv", RUN), tmp_path, say=said.append))
     assert said[:-1] == record.table_lines(again.content["data"])
     assert len(said) == 4
     for name, one in SHIPPED.content["constants"].items():
@@ -251,25 +254,17 @@ ROWS = "".join(f"{a}, {1 / (4 * np.pi):.9f}\n" for a in (1, 10, 30, 60, 90, 120,
         ("angle, value [1/(m sr)], sigma [1/sr]\n" + ROWS, r":1: expected sigma in the unit of value, \[1/\(m sr\)\]"),
         (HEAD + ROWS.replace("0.079577472", "9e307"), "expected values whose integral is finite and > 0, got "),
         ("angle, value, sigma\n" + ROWS.replace("\n", ", 0\n"), ":2: expected a sigma > 0, got 0"),
+        (b"angle, value\n\xff\n", r"table\.csv:2: expected text in UTF-8, got the byte 0xff"),
+        ("#" * (2**20 + 10), "at most 1048576 bytes"),
     ],
 )
 def test_bad_tables_in_one_line(tmp_path, text, message):
     path = tmp_path / "table.csv"
-    path.write_text(text)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=message) as error:
         read_phase(path)
     assert "\n" not in str(error.value)
     assert str(path) in str(error.value)
-
-
-def test_bytes_that_are_no_text(tmp_path):
-    path = tmp_path / "table.csv"
-    path.write_bytes(b"angle, value\n\xff\n")
-    with pytest.raises(InputError, match=r"table\.csv:2: expected text in UTF-8, got the byte 0xff"):
-        read_phase(path)
-    path.write_bytes(b"#" * (2**20 + 10))
-    with pytest.raises(InputError, match="at most 1048576 bytes"):
-        read_phase(path)
 
 
 @pytest.mark.parametrize(
@@ -286,25 +281,22 @@ def test_questions_that_have_no_answer(arguments, message):
         fit_phase(PETZOLD, **arguments)
 
 
-def test_damaged_records(tmp_path):
-    content = json.loads((FOLDER / "petzold.json").read_text())
-    path = tmp_path / "petzold.json"
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        ("data/spans", [{"low": "none"}], "data.spans.0.low must be a number"),
+        ("constants/4-terms.held.w1/regenerated", 0.9, r"petzold\.json: is damaged: weights must sum to 1"),
+        ("constants/4-terms.held.w1", GONE, "constants.4-terms.held.w1 must be a table, got nothing"),
+        ("phases/haltrin/free/rms", "small", "phases.haltrin.free.rms must be a number"),
+        ("pipeline", "profile", "must be a record of phase functions, got pipeline 'profile'"),
+    ],
+)
+def test_damaged_records(tmp_path, place, value, message):
+    path = Path(shutil.copy(FOLDER / "petzold.json", tmp_path))
+    spoil(path, place, value)
+    refused(lambda path: record.load(path).phase("4-terms"), path, message)
 
-    def damaged(message):
-        path.write_text(json.dumps(content))
-        with pytest.raises(RecordError, match=message):
-            record.load(path).phase("4-terms")
 
-    content["data"]["spans"] = [{"low": "none"}]
-    damaged("data.spans.0.low must be a number")
-    del content["data"]["spans"]
-    content["constants"]["4-terms.held.w1"]["regenerated"] = 0.9
-    damaged(r"petzold\.json: is damaged: weights must sum to 1")
-    del content["constants"]["4-terms.held.w1"]
-    damaged("constants.4-terms.held.w1 must be a table, got nothing")
-    content["phases"]["haltrin"]["free"]["rms"] = "small"
-    damaged("phases.haltrin.free.rms must be a number")
-    content["pipeline"] = "profile"
-    damaged("must be a record of phase functions, got pipeline 'profile'")
+def test_a_record_that_is_not_there():
     with pytest.raises(InputError, match=r"must be one of petzold, or a \.json, got 'baltic'"):
         record.named("baltic")

@@ -1,10 +1,72 @@
-"""Each class is given where it belongs, and only there."""
+"""Cells of arguments, their classes, and the regions that they make."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from profilefit.studies.stability.cells import Cells, Verdict, absolute, judged, relative, steps_down, steps_up
-from profilefit.studies.stability.layout import FLOAT64, ArgumentAxis
+from profilefit.studies.stability.cells import (
+    ADVICE,
+    ARITHMETICS,
+    FLOAT64,
+    LENGTHS,
+    TEXT16,
+    ArgumentGrid,
+    Cells,
+    Verdict,
+    absolute,
+    axis,
+    judged,
+    labelled,
+    regions_of,
+    relative,
+    shown,
+    steps_down,
+    steps_up,
+)
+
+DTYPES = (np.float16, np.float32, np.float64)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_every_cell_is_a_number_of_its_format(dtype):
+    grid = ArgumentGrid.of(dtype)
+    for at in (grid.alpha, grid.x, grid.xi, grid.mfp):
+        np.testing.assert_array_equal(at.values.astype(dtype).astype(float), at.values)
+        assert np.all(np.diff(at.values) > 0)
+    limits = np.finfo(dtype)
+    assert grid.alpha.values[0] == 0
+    assert grid.alpha.values[-1] == 1
+    assert {float(limits.smallest_subnormal), float(limits.tiny)} <= set(grid.alpha.values)
+    assert {float(limits.max), np.inf} <= set(grid.x.values)
+    assert 1.0 - float(limits.epsneg) in grid.xi.values
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_lengths_reach_both_ends_of_what_is_accepted_and_beyond(dtype):
+    low, high = LENGTHS[dtype]
+    grid = ArgumentGrid.of(dtype)
+    assert np.min(grid.mfp.values[grid.accepted]) == dtype(low)
+    assert np.max(grid.mfp.values[grid.accepted]) == dtype(high)
+    assert not np.all(grid.accepted)
+    assert np.all(ArgumentGrid.of(dtype, beyond=False).mfp.values <= max(high, 1e3))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (2.0**-24, "2^-24"), (1 - 2.0**-53, "1-2^-53"), (0.25, "0.25"), (np.inf, "inf"), (1.0, "1")],
+)
+def test_numbers_as_a_person_writes_them(value, text):
+    assert shown(value) == text
+
+
+def test_a_span_says_all_where_it_is_all():
+    alpha = axis("α", [0.0, 0.5, 1.0])
+    assert alpha.span(0, 2) == "all α"
+    assert alpha.span(1, 2) == "α 0.5 … 1"
+    assert alpha.span(1, 1) == "α 0.5"
+    assert labelled("of", ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"
+
 
 BOUND = 1e-3
 
@@ -59,9 +121,9 @@ def test_what_is_not_judged_shows_beside_what_is_right():
 def test_failures_are_the_red_classes_inside():
     codes = np.array(list(Verdict), np.int8)
     one = np.ones(codes.shape)
-    axis = ArgumentAxis("x", "-", np.arange(1.0 * codes.size))
+    at = axis("x", np.arange(codes.size))
     for inside in (True, False):
-        cells = Cells("f", True, "cdf", FLOAT64, (axis,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
+        cells = Cells("f", True, "cdf", FLOAT64, (at,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
         np.testing.assert_array_equal(cells.failures, [inside and each.is_red for each in Verdict])
 
 
@@ -76,3 +138,37 @@ def test_errors_of_equal_infinities_are_none():
     value, right = np.array([np.inf, 0.0, 1.0]), np.array([np.inf, 0.0, 2.0])
     np.testing.assert_array_equal(relative(value, right), [0.0, 0.0, 0.5])
     np.testing.assert_array_equal(absolute(value, right), [0.0, 0.0, 1.0])
+
+
+def small_cells(codes, **changed):
+    """A tensor of half precision over l."""
+    axes, one = (axis("α", [0.5]), axis("l", [1.0, 2.0, 2.0**-14], "length")), np.ones((1, 3))
+    cells = Cells("f", False, "cdf", TEXT16, axes, one, one, one, 0.1, one > 0, np.array([codes], np.int8))
+    return replace(cells, **changed)
+
+
+def test_neighbours_of_one_class_are_one_region():
+    wrong, fine, not_finite = Verdict.INACCURATE, Verdict.RIGHT, Verdict.NOT_FINITE
+    assert [one.count for one in regions_of(small_cells([wrong, wrong, fine]))] == [2]
+    assert [one.count for one in regions_of(small_cells([wrong, fine, wrong]))] == [1, 1]
+    assert [one.verdict for one in regions_of(small_cells([not_finite, wrong, wrong]))] == [wrong, not_finite]
+    assert regions_of(small_cells([fine, Verdict.OUTSIDE, Verdict.BEYOND])) == []
+
+
+def test_a_region_has_its_worst_cell():
+    (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3, error=np.array([[0.2, 0.5, 0.3]])))
+    assert (region.place, region.error, region.where) == ("α 0.5; l 2", 0.5, "α 0.5; all l")
+
+
+def test_what_is_not_judged_is_a_region_that_says_why():
+    (region,) = regions_of(small_cells([Verdict.NOT_JUDGED] * 3, unjudged="no text"))
+    assert (region.verdict, region.advice) == (Verdict.NOT_JUDGED, "no text")
+    assert not region.is_failure
+
+
+def test_every_arithmetic_has_its_advice():
+    assert set(ADVICE) == set(ARITHMETICS)
+    (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3))
+    assert region.advice == ADVICE[TEXT16]
+    (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3, advice="mend it"))
+    assert region.advice == "mend it"

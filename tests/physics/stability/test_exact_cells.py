@@ -5,8 +5,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.studies.stability import exact_cells
-from profilefit.studies.stability.cells import Verdict, absolute, judged
-from profilefit.studies.stability.layout import CDF
+from profilefit.studies.stability.cells import CDF, Verdict, absolute, judged
 
 X, ALPHA = np.array([0.0, 1e-3, 0.1, 1.0, 10.0, 1e3, np.inf]), np.array([0.0, 1e-6, 0.5, 1.0])
 

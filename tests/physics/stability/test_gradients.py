@@ -3,17 +3,16 @@
 import pytest
 
 from profilefit.recipes import catalogue
-from profilefit.shader.check import validity
+from profilefit.shader.check import bounds
 from profilefit.studies.stability import gradients
-from profilefit.studies.stability.cells import Verdict
-from profilefit.studies.stability.regions import regions_of
+from profilefit.studies.stability.cells import Verdict, regions_of
 
 FITS = catalogue.fits_folder()
 
 
 def of_map(label):
     one = next(one for one in catalogue.albedo_laws(FITS) if one.label == label)
-    return list(gradients.of_map(one, validity.of_map(one, FITS)))
+    return list(gradients.of_map(one, bounds.valid_map(one, FITS)))
 
 
 def test_the_rational_map_is_differentiable_both_ways():

@@ -5,8 +5,7 @@ import numpy as np
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import find
 from profilefit.studies.stability import misuse
-from profilefit.studies.stability.cells import Verdict
-from profilefit.studies.stability.layout import FLOAT64
+from profilefit.studies.stability.cells import FLOAT64, Verdict
 
 FITS = catalogue.fits_folder()
 

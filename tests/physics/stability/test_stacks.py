@@ -7,10 +7,8 @@ import pytest
 
 from profilefit.recipes.folder import fits_folder
 from profilefit.studies.stability import stacks
-from profilefit.studies.stability.cells import Verdict
-from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PDF, PROFILE, SAMPLE, TEXT32
-from profilefit.studies.stability.regions import regions_of
-from profilefit.studies.stability.stacks import ONCE, TOTAL
+from profilefit.studies.stability.cells import EXTENDED, Verdict, regions_of
+from profilefit.studies.stability.stacks import CDF, FLOAT64, MODEL, ONCE, PDF, PROFILE, SAMPLE, TEXT32, TOTAL
 
 ENDS = {(row[0], row[1]): stacks.end(*row) for row in stacks.ENDS}
 
@@ -79,7 +77,7 @@ def test_a_constant_that_float32_has_wrong_is_found(monkeypatch, quantity, const
     """Negative control: the text of a law whose constant is off by a hundredth."""
     one = replace(ENDS[0.3, 0.9])  # which has not read its text yet
     off = replace(one, law=replace(one.law, **{constant: 1.01 * getattr(one.law, constant)}))
-    monkeypatch.setattr(stacks.StackCase, "reference", off.text(stacks.EXTENDED))
+    monkeypatch.setattr(stacks.StackCase, "reference", off.text(EXTENDED))
     (cells,) = stacks.of_law(one, TEXT32, (quantity,))
     assert np.any(cells.failures)
     assert any(each.is_failure for each in reds(cells))

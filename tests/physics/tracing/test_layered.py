@@ -233,12 +233,6 @@ def test_weak_absorption_keeps_its_digits(absorbs):
     assert np.sqrt(d.absorbed_z_variance.sum()) < 0.01 * d.absorbed[-1]
 
 
-def test_one_photon_says_nothing_of_its_error():
-    d = layered_batch.trace_batch(SMALL, GRID, 1, 0, 1)
-    assert np.all(np.isinf(d.absorbed_z_variance))
-    assert np.all(np.isinf(d.absorbed_rz_variance))
-
-
 def test_another_medium_of_the_same_structure_is_not_compiled_again():
     fast()
     other = Medium((Layer(1.1, 1, 2, 0.1, 3), Layer(1.1, 1, 0, 0, 1), Layer(1.2, 0, 0, 0, 2)))

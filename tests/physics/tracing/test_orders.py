@@ -232,14 +232,3 @@ def test_fifty_seeds_have_no_bias(sidak):
     assert np.abs(z.mean(axis=0)).max() < 3 / np.sqrt(50)
     # And the standard errors are right: chi^2 of 50 degrees, within 4 of its deviations of 0.1 each.
     assert np.abs(np.mean(z**2, axis=0) - 1).max() < 4 * np.sqrt(2 / 50)
-
-
-@pytest.mark.slow
-def test_a_hundred_million_photons_agree_in_every_sampled_ring(sidak):
-    edges = np.concatenate([[0.0], np.geomspace(0.003, 40.0, 100)])
-    run = simulate_orders(Grid.from_edges(r=edges), 10**8, seed=5)
-    for alpha in ALPHAS:
-        found = run.energy(alpha)
-        sampled = found.is_sampled()
-        z = deviations(found, exact_energy(edges, alpha))[sampled]
-        assert np.abs(z).max() < sidak(sampled.sum() * len(ALPHAS))

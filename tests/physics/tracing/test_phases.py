@@ -67,11 +67,7 @@ def test_equal_terms_are_one():
 
 @pytest.mark.parametrize(
     ("phase", "illumination"),
-    [
-        (SEA, "searchlight"),
-        (SEA, "diffuse"),
-        *slow((TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight")),
-    ],
+    [(SEA, "searchlight"), (SEA, "diffuse"), *slow((TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight"))],
     ids=["mixture", "mixture, diffuse", "table", "Forand"],
 )
 @PHOTONS

@@ -1,17 +1,123 @@
-"""Times and errors of a few laws, small."""
+"""Profile laws: the forms that are timed are those that are judged, functions counted by hand, times and errors."""
 
+from collections import Counter
+
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import profilefit
-from profilefit.studies.tradeoff import contenders, laws
+from mcml_sim import exact
+from profilefit.errors import InputError
+from profilefit.fitting.quality import profile_quality
+from profilefit.laws.burley import BurleySampler
+from profilefit.studies.tradeoff import laws
+from profilefit.studies.tradeoff.laws import YARDSTICK, LawSpec, count, described, with_samplers
 from profilefit.studies.tradeoff.stopwatch import Rates
 
 SMALL = laws.LawSizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
 
 
+@pytest.mark.slow
+def test_fast_forms_are_the_laws():
+    """In float32, as they are timed."""
+    alpha = jnp.array([[0.1], [0.8], [0.99]])
+    x, xi = jnp.geomspace(0.01, 5.0, 50), jnp.linspace(0.01, 0.99, 50)
+    law = profilefit.load("burley", "published")
+    for contender, sampler in zip(with_samplers(YARDSTICK, law), ("exact", "xie"), strict=True):
+        profile, drawn = jax.jit(lambda c=contender: (c.profile(x, alpha), c.sample(xi, alpha)))()
+        np.testing.assert_allclose(profile, law.scaled_profile(x, alpha), rtol=1e-5)
+        np.testing.assert_allclose(drawn, law.samplers[sampler].scaled_sample(xi, alpha), rtol=2e-5, atol=1e-6)
+        assert type(contender.judged) is type(law.samplers[sampler])
+    (quantile,) = with_samplers("quantile", profilefit.load("quantile"))
+    drawn, profile = jax.jit(lambda: quantile.both(xi, alpha))()
+    np.testing.assert_allclose(drawn, jax.jit(lambda: quantile.sample(xi, alpha))(), rtol=1e-6)
+    np.testing.assert_allclose(profile, jax.jit(lambda: quantile.profile(drawn, alpha))(), rtol=1e-5)
+
+
+def test_fast_form_in_diffuse_mean_free_paths():
+    law = profilefit.load("burley_diffuse_mfp", "published")
+    (fast,) = with_samplers("own", law)
+    r = np.geomspace(0.01, 5.0, 9)
+    np.testing.assert_allclose(fast.law.profile(r, 0.8), law.profile(r, 0.8), rtol=1e-12)
+    assert fast.constants == (3, 0)
+
+
+def test_fast_pdf_is_that_of_the_law():
+    law = profilefit.load("burley", "published")
+    fast = next(with_samplers(YARDSTICK, law))
+    r = np.geomspace(0.01, 5.0, 9)
+    np.testing.assert_allclose(fast.sampler.pdf(r, 0.8), law.sampler.pdf(r, 0.8), rtol=1e-12)
+
+
+def test_what_cannot_be_had_is_left_out_by_name():
+    specs = (LawSpec(YARDSTICK, "burley", "published"), LawSpec("absent", "gaussians", "no-such-set"))
+    found, left_out = laws.contenders(specs=specs)
+    assert [one.name for one in found] == [YARDSTICK, f"{YARDSTICK}, Xie's sampler"]
+    assert len(left_out) == 1
+    assert left_out[0].startswith("absent: constants must be one of")
+    with pytest.raises(InputError, match="laws must have normalized diffusion among them"):
+        laws.contenders(specs=specs[1:])
+
+
+@pytest.mark.slow
+def test_table_is_the_exact_profile_to_rounding():
+    table = laws.table_contender()
+    x = np.geomspace(0.01, 10.0, 40)
+    truth = exact.profile(x, laws.MATERIAL)
+    looked_up = table.profile(jnp.asarray(x, jnp.float32), jnp.float32(0.0))
+    np.testing.assert_allclose(looked_up, truth, rtol=1e-5)
+    np.testing.assert_allclose(table.law.profile(x, laws.MATERIAL), truth, rtol=1e-5)
+    np.testing.assert_allclose(table.law.cdf(x, laws.MATERIAL), exact.cdf(x, laws.MATERIAL), rtol=1e-5)
+    assert np.max(np.abs(looked_up / truth - 1.0)) > 1e-9  # in float32 it is
+    assert set(table.parts) == {"profile"}
+    assert profile_quality(table.law, laws.judged_albedos(2)).rel.max() < 1e-5
+
+
+def test_counts_what_the_answer_needs_once_for_each_point_or_material():
+    def function(x, alpha):
+        jnp.tanh(x)  # not needed
+        nodes = jnp.log(jnp.arange(1.0, 4.0)) + alpha
+        return jnp.where(x > 0, jnp.exp(jnp.sqrt(alpha) * x), 0.0) + jnp.sum(jnp.cos(x[:, None] * nodes), axis=1)
+
+    found = count(function)
+    assert found.point == Counter(exp=1, cos=3)
+    assert found.material == Counter(sqrt=1, log=3)
+    assert found.transcendental == 4
+
+
+def test_counts_each_step_of_a_loop():
+    found = count(lambda x, alpha: jax.lax.fori_loop(0, 5, lambda _, y: jnp.sqrt(jnp.log(y + alpha)), x))
+    assert (found.point, found.transcendental) == (Counter(log=5, sqrt=5), 5)
+    with pytest.raises(ValueError, match="no loop of unknown length"):
+        count(lambda x, _: jax.lax.while_loop(lambda y: y.sum() > 1, lambda y: y / 2, x))
+
+
+def test_normalized_diffusion_takes_two_exponentials_or_one():
+    law = profilefit.load("burley", "published")
+    assert count(law.scaled_profile).point == Counter(exp=2)
+    assert count(BurleySampler(law).scaled_sample).point == Counter(cbrt=1, log=1, sqrt=1)
+    exact, xie = with_samplers("normalized diffusion", law)
+    assert count(exact.profile).point == Counter(exp=1)
+    assert count(exact.sample).point == Counter(exp=1, log=2, sqrt=1)
+    assert count(xie.sample).point == Counter(log=1)
+
+
+def test_hazard_takes_what_its_docstring_says():
+    one, two = with_samplers("hazard", profilefit.load("hazard"))
+    assert count(one.profile).point == Counter(exp=1, log=1)
+    assert count(one.sample).point == Counter(log=3)
+    assert count(two.sample).point == Counter(log=5)
+
+
+def test_described():
+    assert described(Counter(log=2, exp=1)) == "exp, 2 log"
+    assert described(Counter()) == "–"
+
+
 def test_costly_samplers_are_not_timed():
-    (beam,) = contenders.with_samplers("beam", profilefit.load("beam_diffusion", "published"))
+    (beam,) = with_samplers("beam", profilefit.load("beam_diffusion", "published"))
     counted = laws.counts(beam)
     assert counted["profile"].transcendental > laws.MANY
     works = laws.works(beam, counted, SMALL)
@@ -28,8 +134,8 @@ def test_time_is_over_the_yardsticks_in_each_turn():
 
 @pytest.mark.slow
 def test_rows_become_points():
-    specs = [one for one in contenders.SPECS if one.label in (contenders.YARDSTICK, "Liang, corrected")]
-    found, _ = contenders.contenders(specs=specs)
+    specs = [one for one in laws.SPECS if one.label in (YARDSTICK, "Liang, corrected")]
+    found, _ = laws.contenders(specs=specs)
     rows = laws.measured(found, SMALL)
     profile, both = (laws.points_of(rows, part) for part in laws.TITLES)
     assert [point.method for point in profile] == [one.name for one in found if not one.another]

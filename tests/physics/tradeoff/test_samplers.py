@@ -7,7 +7,7 @@ import profilefit
 from mcml_sim import Setting
 from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
 from profilefit.studies.tradeoff import samplers
-from profilefit.studies.tradeoff.contenders import YARDSTICK, with_samplers
+from profilefit.studies.tradeoff.laws import YARDSTICK, with_samplers
 
 ALPHA, EDGE = 0.8, 1.0
 SMALL = samplers.SamplerSizes((ALPHA,), (EDGE,), 40)

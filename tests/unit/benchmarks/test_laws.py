@@ -7,7 +7,7 @@ import pytest
 
 import profilefit
 from benchmarks import laws
-from profilefit.studies.tradeoff import contenders
+from profilefit.studies.tradeoff import laws as study
 from profilefit.studies.tradeoff.laws import PARTS, ContenderResult, LawSizes, counts
 from profilefit.studies.tradeoff.stopwatch import Ratio
 
@@ -15,7 +15,7 @@ SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 
 
 def test_many_functions_are_summed():
-    (dipole,) = contenders.with_samplers("dipole", profilefit.load("dipole", "published"))
+    (dipole,) = study.with_samplers("dipole", profilefit.load("dipole", "published"))
     ratios = {part: Ratio(2.0, 1.0, 3.0) for part in PARTS}
     row = ContenderResult(dipole, counts(dipole), {}, ratios, None, np.array([0.1]), np.array([0.2]))
     assert laws.as_cells(row)[1:4] == ("0", "2 exp, 2 sqrt", "162 in all")
@@ -24,9 +24,9 @@ def test_many_functions_are_summed():
 
 @pytest.mark.slow
 def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
-    wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
-    absent = contenders.Wanted("absent", "gaussians", "no-such-set")
-    monkeypatch.setattr(contenders, "SPECS", (*(w for w in contenders.SPECS if w[0] in wanted), absent))
+    wanted = {study.YARDSTICK, "Liang, corrected", "hazard"}
+    absent = study.LawSpec("absent", "gaussians", "no-such-set")
+    monkeypatch.setattr(study, "SPECS", (*(w for w in study.SPECS if w[0] in wanted), absent))
     monkeypatch.setattr(laws, "QUICK", SMALL)
     numbers = tmp_path / "numbers.json"
     laws.main(["--quick", "--json", str(numbers)])
@@ -35,8 +35,8 @@ def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     assert "11 + 7" in printed
     assert "left out: absent: constants must be" in printed
     content = json.loads(numbers.read_text())
-    assert set(content) == wanted | {f"{contenders.YARDSTICK}, Xie's sampler", "hazard, two steps"}
-    assert content[contenders.YARDSTICK]["time_ratio"]["both"] == [1.0, 1.0, 1.0]
+    assert set(content) == wanted | {f"{study.YARDSTICK}, Xie's sampler", "hazard, two steps"}
+    assert content[study.YARDSTICK]["time_ratio"]["both"] == [1.0, 1.0, 1.0]
     hazard = content["hazard"]
     assert hazard["constants"] == 14
     assert hazard["functions"]["both"] == {"exp": 1, "log": 4}

@@ -1,12 +1,18 @@
-"""A command as a user gives it, and the OpenGL that some need."""
+"""A command as a user gives it, what it refuses in one line, and the OpenGL that some need."""
 
+import os
 import sys
+from functools import partial
 
 import pytest
 
-from profilefit.cli import main
+import mcml_sim.cli.app
+import profilefit.cli
 from profilefit.errors import ShaderError
 from profilefit.shader.context import open_context
+from tests.fixtures import EXAMPLES
+
+MAINS = {"profilefit": profilefit.cli.main, "mcml-sim": mcml_sim.cli.app.main}
 
 
 @pytest.fixture(scope="module")
@@ -19,15 +25,48 @@ def opengl():
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    """Run `profilefit WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
+def program(monkeypatch, capsys, tmp_path):
+    """Run `PROGRAM WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["profilefit", *words])
+    def run(name: str, *words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", [name, *map(str, words)])
         with pytest.raises(SystemExit) as stop:
-            main()
-        printed = capsys.readouterr()
-        return int(stop.value.code or 0), printed.out, printed.err
+            MAINS[name]()
+        return int(stop.value.code or 0), *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def command(program):
+    return partial(program, "profilefit")
+
+
+@pytest.fixture
+def done(command):
+    """Run WORDS, which must end with status 0 and nothing on stderr; what is printed."""
+
+    def run(*words: object) -> str:
+        status, out, err = command(*words)
+        assert (status, err) == (0, "")
+        return out
+
+    return run
+
+
+@pytest.fixture
+def refused(command):
+    """Run WORDS, between spaces; they must be refused in one line that has `said` in it, which is returned.
+
+    A word that is the name of an example is that file, unless there is one here.
+    """
+
+    def run(words: str | tuple[str, ...], said: str) -> str:
+        words = words.split(" ") if isinstance(words, str) else words
+        status, out, err = command(*(word if os.path.lexists(word) else EXAMPLES.get(word, word) for word in words))
+        assert (status, out, err.count("\n")) == (2, "", 1), err
+        assert said in err
+        return err
 
     return run

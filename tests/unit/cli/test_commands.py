@@ -1,7 +1,6 @@
 """The command line as a user meets it: what it writes, what it refuses, and in how many lines."""
 
 import json
-import os
 import shutil
 import signal
 import subprocess
@@ -45,38 +44,23 @@ def small(recipe: Path, out: str = "out", *more: str) -> tuple[str, ...]:
     return ("regenerate", str(recipe), "--out", out, "--photons", "20000", *more)
 
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
-
-
 @pytest.mark.parametrize(
     "words",
     [
-        ("fit", EXAMPLES / "phantom.csv", "--out", "out"),
-        ("fit", "petzold", "--kind", "phase", "--out", "out"),
-        ("photo", "--simulate", EXAMPLES / "photo.toml", "--out", "out"),
-        ("report", "hazard", "--html", "page.html"),
-        ("report", "hazard", "--figures", "out"),
-        ("regenerate", "burley-whole", "--out", "out"),
-        ("check", "hazard", "--out", "out"),
-        ("stability", "liang", "--out", "out"),
-        ("tradeoff", "laws", "--out", "out"),
-        ("scene", EXAMPLES / "sea.toml", "--out", "out"),
+        *("fit phantom.csv --out out", "fit petzold --kind phase --out out", "photo --simulate photo.toml --out out"),
+        *("report hazard --html page.html", "report hazard --figures out", "regenerate burley-whole --out out"),
+        *("check hazard --out out", "stability liang --out out", "tradeoff laws --out out", "scene sea.toml --out out"),
     ],
-    ids=lambda words: " ".join(map(str, words[:2])).replace(str(EXAMPLES), ""),
 )
-def test_a_full_disk_is_met_before_the_work(command, monkeypatch, tmp_path, words):
+def test_a_full_disk_is_met_before_the_work(refused, monkeypatch, tmp_path, words):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=10**12, free=10**6))
-    status, out, err = command(*map(str, words))
-    assert (status, out) == (2, "")
-    assert "No space left on device: 1.0 MB are free, " in err
-    assert err.count("\n") == 1
+    refused(words, "No space left on device: 1.0 MB are free, ")
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 @pytest.mark.slow
-def test_regenerate_writes_a_record_that_loads(command, recipe):
-    status, out, err = command(*small(recipe, "out", "--json", "--quiet"))
-    assert (status, err) == (0, "")
+def test_regenerate_writes_a_record_that_loads(done, recipe):
+    out = done(*small(recipe, "out", "--json", "--quiet"))
     content = json.loads(Path("out/small.json").read_text())
     assert content["truth"]["photons"] == 20000
     assert content["fit"]["result"] == "converged"
@@ -95,14 +79,15 @@ def test_regenerate_writes_a_record_that_loads(command, recipe):
 def test_a_surface_that_refracts_gets_its_own_record(command, tmp_path):
     """A recipe's table [setting] says which; the record is found by the name that goes with it."""
     path = tmp_path / "albedo-rational-n1.45.toml"
-    changes = {'"liang"': '"rational"', "count = 9": "count = 5", '"albedo"\n': '"reflectance"\n'}
     text = (
         RECIPE.replace('pipeline = "albedo"\n', 'pipeline = "albedo"\nrandom_starts = 3\n') + "\n[setting]\nn = 1.45\n"
     )
-    for old, new in changes.items():
-        text = (
-            text.replace(old, new) if old != '"albedo"\n' else text.replace(f"objective = {old}", f"objective = {new}")
-        )
+    for old, new in (
+        ('"liang"', '"rational"'),
+        ("count = 9", "count = 5"),
+        ('tive = "albedo"', 'tive = "reflectance"'),
+    ):
+        text = text.replace(old, new)
     path.write_text(text)
     status, _, err = command("regenerate", str(path), "--out", "out", "--photons", "20000")
     assert status == 0, err
@@ -189,164 +174,76 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
     ("change", "said"),
     [
         ('law = "liang"|law = "lang"', "law must be one of liang, rational, van_de_hulst, chiang, got 'lang'"),
-        ("low = 0.1|low = 1.1", "[albedos] low must be a number > 0 and <= 1, got 1.1"),
-        ("count = 9|count = 1", "[albedos] count must be a whole number in 3 ... 1000, got 1"),
         ("count = 9|cuont = 9", "[albedos] keys must be of low, high, count, spacing, got 'cuont'"),
         ("[weighting]|[weighting", "is not TOML"),
-        (
-            'objective = "albedo"|objective = "energy"',
-            "must be one of albedo, reflectance, relative_reflectance, got",
-        ),
-        (
-            'truth = "orders"|truth = "orders"\nmfp = [0.0]',
-            "mfp must be a list of lengths from 0.001 to 1000, got [0.0]",
-        ),
+        ('objective = "albedo"|objective = "energy"', "must be one of albedo, reflectance, relative_reflectance, got"),
         ('truth = "orders"|truth = "orders"\nstart = "old"', "start must be one of published, got 'old'"),
-        ('truth = "orders"|truth = "orders"\nheld = ["z"]', "held must name constants of liang, got z"),
     ],
 )
-def test_a_bad_recipe_is_one_line_and_writes_nothing(command, recipe, change, said):
-    old, new = change.split("|")
-    recipe.write_text(RECIPE.replace(old, new))
-    status, out, err = command(*small(recipe))
-    assert status == 2
-    assert said in err
-    assert err.count("\n") == 1
-    assert str(recipe) in err
-    assert out == ""
+def test_a_bad_recipe_is_one_line_and_writes_nothing(refused, recipe, change, said):
+    recipe.write_text(RECIPE.replace(*change.split("|")))
+    assert str(recipe) in refused(small(recipe), said)
     assert not list(Path("out").glob("**/*.*")) if Path("out").exists() else True
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("regenerate", "no-such-recipe"), "recipe must be one of albedo-liang,"),
-        (("regenerate", "missing.toml"), "missing.toml: there is no such recipe"),
-        (("regenerate", "albedo-liang", "--photons", "0"), "photons must be a whole number >= 1"),
-        (("regenerate", "albedo-liang", "--photons", "-5"), "photons must be a whole number >= 1"),
-        (("regenerate", "albedo-rational", "--photons", "0"), "photons must be a whole number >= 1, got 0"),
-        (("regenerate", "albedo-liang", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
-        (("regenerate", "albedo-rational", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
-        (("regenerate", "missing.toml", "--seed", str(2**32)), "seed must be a whole number in [0, 4294967295], got"),
-        (("report", "no-such-record"), "there is no record 'no-such-record' in "),
-        (("report", "--fits", "empty"), "must be a folder of records, got 'empty', which is none"),
+        ("regenerate no-such-recipe", "recipe must be one of albedo-liang,"),
+        ("regenerate missing.toml", "missing.toml: there is no such recipe"),
+        ("regenerate albedo-liang --photons 0", "photons must be a whole number >= 1"),
+        ("regenerate albedo-liang --photons -5", "photons must be a whole number >= 1"),
+        ("regenerate albedo-rational --photons 0", "photons must be a whole number >= 1, got 0"),
+        ("regenerate albedo-liang --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
+        ("regenerate albedo-rational --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
+        ("regenerate missing.toml --seed 4294967296", "seed must be a whole number in [0, 4294967295], got"),
+        ("report no-such-record", "there is no record 'no-such-record' in "),
+        ("report --fits empty", "must be a folder of records, got 'empty', which is none"),
     ],
 )
-def test_bad_words_are_one_line(command, words, said):
-    status, _, err = command(*words)
-    assert status == 2
-    assert said in err
-    assert err.count("\n") == 1
+def test_bad_words_are_one_line(refused, words, said):
+    refused(words, said)
     assert not list(Path().iterdir()), "refused before anything is made"
 
 
-def test_two_recipes_of_one_name_are_refused(command, recipe):
+def test_two_recipes_of_one_name_are_refused(refused, recipe):
     other = Path("other/small.toml")
     other.parent.mkdir()
     other.write_text(RECIPE)
-    status, _, err = command("regenerate", str(recipe), str(other), "--out", "out", "--photons", "20000")
-    assert status == 2
-    assert f"recipes must have different names, as their records do, got {recipe} and {other}" in err
-    assert err.count("\n") == 1
+    refused(
+        f"regenerate {recipe} {other} --out out --photons 20000",
+        f"recipes must have different names, as their records do, got {recipe} and {other}",
+    )
     assert not Path("out").exists()
 
 
-def test_a_damaged_record_is_one_line(command):
+def test_a_damaged_record_is_one_line(refused):
     Path("fits").mkdir()
     content = json.loads((catalogue.fits_folder() / "liang-whole.json").read_text())
     del content["fit"]
     Path("fits/liang-whole.json").write_text(json.dumps(content))
-    status, out, err = command("report", "liang-whole")
-    assert status == 2
-    assert "fits/liang-whole.json: is damaged: fit must be a table, got nothing; regenerate it" in err
-    assert err.count("\n") == 1
-    assert out == ""
-
-
-def test_an_output_that_is_a_file_is_named(command, recipe):
-    Path("out").write_text("in the way")
-    status, _, err = command(*small(recipe))
-    assert status == 2
-    assert "cannot write into out" in err
-    assert Path("out").read_text() == "in the way"
+    refused("report liang-whole", "fits/liang-whole.json: is damaged: fit must be a table, got nothing; regenerate it")
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix" or not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is full")
-def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeypatch):
-    assert command(*small(recipe))[0] == 0
-    before = {path: path.read_bytes() for path in Path("out").glob("small.*")}
-    recipe.write_text(RECIPE.replace("count = 9", "count = 10"))  # another record, if it were written
-    real = os.fsync
-
-    def full(handle):  # what the kernel answers on a disk that filled up meanwhile
-        with open("/dev/full", "w") as disk:
-            disk.write("x")
-            disk.flush()
-        real(handle)
-
-    monkeypatch.setattr(os, "fsync", full)
-    status, _, err = command(*small(recipe))
-    assert status == 2
-    assert "No space left on device" in err
-    assert {path: path.read_bytes() for path in before} == before
-    assert not list(Path("out").glob(".small*"))
-    monkeypatch.setattr(os, "fsync", real)
-    assert command(*small(recipe))[0] == 0
-    assert all(path.read_bytes() != old for path, old in before.items()), "else this test could not fail"
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("default::mcml_sim.DamagedBatch")  # pytest would raise it; a user is shown it
-def test_a_damaged_batch_is_named_and_traced_again(command, recipe):
-    assert command(*small(recipe))[0] == 0
-    batch = next(Path("out/.photons").glob("*/batch-*"))
-    whole = batch.read_bytes()
-    batch.write_bytes(whole[:100])
-    status, _, err = command(*small(recipe))
-    assert status == 0, err
-    assert f"{batch} is damaged" in err
-    assert "just that batch is traced again" in err
-    assert batch.read_bytes() == whole
-
-
-@pytest.mark.slow
-def test_the_photons_of_another_run_are_refused(command, recipe):
-    assert command(*small(recipe))[0] == 0
-    manifest = next(Path("out/.photons").glob("*/run.json"))
-    manifest.write_text(manifest.read_text().replace('"max_order": 8192', '"max_order": 4096'))
-    status, _, err = command(*small(recipe))
-    assert status == 2
-    assert "max_order is 4096 there, 8192 here" in err
-    assert err.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_report_shows_shipped_records_and_draws_figures(command):
-    status, out, err = command("report", "albedo-liang", "--figures", "figures", "--quiet")
-    assert (status, err) == (0, "")
+def test_report_shows_shipped_records_and_draws_figures(done):
+    out = done("report", "albedo-liang", "--figures", "figures", "--quiet")
     assert "(8)" in out
     assert list(Path("figures").glob("*.png"))
 
 
-def test_help_names_both_commands_and_version_is_a_number(command):
-    status, out, _ = command("--help")
-    assert status == 0
-    assert "regenerate" in out
-    assert "report" in out
+def test_version_is_a_number(command):
     status, out, _ = command("--version")
     assert status == 0
     assert out.startswith("profilefit 0.")
 
 
-def test_shipped_records_are_written_over_only_where_they_are_named(command, monkeypatch):
+def test_shipped_records_are_written_over_only_where_they_are_named(refused, monkeypatch):
     """Where ./fits is what is shipped, as in a clone; the last error comes from behind that check."""
     monkeypatch.chdir(fits_folder().parent)
-    status, _, err = command("regenerate", "albedo-liang")
-    assert (status, "--out must be given where ./fits holds the shipped records" in err) == (2, True)
+    refused("regenerate albedo-liang", "--out must be given where ./fits holds the shipped records")
     monkeypatch.setattr("mcml_sim.files.whole_file.require_folder", _reached)
-    status, _, err = command("regenerate", "albedo-liang", "--out", "fits")
-    assert (status, "the folder is next" in err) == (2, True)
+    refused("regenerate albedo-liang --out fits", "the folder is next")
 
 
 def _reached(*_, **__):

@@ -1,27 +1,17 @@
 """`profilefit convert` as a user meets it: what it prints, what it refuses, and in how many lines."""
 
 import json
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
 
-from profilefit.cli import main
 from profilefit.convert import BY_NAME, ENGINES, Optical, alpha_of
 
 
 @pytest.fixture
-def command(monkeypatch, capsys):
-    """Run `profilefit convert WORDS`; the exit status and what it printed on stdout and stderr."""
-
-    def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["profilefit", "convert", *words])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        printed = capsys.readouterr()
-        return int(stop.value.code or 0), printed.out, printed.err
-
-    return run
+def command(command):
+    return partial(command, "convert")
 
 
 @pytest.fixture
@@ -36,11 +26,9 @@ def table(command):
     return run
 
 
-def test_tables_of_the_medium_and_of_what_to_type(command):
+def test_tables_of_the_medium_and_of_what_to_type(done):
     words = ("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
-    status, out, err = command(*words)
-    assert status == 0, err
-    assert err == ""
+    out = done(*words)
     lines = out.splitlines()
     assert max(map(len, lines)) <= 120
     assert "…" not in out
@@ -92,7 +80,7 @@ def test_json_has_every_convention_and_null_for_none(table):
     assert typed["arnold"]["colour"] is None
 
 
-def test_a_colour_of_a_surface_that_refracts_and_the_matched_one(table, command):
+def test_a_colour_of_a_surface_that_refracts_and_the_matched_one(table, command, refused):
     words = ("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
     printed = table(*words, "--n", "1.4")
     assert printed["alpha"] == pytest.approx(alpha_of([0.8], "diffuse", 1.4), rel=1e-12)
@@ -108,12 +96,10 @@ def test_a_colour_of_a_surface_that_refracts_and_the_matched_one(table, command)
     assert "exact, n = 1.4" in out
     assert out.count("  index-matched") == 2
     for n, why in (("0.9", "n >= 1"), ("nan", "n must be a refractive index"), ("1.4", "must be in [0, 0.923")):
-        status, out, err = command("--reflectance", "0.99", *words[2:], "--n", n)
-        assert (status, out, len(err.splitlines())) == (2, "", 1)
-        assert why in err
+        refused(("--reflectance", "0.99", *words[2:], "--n", n), why)
 
 
-def test_g_leaves_what_is_reduced_and_changes_the_rest(table, command):
+def test_g_leaves_what_is_reduced_and_changes_the_rest(table, command, refused):
     words = ("--alpha", "0.9", "--mfp", "1mm")
     isotropic, printed = table(*words), table(*words, "--g", "0.8")
     for name in ("alpha", "mfp", "mu_a", "mu_s", "dmfp", "falloff_diffuse", "reflectance_diffuse", "hdrp_distance"):
@@ -125,9 +111,7 @@ def test_g_leaves_what_is_reduced_and_changes_the_rest(table, command):
     assert "exact, n = 1.4, g = 0.8" in command(*words, "--g", "0.8", "--n", "1.4")[1]
     assert "no such g" in command(*words, "--g", "0.95")[1]
     for g, n, why in (("1", "1", "--g must be a mean cosine in (-1, 1), got 1"), (".8", "2", "n from 1.33 to 1.45")):
-        status, out, err = command(*words, "--g", g, "--n", n)
-        assert (status, out, len(err.splitlines())) == (2, "", 1)
-        assert why in err
+        refused((*words, "--g", g, "--n", n), why)
 
 
 @pytest.mark.parametrize("name", list(BY_NAME))
@@ -139,13 +123,8 @@ def test_every_length_is_an_option(table, name):
     found = table("--alpha", "0.5,0.9", f"--{option}", "0.3um", *more)
     assert found[name] == pytest.approx([0.3, 0.3], rel=1e-12)
     np.testing.assert_allclose(found["mfp"], Optical.from_length(name, 0.3, [0.5, 0.9]).mfp, rtol=1e-14)
-
-
-def test_there_and_back_through_an_engine(table):
-    first = table("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
-    again = table("--alpha", repr(first["alpha"][0]), "--unreal-mfp", f"{first['unreal_mfp'][0]!r}mm")
-    for name in {*BY_NAME, "alpha", "mu_a", "mu_s"}:
-        assert again[name] == pytest.approx(first[name], rel=1e-12)
+    if light == "searchlight":  # unless said
+        assert table("--alpha", "0.5,0.9", "--falloff", "0.3um") == found
 
 
 def test_coefficients_are_a_colour_and_a_length(table):
@@ -155,15 +134,9 @@ def test_coefficients_are_a_colour_and_a_length(table):
     assert found["mfp"][0] == pytest.approx(1 / 0.772, rel=1e-14)
 
 
-def test_a_falloff_is_a_pencil_beam_s_unless_said(table):
-    assert table("--alpha", ".95", "--falloff", "0.3")["falloff_searchlight"] == pytest.approx([0.3], rel=1e-12)
-
-
 def test_the_light_of_a_colour_matters(table):
-    found = [
-        table("--reflectance", "0.5", "--illumination", light, "--mfp", "1")["alpha"][0]
-        for light in ("searchlight", "diffuse")
-    ]
+    words = ("--reflectance", "0.5", "--mfp", "1", "--illumination")
+    found = [table(*words, light)["alpha"][0] for light in ("searchlight", "diffuse")]
     np.testing.assert_allclose(found, [alpha_of(0.5, "searchlight"), alpha_of(0.5, "diffuse")], rtol=1e-14)
     assert found[0] - found[1] > 0.02
 
@@ -204,9 +177,5 @@ def test_the_light_of_a_colour_matters(table):
         ("--mu-a 0 --mu-s 0", "mu_a + mu_s must be > 0"),
     ],
 )
-def test_bad_words_are_one_line(command, words, said):
-    status, out, err = command(*words.split())
-    assert status == 2
-    assert said in err
-    assert err.count("\n") == 1
-    assert out == ""
+def test_bad_words_are_one_line(refused, words, said):
+    refused(words, said)

@@ -16,9 +16,8 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
 from profilefit.shader import opened
-from tests.fixtures import slow
+from tests.fixtures import EXAMPLES, slow
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
 NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",), "fur": ()}
 OWN = {
@@ -46,10 +45,9 @@ def small(tmp_path):
 
 
 @pytest.mark.parametrize("name", [*slow("heart"), *(one for one in SCENES if one != "heart")])
-def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
-    status, out, err = command("scene", name, "--example")
-    assert (status, err) == (0, "")
-    assert out == (EXAMPLES / SCENES[name][1]).read_text(encoding="utf-8")
+def test_the_example_says_what_is_taken_without_it(done, tmp_path, name):
+    out = done("scene", name, "--example")
+    assert out == Path(EXAMPLES[SCENES[name][1]]).read_text(encoding="utf-8")
     home = import_module(SCENES[name][0])
     path = tmp_path / "printed.toml"
     path.write_text(out, encoding="utf-8")
@@ -82,19 +80,12 @@ def test_the_truth_is_of_the_index_that_the_law_is_of(opengl, n):
 
 
 @pytest.mark.slow
-def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
+def test_a_scene_is_drawn_beside_its_truth(done, small, opengl):
     """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
-    status, out, err = command("scene", str(small), "--out", "drawn", "--json", "--quiet")
-    assert (status, err) == (0, "")
-    told = json.loads(out)
+    told = json.loads(done("scene", str(small), "--out", "drawn", "--json", "--quiet"))
     assert json.loads(Path("drawn/small.json").read_text(encoding="utf-8")) == told
-    assert sorted(path.name for path in Path("drawn").iterdir()) == [
-        "small-chart.png",
-        "small-error.png",
-        "small-truth.png",
-        "small.json",
-        "small.png",
-    ]
+    ends = ("-chart.png", "-error.png", "-truth.png", ".json", ".png")
+    assert sorted(path.name for path in Path("drawn").iterdir()) == [f"small{end}" for end in ends]
     picture, truth = (image.imread(io.BytesIO(Path(f"drawn/small{end}.png").read_bytes())) for end in ("", "-truth"))
     assert picture.shape[:2] == truth.shape[:2] == (24, 32)
     assert 0.001 < np.abs(picture - truth)[..., :3].mean() < 0.1  # noise of four samples
@@ -106,52 +97,40 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
     assert 0 < told["truth_error"]["half"] < told["truth_error"]["rms"] < 0.2
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
-        ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
-        (
-            "samples",
-            "sample",
-            "[technique] keys must be of samples, chart, kind, law, constants, illumination, tolerance,",
-        ),
-        ("samples = 4", "samples = 300", "[technique] samples must be a whole number in 1 ... 256, got 300"),
-        ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
-        (
-            "samples = 4",
-            'law = "beam_diffusion"\nillumination = "searchlight"',
-            "[technique] law must have a closed form to become a shader",
-        ),
-        ("samples = 4", 'kind = "none"\nlaw = "liang"', "[technique] law must be left out where kind is none, got"),
-        (
-            "samples = 4",
-            'law = "burley"\nconstants = "published:diffuse"',
-            "[technique] the published:diffuse constants of burley belong to diffuse, n = 1, g = 0, got a request for "
-            "diffuse, n = 1.4, g = 0: write n = 1 at the top of the file, or name another law",
-        ),
-        (
-            "[technique]",
-            "[material.red]\nmfp = 1\n[technique]",
-            "[material.red] reflectance must be a number > 0, or two",
-        ),
-        ("[64]", "[0]", "[technique] chart must be at most 8 numbers of samples in 1 ... 256, got [0]"),
-        ("[32, 24]", "[1000, 1000]", "[camera] resolution must be 65536 pixels at most, which the truth sums over"),
-        ("[32, 24]", "[32, 0]", "[camera] resolution must be two whole numbers of pixels in 1 ... 1024, got [32, 0]"),
-        ("[32, 24]", "[9, 9]\ndistance = 10", "[camera] distance must be a number in 300 ... 10000, got 10"),
-        ("[32, 24]", "[9, 9]\ntarget = [nan, 0, 0]", "[camera] target must be three numbers in -150 ... 150, got"),
-        ("[camera]", "[light]\ndirection = [0, 0, 0]\n[camera]", "[light] direction must be a direction, not 0, got"),
-    ],
-)
-def test_a_mistake_is_one_line_that_names_file_and_key(command, small, old, new, said):
-    assert old in SMALL
-    small.write_text(SMALL.replace(old, new, 1), encoding="utf-8")
-    status, out, err = command("scene", str(small), "--out", "drawn")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"profilefit: {small}: {said}")
-    assert not Path("drawn").exists()
-
-
+SKIN_MISTAKES = [
+    ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
+    ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
+    (
+        "samples",
+        "sample",
+        "[technique] keys must be of samples, chart, kind, law, constants, illumination, tolerance,",
+    ),
+    ("samples = 4", "samples = 300", "[technique] samples must be a whole number in 1 ... 256, got 300"),
+    ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
+    (
+        "samples = 4",
+        'law = "beam_diffusion"\nillumination = "searchlight"',
+        "[technique] law must have a closed form to become a shader",
+    ),
+    ("samples = 4", 'kind = "none"\nlaw = "liang"', "[technique] law must be left out where kind is none, got"),
+    (
+        "samples = 4",
+        'law = "burley"\nconstants = "published:diffuse"',
+        "[technique] the published:diffuse constants of burley belong to diffuse, n = 1, g = 0, got a request for "
+        "diffuse, n = 1.4, g = 0: write n = 1 at the top of the file, or name another law",
+    ),
+    (
+        "",
+        "[material.red]\nmfp = 1\n",
+        "[material.red] reflectance must be a number > 0, or two",
+    ),
+    ("[64]", "[0]", "[technique] chart must be at most 8 numbers of samples in 1 ... 256, got [0]"),
+    ("[32, 24]", "[1000, 1000]", "[camera] resolution must be 65536 pixels at most, which the truth sums over"),
+    ("[32, 24]", "[32, 0]", "[camera] resolution must be two whole numbers of pixels in 1 ... 1024, got [32, 0]"),
+    ("[32, 24]", "[9, 9]\ndistance = 10", "[camera] distance must be a number in 300 ... 10000, got 10"),
+    ("[32, 24]", "[9, 9]\ntarget = [nan, 0, 0]", "[camera] target must be three numbers in -150 ... 150, got"),
+    ("", "[light]\ndirection = [0, 0, 0]\n", "[light] direction must be a direction, not 0, got"),
+]
 SEA = """\
 scene = "sea"
 [water]
@@ -160,66 +139,40 @@ b = [0.1, 0.1, 0.1]
 source = "assumed"
 phase = [[0.9, 0.95], [0.1, 0.3]]
 """
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (
-            "[0.3, 0.1, 0.08]",
-            "[-0.3, 0.1, 0.08]",
-            "[water] a must be three numbers in 0 ... 100 [1/m], got [-0.3, 0.1, 0.08]",
-        ),
-        (
-            "[0.3, 0.1, 0.08]",
-            "[0.3, nan, 0.08]",
-            "[water] a must be three numbers in 0 ... 100 [1/m], got [0.3, nan, 0.08]",
-        ),
-        ('source = "assumed"\n', "", "[water] source must be a text that says where a and b are from, got nothing"),
-        ("[0.1, 0.3]]", "[0.2, 0.3]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
-        ("[0.1, 0.3]]", "[0.1, 1.0]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
-        (
-            "[[0.9, 0.95], [0.1, 0.3]]",
-            '"fog"',
-            "[water] the record of a phase function must be one of petzold, or a .json, got 'fog'",
-        ),
-        ("[water]", "[floor]\ndepth = 0.1\n[water]", "floor must be below the sea's lowest trough, "),
-        ("[water]", "[sea]\nwind = [0, 0]\n[water]", "[sea] wind must be two speeds in -100 ... 100 [m/s], not both 0"),
-        ("[water]", "[sea]\nseed = 0.5\n[water]", "[sea] seed must be a whole number in 0 ... 2147483648, got 0.5"),
-        (
-            "[water]",
-            "[camera]\nangle = 60\n[water]",
-            "[camera] angle must be the picture's height as an angle in 0 ...",
-        ),
-        ("[water]", "[camera]\neye = [0, 0, 1]\n[water]", "[camera] eye must be in the water, with z in "),
-        ("[water]", "[camera]\ntarget = [6, 2.5, 0]\n[water]", "[camera] target must be a point that is not straight"),
-        ("[water]", "[light]\ndirection = [1, 0, 1]\n[water]", "[light] direction must be toward the sun, [x <= 0,"),
-        (
-            "[water]",
-            "[technique]\nslices = 33\n[water]",
-            "[technique] slices must be a whole number in 2 ... 32, got 33",
-        ),
-        (
-            "[water]",
-            "[technique]\nslices = 32\ntexels = 1024\n[water]",
-            "[technique] slices must be so many that texels times slices is 16384 at most, got 32",
-        ),
-        (
-            "[water]",
-            "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n[water]",
-            "[light] irradiance and ambient must not both be 0: nothing would be seen",
-        ),
-    ],
-)
-def test_a_mistake_in_a_sea_is_one_line(command, small, old, new, said):
-    assert old in SEA
-    small.write_text(SEA.replace(old, new, 1), encoding="utf-8")
-    status, out, err = command("scene", str(small), "--out", "drawn")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"profilefit: {small}: {said}")
-    assert not Path("drawn").exists()
-
-
+SEA_MISTAKES = [
+    ("[0.3, 0.1, 0.08]", "[-0.3, 0.1, 0.08]", "[water] a must be three numbers in 0 ... 100 [1/m], got [-0.3,"),
+    (
+        "[0.3, 0.1, 0.08]",
+        "[0.3, nan, 0.08]",
+        "[water] a must be three numbers in 0 ... 100 [1/m], got [0.3, nan, 0.08]",
+    ),
+    ('source = "assumed"\n', "", "[water] source must be a text that says where a and b are from, got nothing"),
+    ("[0.1, 0.3]]", "[0.2, 0.3]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
+    ("[0.1, 0.3]]", "[0.1, 1.0]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
+    (
+        "[[0.9, 0.95], [0.1, 0.3]]",
+        '"fog"',
+        "[water] the record of a phase function must be one of petzold, or a .json, got 'fog'",
+    ),
+    ("", "[floor]\ndepth = 0.1\n", "floor must be below the sea's lowest trough, "),
+    ("", "[sea]\nwind = [0, 0]\n", "[sea] wind must be two speeds in -100 ... 100 [m/s], not both 0"),
+    ("", "[sea]\nseed = 0.5\n", "[sea] seed must be a whole number in 0 ... 2147483648, got 0.5"),
+    ("", "[camera]\nangle = 60\n", "[camera] angle must be the picture's height as an angle in 0 ..."),
+    ("", "[camera]\neye = [0, 0, 1]\n", "[camera] eye must be in the water, with z in "),
+    ("", "[camera]\ntarget = [6, 2.5, 0]\n", "[camera] target must be a point that is not straight"),
+    ("", "[light]\ndirection = [1, 0, 1]\n", "[light] direction must be toward the sun, [x <= 0,"),
+    ("", "[technique]\nslices = 33\n", "[technique] slices must be a whole number in 2 ... 32, got 33"),
+    (
+        "",
+        "[technique]\nslices = 32\ntexels = 1024\n",
+        "[technique] slices must be so many that texels times slices is 16384 at most, got 32",
+    ),
+    (
+        "",
+        "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n",
+        "[light] irradiance and ambient must not both be 0: nothing would be seen",
+    ),
+]
 FUR = """\
 scene = "fur"
 [fur]
@@ -230,61 +183,57 @@ length = 8.0
 kind = "swept"
 samples = 8
 """
+FUR_MISTAKES = [
+    ("0.5", "0", "[fur] density must be a number > 0"),
+    ("0.5", "5.8", "[fur] density must be so many strands [1/mm^2] that the ball has 65536 at most, 5.795"),
+    ("radius = 0.4", "radius = 1.5", "[fur] radius must be at most the strands' mean distance, 1 / sqrt(density)"),
+    ("radius = 0.4", "radius = 0.01", "[fur] ball must be at most 140 times the strands' radius, got 30"),
+    ("8.0", "-8.0", "[fur] length must be a number > 0 and <= 150, got -8"),
+    ("8.0", "8.0\nforce = [0, -2, 0]", "[fur] force must be three numbers in -0.9 ... 0.9, got [0, -2, 0]"),
+    ("samples = 8", "samples = 0", "[technique] samples must be a whole number in 1 ... 256, got 0"),
+    ("samples = 8", "samples = 1000000000", "[technique] samples must be a whole number in 1 ... 256, got"),
+    ("samples = 8", "exponent = 2", "[technique] exponent must be left out where kind is swept, got 2"),
+    ('"swept"', '"shells"\nstrands = 2', "[technique] strands must be left out where kind is shells, got 2"),
+    ('"swept"', '"shells"\nexponent = 0', "[technique] exponent must be a number > 0 and <= 100, or"),
+    ("samples = 8", "strands = 3", "[technique] strands must be a whole number in 1 ... 2, got 3"),
+    ("", "[shading]\nexponents = [1]\n", "[shading] exponents must be two numbers in 0 ..."),
+    (
+        "8.0",
+        "150.0\n[camera]\ntarget = [0, 0, 150]\ndistance = 300\ndirection = [0, 0, -1]",
+        "[camera] distance must be so long that the eye is ",
+    ),
+]
+MISTAKES = {SMALL: SKIN_MISTAKES, SEA: SEA_MISTAKES, FUR: FUR_MISTAKES}
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("0.5", "0", "[fur] density must be a number > 0"),
-        ("0.5", "5.8", "[fur] density must be so many strands [1/mm^2] that the ball has 65536 at most, 5.795"),
-        ("radius = 0.4", "radius = 1.5", "[fur] radius must be at most the strands' mean distance, 1 / sqrt(density)"),
-        ("radius = 0.4", "radius = 0.01", "[fur] ball must be at most 140 times the strands' radius, got 30"),
-        ("8.0", "-8.0", "[fur] length must be a number > 0 and <= 150, got -8"),
-        ("8.0", "8.0\nforce = [0, -2, 0]", "[fur] force must be three numbers in -0.9 ... 0.9, got [0, -2, 0]"),
-        ("samples = 8", "samples = 0", "[technique] samples must be a whole number in 1 ... 256, got 0"),
-        ("samples = 8", "samples = 1000000000", "[technique] samples must be a whole number in 1 ... 256, got"),
-        ("samples = 8", "exponent = 2", "[technique] exponent must be left out where kind is swept, got 2"),
-        ('"swept"', '"shells"\nstrands = 2', "[technique] strands must be left out where kind is shells, got 2"),
-        ('"swept"', '"shells"\nexponent = 0', "[technique] exponent must be a number > 0 and <= 100, or"),
-        ("samples = 8", "strands = 3", "[technique] strands must be a whole number in 1 ... 2, got 3"),
-        ("[technique]", "[shading]\nexponents = [1]\n[technique]", "[shading] exponents must be two numbers in 0 ..."),
-        (
-            "8.0",
-            "150.0\n[camera]\ntarget = [0, 0, 150]\ndistance = 300\ndirection = [0, 0, -1]",
-            "[camera] distance must be so long that the eye is ",
-        ),
-    ],
+    ("text", "old", "new", "said"), [(text, *row) for text, rows in MISTAKES.items() for row in rows]
 )
-def test_a_mistake_in_a_fur_is_one_line(command, small, old, new, said):
-    assert old in FUR
-    small.write_text(FUR.replace(old, new, 1), encoding="utf-8")
-    status, out, err = command("scene", str(small), "--out", "drawn")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"profilefit: {small}: {said}")
+def test_a_mistake_is_one_line_that_names_file_and_key(refused, small, text, old, new, said):
+    """What takes the place of `old`, or stands at the end of the file."""
+    assert old in text
+    small.write_text(text.replace(old, new, 1) if old else text + new, encoding="utf-8")
+    assert refused(f"scene {small} --out drawn", said).startswith(f"profilefit: {small}: {said}")
     assert not Path("drawn").exists()
 
 
 @pytest.mark.slow
-def test_nothing_to_see_is_one_line(command, small, opengl):
+def test_nothing_to_see_is_one_line(refused, small, opengl):
     dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
     small.write_text(SMALL + dark, encoding="utf-8")
-    status, out, err = command("scene", str(small), "--out", "drawn", "--quiet")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "the view must show something that light scatters in, and light must reach it" in err
+    refused(
+        f"scene {small} --out drawn --quiet",
+        "the view must show something that light scatters in, and light must reach it",
+    )
     assert not list(Path("drawn").iterdir())
 
 
-def test_names_and_places(command, small):
-    assert command("scene", "fog", "--example") == (
-        2,
-        "",
-        "profilefit: NAME must be one of skin, layers, heart, sea, fur with --example, got 'fog'\n",
-    )
-    assert command("scene", "nowhere.toml")[0] == 2
+def test_names_and_places(refused, small):
+    said = "NAME must be one of skin, layers, heart, sea, fur with --example, got 'fog'"
+    assert refused("scene fog --example", said) == f"profilefit: {said}\n"
+    refused("scene nowhere.toml", "nowhere.toml")
     Path("file").write_text("")
-    status, out, err = command("scene", str(small), "--out", "file")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "cannot write into file" in err
+    refused(f"scene {small} --out file", "cannot write into file")
 
 
 def test_a_file_without_a_gpu_is_one_line(small, tmp_path):

@@ -24,17 +24,15 @@ def strict(text: str):
     return json.loads(text, parse_constant=refuse)
 
 
-def test_json_of_records_is_what_they_hold(command):
-    status, out, err = command("report", "--json")
-    assert (status, err) == (0, "")
+def test_json_of_records_is_what_they_hold(command, done):
+    out = done("report", "--json")
     assert strict(out) == {"records": {name: record.read(path) for name, path in record.available(FITS).items()}}
     assert list(strict(command("report", "hazard", "--json")[1])["records"]) == ["hazard"]
 
 
 @pytest.mark.slow
-def test_json_of_quality_is_measured(command):
-    status, out, err = command("report", "albedo-rational", "albedo-liang", "--quality", "--json")
-    assert (status, err) == (0, "")
+def test_json_of_quality_is_measured(done):
+    out = done("report", "albedo-rational", "albedo-liang", "--quality", "--json")
     told = strict(out)
     (rational,) = [one for one in told["quality"]["maps"] if one["records"] == ["albedo-rational"]]
     stated = told["records"]["albedo-rational"]["quality"]["regenerated"]["delta_A"]

@@ -20,10 +20,8 @@ def toy(monkeypatch, tmp_path):
     return str(path)
 
 
-def test_it_is_drawn_by_the_command(command, opengl, toy):
-    status, out, err = command("scene", toy, "--out", "drawn", "--json", "--quiet")
-    assert (status, err) == (0, "")
-    told = json.loads(out)
+def test_it_is_drawn_by_the_command(done, opengl, toy):
+    told = json.loads(done("scene", toy, "--out", "drawn", "--json", "--quiet"))
     assert sorted(path.name for path in Path("drawn").iterdir()) == [
         *(f"toy{end}" for end in ("-chart.png", "-error.png", "-truth.png", ".json", ".png"))
     ]
@@ -39,6 +37,4 @@ def test_it_is_drawn_by_the_command(command, opengl, toy):
 
 def test_its_mistakes_are_one_line(command, toy):
     Path(toy).write_text(FILE.replace("[technique]", "k = -1\n[technique]"), encoding="utf-8")
-    status, out, err = command("scene", toy, "--out", "drawn")
-    assert (status, out) == (2, "")
-    assert err == f"profilefit: {toy}: k must be a number > 0, got -1\n"
+    assert command("scene", toy, "--out", "drawn") == (2, "", f"profilefit: {toy}: k must be a number > 0, got -1\n")

@@ -10,18 +10,12 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.studies.tradeoff.parts import is_comparable, keep, read
 
 
-def test_an_unknown_part_is_one_line(command, tmp_path):
-    status, out, err = command("tradeoff", "laws", "light")
-    assert (status, out) == (2, "")
-    assert err == "profilefit: PART must be one of truth, laws, samplers, fits, sea, fur, got 'light'\n"
+def test_what_cannot_be_done_is_told_before_anything_is_measured(refused, tmp_path):
+    said = "PART must be one of truth, laws, samplers, fits, sea, fur, got 'light'"
+    assert refused("tradeoff laws light", said) == f"profilefit: {said}\n"
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_cannot_be_is_told_before_anything_is_measured(command, tmp_path):
     (tmp_path / "file").write_text("")
-    status, _, err = command("tradeoff", "laws", "--out", "file")
-    assert status == 2
-    assert err.startswith("profilefit: cannot write into file:")
+    refused("tradeoff laws --out file", "profilefit: cannot write into file:")
 
 
 def told(date: str, sha256: str = "a", **parts: int) -> dict:

@@ -26,15 +26,14 @@ def test_what_is_written_out_is_what_there_is():
 
 
 @pytest.fixture
-def completed(command, monkeypatch):
+def completed(done, monkeypatch):
     """Words that bash is offered in place of the last of WORDS."""
 
     def run(*typed):
         monkeypatch.setenv("_PROFILEFIT_COMPLETE", "complete_bash")
         monkeypatch.setenv("COMP_WORDS", " ".join(("profilefit", *typed)))
         monkeypatch.setenv("COMP_CWORD", str(len(typed)))
-        status, out, err = command()
-        assert (status, err) == (0, "")
+        out = done()
         return set(out.split())
 
     return run

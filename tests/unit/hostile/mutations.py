@@ -50,17 +50,8 @@ TEXTS = (
     *("PF_SELECT", "x" * 10_000, "x " * 10_000, "0" * 64, "F" * 64, "0" * 63),
 )  # fmt: skip
 WORDS = (
-    "converged",
-    "failed",
-    "profile",
-    "albedo",
-    "evidence",
-    "as-published",
-    "inverse",
-    "hazard",
-    "liang",
-    "diffuse",
-)
+    *("converged", "failed", "profile", "albedo", "evidence", "as-published", "inverse", "hazard", "liang", "diffuse"),
+)  # fmt: skip
 # As they stand in a file: numbers that are large, tiny or none, and nests that are deep.
 NUMBERS = (
     *("0", "-0.0", "1", "-1", "2", "3.5", "1e-300", "5e-324", "1e16", "1e22", "1e300", "1e308", "1e400", "-1e400"),
@@ -69,51 +60,23 @@ NUMBERS = (
 DEEP = 100_000
 NESTS = ("[" * DEEP + "]" * DEEP, '{"a":' * DEEP + "1" + "}" * DEEP, "[" * DEEP, "[[]," * 2000 + "1" + "]" * 2000)
 FILE_NAMES = (
-    "\nimport os",
-    "\x1b[31mred",
-    "<img src=x onerror=alert(1)>",
-    "\\",
-    "[bold]a",
-    "*",
-    "\u202ea",
-    ".b",
-    "|",
-    "`",
-)
+    *("\nimport os", "\x1b[31mred", "<img src=x onerror=alert(1)>", "\\", "[bold]a", "*", "\u202ea", ".b", "|", "`"),
+)  # fmt: skip
 TOML_WORDS = (
     *NUMBERS, *("nan", "inf", "-inf", "true", "1_000", "0x10", "1979-05-27T07:32:00Z", "[]", "{}", "{a = 1}", "[[1]]"),
     *("[1, 2]", "[2, 1]", "[1, 2, 3]", "[0.1, true]", '["a"]', "'''a", '"', "=", "[" * DEEP, "{a=" * DEEP, "[" * 500),
 )  # fmt: skip
 TOML_LINES = (
     *("[choose]", "[[layers]]", "[layers]", "layers = 3", "choose = 3", "unknown = 1", "[", "]", "=", "a = ", '"" = 1'),
-    *(
-        f"{'a.' * DEEP}b = 1",
-        f"[{'a.' * 3000}b]",
-        f"{'k' * DEEP} = 1",
-        f"x = {'9' * 5000}",
-        "x = 1\nx = 2",
-        "\x1b[31m = 1",
-    ),
-)
+    *(f"{'a.' * DEEP}b = 1", f"[{'a.' * 3000}b]", f"{'k' * DEEP} = 1", f"x = {'9' * 5000}", "x = 1\nx = 2"),
+    "\x1b[31m = 1",
+)  # fmt: skip
 CELLS = (
     *("0", "-1", "1e400", "-1e308", "5e-324", "nan", "inf", "1_000", "", '"', '"a', '"1"', "1,5", "1.5.5", "٣", "0x10"),
-    *(
-        "\x1b[31m",
-        "a\u2028b",
-        "\0",
-        "=cmd|' /C calc'!A0",
-        "x" * DEEP,
-        "9" * 5000,
-        ",",
-        ";",
-        "\t",
-        "#",
-        '"\n"',
-        "[",
-        "[a.u.]",
-    ),
-    *("r", "value", "sigma", "value1", "value_2", "r_in", "r_out", "r [mm]", "r [furlong]", "r (mm)", "value [1/cm^2]"),
-)
+    *("\x1b[31m", "a\u2028b", "\0", "=cmd|' /C calc'!A0", "x" * DEEP, "9" * 5000, ",", ";", "\t", "#", '"\n"'),
+    *("[", "[a.u.]", "r", "value", "sigma", "value1", "value_2", "r_in", "r_out", "r [mm]", "r [furlong]", "r (mm)"),
+    "value [1/cm^2]",
+)  # fmt: skip
 CELL_LINES = (
     *("", ",", ",,", "1,2,3,4", "#", "a,b,c", "r,value,sigma", "," * 60_000, "1," * 60_000, '"' * 1001, "\0", "1 2 3"),
     ",".join(["r", *(f"value{i}" for i in range(1, 60_000))]),
@@ -337,9 +300,8 @@ def npz_mutant(rng: random.Random, arrays: Mapping[str, np.ndarray]) -> bytes:
         elif way == 4:
             del members[at]
         elif way == 5:
-            odd = rng.choice(
-                ("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999)
-            )
+            others = ("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999)
+            odd = rng.choice(others)
             members[at] = (odd, data)
         elif way == 6:
             members.insert(at, rng.choice(((name, data), (name, _npy(_odd_array(rng, array))), ("more.npy", data))))
@@ -392,17 +354,9 @@ def _odd_header(rng: random.Random, text: str) -> np.ndarray:
 def _lying(rng: random.Random, data: bytes) -> bytes:
     """A member whose header says what its bytes are not."""
     shapes = (
-        "(100000000000000,)",
-        "(10000000, 10000000)",
-        "(-1,)",
-        "(1e9,)",
-        "(True,)",
-        "()",
-        "(3",
-        "(2**40,)",
-        "None",
-        "3",
-    )
+        *("(100000000000000,)", "(10000000, 10000000)", "(-1,)", "(1e9,)", "(True,)", "()", "(3", "(2**40,)"),
+        *("None", "3"),
+    )  # fmt: skip
     told = (
         *(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}" for shape in shapes),
         *(
@@ -477,16 +431,9 @@ def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
 def records() -> dict[str, Any]:
     """Shipped records of every kind, the one of readings cut to a few."""
     names = (
-        *(
-            "albedo-rational",
-            "albedo-liang",
-            "albedo-rational-diffuse-refracting",
-            "burley-whole",
-            "gaussians-2",
-            "quantile",
-        ),
-        *("hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
-    )
+        *("albedo-rational", "albedo-liang", "albedo-rational-diffuse-refracting", "burley-whole", "gaussians-2"),
+        *("quantile", "hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
+    )  # fmt: skip
     found = {name: json.loads((ROOT / "fits" / f"{name}.json").read_text(encoding="utf-8")) for name in names}
     for key in ("readings", "table1"):
         found["reproduction"][key] = found["reproduction"][key][:12]
@@ -507,14 +454,9 @@ def _arrays(path: str) -> dict[str, np.ndarray]:
         return dict(found)
 
 
-def results(seed: int) -> bytes:
-    """An .npz of `mcml-sim run`."""
-    return npz_mutant(random.Random(seed), _arrays("examples/half_space.npz"))
-
-
-def samples(seed: int) -> bytes:
-    """An .npz beside a record."""
-    return npz_mutant(random.Random(seed), _arrays("fits/albedo-rational.npz"))
+def arrays(path: str) -> Callable[[int], bytes]:
+    """Return what mutates an .npz of the repository."""
+    return lambda seed: npz_mutant(random.Random(seed), _arrays(path))
 
 
 def table(seed: int) -> bytes:
@@ -530,24 +472,11 @@ def table(seed: int) -> bytes:
     return text_mutant(rng, text.replace(",", ";") if ";" in text else text, CELLS, CELL_LINES)
 
 
-def mco(seed: int) -> bytes:
-    """An .mco of MCML."""
-    return text_mutant(random.Random(seed), _text("examples/half_space.mco"), MCI_WORDS, MCI_LINES)
-
-
-def mci(seed: int) -> bytes:
-    """An .mci of `mcml-sim run`."""
-    return text_mutant(random.Random(seed), _text("examples/slab.mci"), MCI_WORDS, MCI_LINES)
-
-
-def mci2(seed: int) -> bytes:
-    """An .mci of MCML 2."""
-    return text_mutant(random.Random(seed), MCI_2, (*MCI_WORDS, *MCI_2_WORDS), (*MCI_LINES, *MCI_2_WORDS))
-
-
-def mco2(seed: int) -> bytes:
-    """An .mco of MCML 2."""
-    return text_mutant(random.Random(seed), MCO_2, (*MCI_WORDS, *MCI_2_WORDS), (*MCI_LINES, *MCI_2_WORDS))
+def words(text: str, *more: str) -> Callable[[int], bytes]:
+    """Return what mutates an .mci or .mco, whose text this is, or its path in the repository."""
+    return lambda seed: text_mutant(
+        random.Random(seed), text if "\n" in text else _text(text), (*MCI_WORDS, *more), (*MCI_LINES, *more)
+    )
 
 
 def facts(seed: int) -> bytes:
@@ -569,11 +498,8 @@ def phase(seed: int) -> bytes:
 
 def translucency(seed: int) -> bytes:
     """A text file of a TLS850."""
-    rows = (
-        f"{record} {pixel} {math.exp(-0.3 * pixel) * (1 + 0.01 * record):.4g}"
-        for record in range(1, 10)
-        for pixel in range(1, 33)
-    )
+    places = ((record, pixel) for record in range(1, 10) for pixel in range(1, 33))
+    rows = (f"{at} {pixel} {math.exp(-0.3 * pixel) * (1 + 0.01 * at):.4g}" for at, pixel in places)
     return text_mutant(random.Random(seed), "\n".join(["Record Pixel Value", *rows]), CELLS, CELL_LINES)
 
 
@@ -582,24 +508,9 @@ def toml(path: str) -> Callable[[int], bytes]:
     return lambda seed: toml_mutant(random.Random(seed), _text(path))
 
 
-def claims(seed: int) -> bytes:
-    """A .json that `make claims` writes."""
-    return json_mutant(random.Random(seed), _json("fits/evidence/claims.json"))
-
-
-def stack(seed: int) -> bytes:
-    """A record of a stack."""
-    return json_mutant(random.Random(seed), _json("fits/stacks/skin.json"))
-
-
-def sum_record(seed: int) -> bytes:
-    """A record of sums of Gaussians."""
-    return json_mutant(random.Random(seed), _json("fits/gaussians/skin.json"))
-
-
-def phase_record(seed: int) -> bytes:
-    """A record of a phase function."""
-    return json_mutant(random.Random(seed), _json("fits/phases/petzold.json"))
+def tree(path: str) -> Callable[[int], bytes]:
+    """Return what mutates a .json of the repository."""
+    return lambda seed: json_mutant(random.Random(seed), _json(path))
 
 
 @cache
@@ -610,9 +521,8 @@ def _json(path: str) -> Any:
 def recipe(seed: int) -> bytes:
     """A .toml of `profilefit regenerate`."""
     rng = random.Random(seed)
-    return toml_mutant(
-        rng, _text(f"fits/{rng.choice(('burley-whole', 'albedo-rational', 'liang-as-published', 'quantile'))}.toml")
-    )
+    name = rng.choice(("burley-whole", "albedo-rational", "liang-as-published", "quantile"))
+    return toml_mutant(rng, _text(f"fits/{name}.toml"))
 
 
 @cache

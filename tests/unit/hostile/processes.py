@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 IMPORTED = (
-    *("mcml_sim.cli.app", "mcml_sim.cli.printed", "mcml_sim.runs.input_runs", "profilefit.cli", "profilefit.report"),
+    *("mcml_sim.cli.app", "mcml_sim.runs.input_runs", "profilefit.cli", "profilefit.report"),
     *("profilefit.studies.choose.choice", "profilefit.studies.choose.layers", "profilefit.report.tables.choose_table"),
     *("profilefit.shader.law_file", "profilefit.measured.result", "profilefit.recipes.regenerate"),
     *("profilefit.report.tables.fit_tables", "profilefit.report.figures.fit_figures"),

@@ -1,7 +1,9 @@
 """Whatever stands in a file: it is refused in one line, or taken for data. Nothing read is run, or becomes code.
 
-A failure names the seed: `mutations.KIND(seed)` are the bytes. Slow tests read as many files of a kind as the variable
-MUTATIONS says, 2,000 if it is not set: MUTATIONS=10000 make test-all ARGS="-k mutat".
+Commands on such files, as processes, end with 0, 1 or 2, refuse in one line, and then leave nothing.
+
+A failure names kind and seed: `KINDS[kind][1](seed)` are the bytes. Slow tests read as many files of a kind as the
+variable MUTATIONS says, 2,000 if it is not set: MUTATIONS=10000 make test-all ARGS="-k mutat".
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from html.parser import HTMLParser
 from importlib import import_module
@@ -33,7 +36,7 @@ import pytest
 from mcml_sim.errors import InputError, OutputError, StoreError
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.results.mci import read_mci
-from mcml_sim.results.tally_file import read_results
+from mcml_sim.results.tally import read_results
 from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading
@@ -43,7 +46,7 @@ from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record
 from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.kinds import gaussians, phase, stack
-from profilefit.recipes.phases.data import read_phase
+from profilefit.recipes.phases import read_phase
 from profilefit.recipes.stack.file import read_layers
 from profilefit.report.page.document import write_page
 from profilefit.report.tables.claims_table import read_claims
@@ -53,7 +56,7 @@ from profilefit.scenes.skin import scene as skin
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
 from profilefit.studies.choose import requirements
-from tests.unit.hostile import mutations
+from tests.unit.hostile import mutations, processes
 
 # A record alone in its folder is normalised with the shipped map, and the command says so.
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
@@ -77,6 +80,14 @@ def own_garbage():
     gc.unfreeze()
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def elsewhere(tmp_path, monkeypatch):
+    """A folder to work in, where what a payload would make is seen."""
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    assert not list(tmp_path.rglob(f"*{mutations.CANARY}*"))
 
 
 @pytest.fixture(autouse=True)
@@ -118,13 +129,14 @@ def read_heart(path: Path) -> object:
         return heart.read(str(path), read_toml(path))
 
 
+SAMPLES = mutations.arrays("fits/albedo-rational.npz")  # beside a record
 # Kind -> the ending of its files, what mutates it, and all that reads it.
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
     "record": (".json", lambda seed: mutations.record(seed)[1], (lambda path: record.read(path, whole=True),)),
-    "stack-record": (".json", mutations.stack, (stack.read,)),
-    "sum-record": (".json", mutations.sum_record, (gaussians.load,)),
-    "phase-record": (".json", mutations.phase_record, (phase.load,)),
-    "claims": (".json", mutations.claims, (read_claims_of,)),
+    "stack-record": (".json", mutations.tree("fits/stacks/skin.json"), (stack.read,)),
+    "sum-record": (".json", mutations.tree("fits/gaussians/skin.json"), (gaussians.load,)),
+    "phase-record": (".json", mutations.tree("fits/phases/petzold.json"), (phase.load,)),
+    "claims": (".json", mutations.tree("fits/evidence/claims.json"), (read_claims_of,)),
     "scene": (".toml", mutations.toml("examples/skin.toml"), (requirements.read,)),
     "head": (".toml", mutations.toml("examples/skin-head.toml"), (lambda path: skin.read(str(path), read_toml(path)),)),
     "layers": (".toml", mutations.toml("examples/layers-head.toml"), (read_layers_of, read_scene("layers"))),
@@ -139,12 +151,12 @@ KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], objec
     "beam": (".csv", mutations.beam, (lambda path: beam_of("beam", str(path), "mm"),)),
     "phase": (".csv", mutations.phase, (read_phase,)),
     "translucency": (".txt", mutations.translucency, (lambda path: reading.read(path, None, True, "red"),)),
-    "results": (".npz", mutations.results, (read_results, read_profile)),
-    "samples": (".npz", mutations.samples, (read_samples,)),
-    "mco": (".mco", mutations.mco, (read_profile,)),
-    "mci": (".mci", mutations.mci, (read_mci,)),
-    "mco2": (".mco", mutations.mco2, (read_profile,)),
-    "mci2": (".mci", mutations.mci2, (read_mci,)),
+    "results": (".npz", mutations.arrays("examples/half_space.npz"), (read_results, read_profile)),
+    "samples": (".npz", SAMPLES, (read_samples,)),
+    "mco": (".mco", mutations.words("examples/half_space.mco"), (read_profile,)),
+    "mci": (".mci", mutations.words("examples/slab.mci"), (read_mci,)),
+    "mco2": (".mco", mutations.words(mutations.MCO_2, *mutations.MCI_2_WORDS), (read_profile,)),
+    "mci2": (".mci", mutations.words(mutations.MCI_2, *mutations.MCI_2_WORDS), (read_mci,)),
 }
 
 
@@ -257,8 +269,7 @@ def export_faults(name: str, folder: Path, faults: list[str], told: str) -> None
     for lang in LANGUAGES if named else ():
         with bounded(faults, f"{told}, {lang}"):
             text = export(named, folder, lang)
-            if CONTROL.search(text):
-                faults.append(f"{told}, {lang}: control characters {CONTROL.findall(text)[:5]}")
+            faults += [f"{told}, {lang}: control character {one!r}" for one in CONTROL.findall(text)[:1]]
             if skeleton(text, lang) != known.get(code_of(named, lang)):
                 faults.append(f"{told}, {lang}: other code than of the record unchanged")
 
@@ -268,23 +279,19 @@ MARKS = ("short", "quality", "constants", "hazard", "readings", "inversion", "ma
 
 def table_faults(name: str, folder: Path, faults: list[str], told: str) -> None:
     """Print a record's tables, and fill those of a page in Markdown."""
-    options: dict[str, Any] = {
-        **{"quality": False, "figures_to": None, "markdown": None, "html": None, "evidence": None, "fits": folder},
-        **{"as_json": False, "quiet": True},
-    }
+    options: dict[str, Any] = dict.fromkeys(("figures_to", "markdown", "html", "evidence"))
+    options |= {"quality": False, "claims": False, "fits": folder, "as_json": False, "quiet": True}
     for names in ([name], None):
         with bounded(faults, f"{told}, tables"), contextlib.redirect_stdout(io.StringIO()) as printed:
             report(names, **options)
-            if CONTROL.search(printed.getvalue()):
-                faults.append(f"{told}, tables: control characters {CONTROL.findall(printed.getvalue())[:5]}")
+            faults += [f"{told}, tables: control character {one!r}" for one in CONTROL.findall(printed.getvalue())[:1]]
     page = folder / "page.md"
     empty = "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in MARKS)
     page.write_text(empty)
     with bounded(faults, f"{told}, markdown"):
         report([name], **options | {"markdown": page})
         text = page.read_text(encoding="utf-8")
-        if CONTROL.search(text):
-            faults.append(f"{told}, markdown: control characters {CONTROL.findall(text)[:5]}")
+        faults += [f"{told}, markdown: control character {one!r}" for one in CONTROL.findall(text)[:1]]
         if found := set(re.findall(r"(?<!\\)<[A-Za-z!/][^>]*", text)) - set(re.findall("<[^>]*", empty)):
             faults.append(f"{told}, markdown: markup {found}")
         if any(len({row.count("|") for row in rows}) > 1 for rows in _markdown_tables(text)):
@@ -363,21 +370,18 @@ def page_faults(name: str, folder: Path, faults: list[str], told: str) -> bool:
         faults.append(f"{told}: {type(error).__name__}: {str(error)[:200]} at {_place(error)}")
         return False
     found = Elements(text)
-    if new := set(found.counts) - set(known.counts):
-        faults.append(f"{told}: elements {new}")
-    if more := found.active - known.active:  # fewer, where a fit that failed has no figures
-        faults.append(f"{told}: more scripts or controls {more}")
-    if found.misnested or found.open:
-        faults.append(f"{told}: elements that do not close {found.misnested} {found.open}")
-    if strange := {one for one in found.addresses - known.addresses if not one.startswith("#")}:
-        faults.append(f"{told}: addresses {strange}")
     data = [one for one in found.scripts if one.lstrip().startswith("{")]
     for one in data:
         json.loads(one, parse_constant=pytest.fail)
-    if len(data) != 1 or "<" in data[0]:
-        faults.append(f"{told}: the explorer's data must be one piece of JSON without <")
-    if CONTROL.search(text):
-        faults.append(f"{told}: control characters {CONTROL.findall(text)[:5]}")
+    wrong: dict[str, object] = {
+        "elements": set(found.counts) - set(known.counts),
+        "more scripts or controls": found.active - known.active,  # fewer, where a fit that failed has no figures
+        "elements that do not close": found.misnested + found.open,
+        "addresses": {one for one in found.addresses - known.addresses if not one.startswith("#")},
+        "the explorer's data must be one piece of JSON without <": len(data) != 1 or "<" in data[0],
+        "control characters": CONTROL.findall(text)[:5],
+    }
+    faults += [f"{told}: {what} {seen}" for what, seen in wrong.items() if seen]
     return True
 
 
@@ -405,17 +409,6 @@ def test_reading_refuses_or_takes_data(kind, elsewhere):
     faults, accepted = reading_faults(kind, range(QUICK), elsewhere)
     require_none(faults)
     assert QUICK / 40 < len(accepted) < QUICK  # neither all nor none, or nothing was tried
-
-
-@pytest.mark.slow
-def test_exports_and_tables_of_what_is_accepted(elsewhere):
-    faults: list[str] = []
-    names = [(seed, name) for seed in range(60) if (name := copied(seed, elsewhere))]
-    for seed, _ in names[:6]:
-        name = copied(seed, elsewhere)
-        export_faults(name, elsewhere, faults, f"record {seed}")
-        table_faults(name, elsewhere, faults, f"record {seed}")
-    require_none(faults)
 
 
 @pytest.mark.slow
@@ -456,7 +449,7 @@ def test_pages_of_fifty(part, elsewhere):
             continue
         shutil.copy(mutations.ROOT / "fits" / f"{name}.npz", elsewhere)
         if seed % 3 == 0 and name == "albedo-rational":
-            (elsewhere / f"{name}.npz").write_bytes(mutations.samples(seed))
+            (elsewhere / f"{name}.npz").write_bytes(SAMPLES(seed))
         made += page_faults(name, elsewhere, faults, f"record {seed}")
     require_none(faults)
 
@@ -472,3 +465,96 @@ def test_checks_see_what_they_look_for():
     plain, evil = Elements("<p>one</p>"), Elements("<p onclick='x'>one</p><script>x</script><b>")
     assert set(evil.counts) - set(plain.counts) == {("p", "onclick"), ("script",), ("b",)}
     assert evil.open == ["b"]
+
+
+# Kind -> module, arguments of the command, and how many of those that are not refused may run: some take minutes.
+AS_PROCESSES: dict[str, tuple[str, tuple[str, ...], int]] = {
+    "export": ("profilefit", ("export", "NAME", "--fits", ".", "--lang", "python", "--out", "out.txt"), 200),
+    "report": ("profilefit", ("report", "NAME", "--fits", ".", "-q"), 200),
+    "scene": ("profilefit", ("choose", "FILE", "-q"), 2),
+    "photo": ("profilefit", ("photo", "--simulate", "FILE", "--out", "mine", "-q"), 2),
+    "facts": ("profilefit", ("fit", "FILE", "--out", "mine", "-q"), 2),
+    "phase": ("profilefit", ("fit", "FILE", "--kind", "phase", "--out", "mine", "-q"), 1),
+    "recipe": ("profilefit", ("regenerate", "FILE", "--photons", "1000", "--out", "mine", "-q"), 1),
+    "table": ("profilefit", ("fit", "FILE", "--unit", "mm", "--out", "mine", "-q"), 5),
+    "results": ("profilefit", ("fit", "FILE", "--out", "mine", "-q"), 5),
+    "mci": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 5),
+    "mci2": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 2),
+}
+PROCESSES = ALL // 50
+BESIDE = 2
+ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning", "site-packages")
+
+
+def process_faults(kind: str, count: int, folder: Path) -> list[str]:
+    """Run a command on so many mutated files, each in a folder of its own, a few side by side."""
+    seeds = list(_seeds(kind, count, folder))
+    shares = [seeds[part::BESIDE] for part in range(BESIDE)]
+    with ThreadPoolExecutor(BESIDE) as pool:
+        found = pool.map(lambda part: _faults_of(kind, shares[part], folder / f"part{part}"), range(BESIDE))
+        return [fault for faults in found for fault in faults]
+
+
+def _faults_of(kind: str, seeds: Sequence[int], folder: Path) -> list[str]:
+    module, arguments, _ = AS_PROCESSES[kind]
+    ending, mutant, _ = KINDS["record" if kind in ("export", "report") else kind]
+    faults: list[str] = []
+    folder.mkdir()
+    with processes.commands(folder) as program:
+        for seed in seeds:
+            here = folder / str(seed)
+            here.mkdir()
+            name = mutations.record(seed)[0] if ending == ".json" else "one"
+            (here / f"{name}{ending}").write_bytes(mutant(seed))
+            told = [{"NAME": name, "FILE": f"{name}{ending}"}.get(word, word) for word in arguments]
+            ended = program.run(module, told, here)
+            faults += [f"{kind} {seed}: {text}" for text in _ended_wrong(ended, here, f"{name}{ending}")]
+            shutil.rmtree(here)
+    return faults
+
+
+def _seeds(kind: str, count: int, folder: Path) -> Iterator[int]:
+    """Seeds of `count` files, of which only so many are accepted when they are read."""
+    answered = AS_PROCESSES[kind][2]
+    ending, mutant, readers = KINDS["record" if kind in ("export", "report") else kind]
+    path, given = folder / f"one{ending}", 0
+    for seed in itertools.count(ALL):
+        path.write_bytes(mutant(seed))
+        refused = False
+        try:
+            for read in readers:
+                read(path)
+        except NAMED:
+            refused = True
+        if refused or answered > 0:
+            answered -= not refused
+            given += 1
+            yield seed
+        if given == count:
+            return
+
+
+def _ended_wrong(ended: processes.Ended, folder: Path, given: str) -> Iterator[str]:
+    """What is wrong with how a command ended, and with what it left."""
+    left = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()} - {given}
+    if ended.status not in (0, 1, 2):
+        yield f"status {ended.status}: {ended.stderr[-300:]!r}"
+    if ended.status == 2 and (len(ended.stderr.splitlines()) != 1 or not ended.stderr.endswith("\n")):
+        yield f"{len(ended.stderr.splitlines())} lines on stderr: {ended.stderr[:300]!r}"
+    if ended.status == 2 and (left or ended.stdout):
+        yield f"refused, yet left {sorted(left)[:5]} and printed {ended.stdout[:100]!r}"
+    if ended.status == 1 and not ended.stdout:
+        yield f"status 1 without an answer: {ended.stderr[:300]!r}"
+    if words := [word for word in ARRAYS_WORDS if word in ended.stderr]:
+        yield f"{words[0]!r} on stderr: {ended.stderr[:300]!r}"
+    if CONTROL.search(ended.stdout + ended.stderr):
+        yield f"control characters: {CONTROL.findall(ended.stdout + ended.stderr)[:5]}, {ended.stderr[:200]!r}"
+    if strange := [path for path in left if path.endswith((".part", ".tmp")) or mutations.CANARY in path]:
+        yield f"left {strange}"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("kind", AS_PROCESSES)
+def test_as_processes(kind, elsewhere):
+    require_none(process_faults(kind, PROCESSES, elsewhere))

@@ -13,13 +13,13 @@ import profilefit
 from mcml_sim import Setting
 from profilefit import laws
 from profilefit.errors import InputError
-from profilefit.laws.base import Sampler
-from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.base import Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational
-from profilefit.recipes import catalogue, recipe, record, starts
+from profilefit.recipes import catalogue, recipe, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
+from profilefit.recipes.targets import require_known, starting_law
 from profilefit.shader import emit
 
 CLASSES = {**{f"map {name}": kind for name, kind in laws.map_classes().items()}, **laws.profile_classes()}
@@ -50,11 +50,9 @@ def test_an_entry_tells_of_what_there_is(name):
 
 
 def test_no_record_is_of_an_index_that_its_law_is_not_made_for():
-    for one in [
-        *catalogue.profile_laws(fits_folder(), matched=False),
-        *catalogue.albedo_laws(fits_folder(), matched=False),
-    ]:
-        assert one.law.entry.n.holds(one.setting.n), one.label
+    for find in (catalogue.profile_laws, catalogue.albedo_laws):
+        for one in find(fits_folder(), matched=False):
+            assert one.law.entry.n.holds(one.setting.n), one.label
 
 
 @pytest.mark.parametrize("n", [0.5, 3.0])
@@ -72,6 +70,16 @@ def test_a_range_has_ends():
     assert str(Range(0.0, 0.5, open_low=True)) == "(0, 0.5]"
 
 
+class ToySampler(Sampler):
+    law: "Toy"
+
+    def scaled_sample(self, xi, alpha):
+        return -jnp.log1p(-xi) / self.law.rate(alpha)
+
+    def scaled_pdf(self, x, alpha):
+        return self.law.scaled_density(x, alpha)
+
+
 class Toy(EscapeLaw):
     """2 pi x R_d = A q e^{-q x}, q = q0 + q1 (1 - alpha)."""
 
@@ -80,6 +88,7 @@ class Toy(EscapeLaw):
     q0: float
     q1: float
     entry = Entry("toy", "a toy", records=("toy",), start={"q0": 1.0, "q1": 1.0}, text=Text("toy"))
+    sampler_class = ToySampler
 
     def rate(self, alpha):
         return self.q0 + self.q1 * (1.0 - alpha)
@@ -89,20 +98,6 @@ class Toy(EscapeLaw):
 
     def scaled_cdf(self, x, alpha):
         return -jnp.expm1(-self.rate(alpha) * x)
-
-    @property
-    def sampler(self):
-        return ToySampler(self)
-
-
-class ToySampler(Sampler):
-    law: Toy
-
-    def scaled_sample(self, xi, alpha):
-        return -jnp.log1p(-xi) / self.law.rate(alpha)
-
-    def scaled_pdf(self, x, alpha):
-        return self.law.scaled_density(x, alpha)
 
 
 TOY_TEXT = """\
@@ -117,43 +112,24 @@ LAW_Shape LAW_shape(float alpha) {
     s.rate = LAW_q0 + LAW_q1 * (1.0 - alpha);
     return s;
 }
-
-float LAW_reflectance(LAW_Shape s) {
-    return s.reflectance;
-}
-
-float LAW_density(float x, LAW_Shape s) {
-    return s.rate * exp(-s.rate * x);
-}
-
-float LAW_cumulated(float x, LAW_Shape s) {
-    return 1.0 - exp(-s.rate * x);
-}
-
-float LAW_radius(float xi, LAW_Shape s) {
-    return -log(1.0 - clamp(xi, 0.0, PF_MOST_XI)) / s.rate;
-}
-
-float LAW_radius_density(float x, LAW_Shape s) {
-    return LAW_density(x, s);
-}
 """
+FUNCTIONS = {
+    "reflectance(LAW_Shape s)": "s.reflectance",
+    "density(float x, LAW_Shape s)": "s.rate * exp(-s.rate * x)",
+    "cumulated(float x, LAW_Shape s)": "1.0 - exp(-s.rate * x)",
+    "radius(float xi, LAW_Shape s)": "-log(1.0 - clamp(xi, 0.0, PF_MOST_XI)) / s.rate",
+    "radius_density(float x, LAW_Shape s)": "LAW_density(x, s)",
+}
+TOY_TEXT += "".join(f"\nfloat LAW_{head} {{\n    return {value};\n}}\n" for head, value in FUNCTIONS.items())
 TOY_RECIPE = """\
 title = "a toy"
 law = "toy"
 equations = "q"
 pipeline = "profile"
 truth = "exact"
-[albedos]
-low = 0.3
-high = 0.9
-count = 4
-[rings]
-first = 0.1
-last = 20.0
-count = 12
-[weighting]
-objective = "energy"
+albedos = { low = 0.3, high = 0.9, count = 4 }
+rings = { first = 0.1, last = 20.0, count = 12 }
+weighting = { objective = "energy" }
 """
 
 
@@ -172,8 +148,8 @@ def toy(monkeypatch, tmp_path):
 def test_a_law_is_added_by_one_line_of_the_table(toy):
     """From its recipe by a fit to a record, from that to a law by name, and from that to a text."""
     chosen = recipe.find("toy", toy)
-    starts.require_known(chosen)
-    start = starts.starting_law(chosen, toy)
+    require_known(chosen)
+    start = starting_law(chosen, toy)
     assert start.constants() == {"q0": 1.0, "q1": 1.0}
     edges = np.append(0.0, np.geomspace(0.1, 20.0, 12))
     found = profilefit.fit(profilefit.Profiles.from_exact(np.linspace(0.3, 0.9, 4), edges), start, jackknife=False)

@@ -115,38 +115,24 @@ def test_replicates_that_agree_by_accident(table):
     assert np.all(table("r,value1,value2,value3\n" + flat).sigma > 0)
 
 
+LONG = {
+    "columns": "r," + ",".join(f"value{i}" for i in range(60_000)) + "\n",
+    "empty": "r," + "," * 4_000_000,
+    "words": " ".join("r" for _ in range(2_000_000)),
+    "square": "r [ " * 1_000_000,
+    "round": "r( " * 1_000_000,
+    "blank": "r," + " " * 4_000_000 + "value",
+    "long": "r," + "a " * 60_000 + "b,value,sigma",
+    "lines": "\n" * 4_000_000,
+    "cells": GOOD + "4" + ",5" * 2_000_000,
+    "rows": GOOD + "4,0.1,0.1\n" * 300_000,
+    "long profile": "r,value,sigma\n" + "".join(f"{i},1,1\n" for i in range(1, 19_000)),
+    "many replicates": "r," + ",".join(f"value{i}" for i in range(1, 1000)) + "\n" + ("1" + ",1" * 999 + "\n") * 2000,
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "text",
-    [
-        "r," + ",".join(f"value{i}" for i in range(60_000)) + "\n",
-        "r," + "," * 4_000_000,
-        " ".join("r" for _ in range(2_000_000)),
-        "r [ " * 1_000_000,
-        "r( " * 1_000_000,
-        "r," + " " * 4_000_000 + "value",
-        "r," + "a " * 60_000 + "b,value,sigma",
-        "\n" * 4_000_000,
-        GOOD + "4" + ",5" * 2_000_000,
-        GOOD + "4,0.1,0.1\n" * 300_000,
-        "r,value,sigma\n" + "".join(f"{i},1,1\n" for i in range(1, 19_000)),
-        "r," + ",".join(f"value{i}" for i in range(1, 1000)) + "\n" + ("1" + ",1" * 999 + "\n") * 2000,
-    ],
-    ids=[
-        "columns",
-        "empty",
-        "words",
-        "square",
-        "round",
-        "blank",
-        "long",
-        "lines",
-        "cells",
-        "rows",
-        "long profile",
-        "many replicates",
-    ],
-)
+@pytest.mark.parametrize("text", LONG.values(), ids=LONG)
 def test_no_file_takes_long(table, text):
     """All of them as long as a file may be, or nearly so; the slowest reads half a million numbers."""
     started = time.process_time()

@@ -9,7 +9,7 @@ from mcml_sim import InputError, Layer, Medium, Setting, SettingError, exact
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, Tabulated, as_table, from_table
 from mcml_sim.tracing import rng
 from profilefit.recipes.folder import shipped
-from profilefit.recipes.phases.data import read_phase
+from profilefit.recipes.phases import read_phase
 
 PETZOLD = read_phase(shipped("fits") / "phases" / "petzold.csv").table
 FORAND = FournierForand(1.1054, 3.582)

@@ -14,10 +14,7 @@ from mcml_sim import InputError
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from mcml_sim.tracing import rng
 
-SHELF = [
-    Isotropic(),
-    *(HenyeyGreenstein(g) for g in (-0.9, -0.3, 0.0, 1e-9, 0.5, 0.9, 0.99)),
-]
+SHELF = [Isotropic(), *(HenyeyGreenstein(g) for g in (-0.9, -0.3, 0.0, 1e-9, 0.5, 0.9, 0.99))]
 ENDS = np.array([-1 + 1e-7, -0.5, 0.0, 0.5, 1 - 1e-7])
 
 every_phase = pytest.mark.parametrize("phase", SHELF, ids=str)

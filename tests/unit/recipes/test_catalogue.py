@@ -1,4 +1,4 @@
-"""Laws by name: every form of `constants`, and what each wrong one is told."""
+"""Laws by name: every form of `constants`, records and laws by a user's name, and what each wrong one is told."""
 
 import json
 
@@ -9,30 +9,34 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import profile_classes
 from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
-from profilefit.laws.published import SETS
+from profilefit.laws.published import constants as constants_of
 from profilefit.recipes import catalogue, record
+from profilefit.recipes.catalogue import albedo_laws, find, profile_laws, sampled_laws
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records, record_name
 
+FITS = fits_folder()
+DIFFUSE, REFRACTED = Setting("diffuse"), Setting(n=1.4)
+FOUR = {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0}
+MAP = {"p": 5.0, "q": 3.5, "w": 0.8}
 
-def constants_of(law, name):
-    return next(dict(s.constants) for s in SETS if (s.law, s.name) == (law, name))
 
-
-def make_record(folder, name, law, values, pipeline="profile", setting=None, **extra):
-    content = {
-        "law": law,
-        "pipeline": pipeline,
-        "setting": setting or Setting(),
-        "constants": {key: {"regenerated": value} for key, value in values.items()},
-        **extra,
-    }
+def make_record(folder, name, law, values, pipeline="profile", setting=None):
+    constants = {key: {"regenerated": value} for key, value in values.items()}
+    content = {"law": law, "pipeline": pipeline, "setting": setting or Setting(), "constants": constants}
     return record.write(folder, name, content, {})
 
 
+@pytest.fixture
+def mine(tmp_path):
+    """A record of the printed constants of normalized diffusion."""
+    return make_record(tmp_path, "mine", "burley", constants_of("burley"))
+
+
 def test_names():
-    assert {"liang", "burley"} <= set(profilefit.names())
+    assert {"liang", "burley", "gaussians"} <= set(profilefit.names())
     assert isinstance(profilefit.names(), tuple)
+    assert not [name for name in profilefit.names() if ":" in name]
 
 
 @pytest.mark.parametrize(
@@ -57,15 +61,16 @@ def test_every_map_loads_as_regenerated(name):
     assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("asked", "found"), [("published", "published"), ("published:corrected", "corrected"), ("corrected", "corrected")]
-)
-def test_printed_sets_by_name(asked, found):
-    assert profilefit.load("liang", asked).constants() == constants_of("liang", found)
-
-
-def test_printed_sets_of_maps():
+def test_printed_sets_by_name():
+    for name in ("published", "published:corrected", "corrected"):
+        found = profilefit.load("liang", name).constants()
+        assert found == constants_of("liang", name.removeprefix("published:"))
     assert profilefit.albedo_law("liang", "published").constants() == {"p": 5.67, "q": 3.84, "w": 0.84}
+    law = profilefit.load("burley", "published:diffuse")
+    assert (law.setting, law.albedo.setting) == (DIFFUSE, DIFFUSE)
+    assert profilefit.load("burley", "published:diffuse", DIFFUSE) == law
+    with pytest.raises(SettingError, match=r"belong to diffuse, n = 1, g = 0, got a request for searchlight"):
+        profilefit.load("burley", "published:diffuse", Setting())
 
 
 def test_a_records_path(tmp_path):
@@ -73,64 +78,58 @@ def test_a_records_path(tmp_path):
     values = {**constants_of("liang", "corrected"), "a1": -0.007}
     path = make_record(tmp_path, "mine", "liang", {"a1": values["a1"], "b0": values["b0"]})
     assert profilefit.load("liang", str(path)).constants() == values
-    path = make_record(tmp_path, "map", "liang", {"p": 5.0, "q": 3.5, "w": 0.8}, pipeline="albedo")
-    assert profilefit.albedo_law("liang", str(path)).constants() == {"p": 5.0, "q": 3.5, "w": 0.8}
+    path = make_record(tmp_path, "map", "liang", MAP, pipeline="albedo")
+    assert profilefit.albedo_law("liang", str(path)).constants() == MAP
+    with pytest.raises(RecordError, match=r"holds constants of law 'albedo liang', got a request for 'liang'"):
+        profilefit.load("liang", str(path))
 
 
 def test_regenerated_records_of_another_folder_come_first(tmp_path):
-    make_record(tmp_path, "burley-whole", "burley", {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0})
+    assert (FITS / "albedo-rational.json").is_file()
+    make_record(tmp_path, "burley-whole", "burley", FOUR)
     with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
         here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
-    assert here.constants() == {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0}
-    assert shipped.constants() != here.constants()
+    assert here.constants() == FOUR != shipped.constants()
     assert here.albedo == shipped.albedo  # not in that folder: the installation's own
 
 
-def test_shipped_records_belong_to_the_installation():
-    assert (fits_folder() / "albedo-rational.json").is_file()
-
-
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("load", "arguments", "words"),
     [
-        (lambda: profilefit.load("lambert"), r"law must be one of liang, burley.*, got 'lambert'"),
-        (lambda: profilefit.albedo_law("burley"), r"albedo law must be one of liang, rational.*, got 'burley'"),
-        (
-            lambda: profilefit.load("liang", "best"),
-            r"constants must be one of regenerated, published, corrected, the path",
+        (profilefit.load, ["lambert"], r"law must be one of liang, burley.*, got 'lambert'"),
+        (profilefit.albedo_law, ["burley"], r"albedo law must be one of liang, rational.*, got 'burley'"),
+        (profilefit.load, ["liang", "best"], r"constants must be one of regenerated, published, corrected, the path"),
+        (profilefit.load, ["burley", "published:corrected"], r"got 'published:corrected'"),
+        (profilefit.albedo_law, ["rational", "published"], r"constants must be one of regenerated, the path"),
+        (profilefit.load, ["liang", "/nowhere/x.json"], r"/nowhere/x\.json: there is no such record"),
+        (profilefit.load, ["burley", "regenerated", "diffuse"], r"setting must be a mcml_sim\.Setting, got 'diffuse'"),
+        (profilefit.load, ["dipole", "old"], r"must be one of regenerated, the path of a record .*, got 'old'"),
+        (profilefit.albedo_law, ["chiang"], r"of albedo chiang must be one of published, the path .*'regenerated'"),
+        (profilefit.load, ["gaussians:3"], r"of gaussians:3 must be one of the path of a record .*, got 'regenerated'"),
+        *(
+            (profilefit.load, [name], rf"law must be gaussians:N with N a whole number in 1 \.\.\. 8, got '{name}'")
+            for name in ("gaussians:0", "gaussians:9", "gaussians:two", "gaussians:")
         ),
-        (lambda: profilefit.load("burley", "published:corrected"), r"got 'published:corrected'"),
-        (lambda: profilefit.albedo_law("rational", "published"), r"constants must be one of regenerated, the path"),
-        (lambda: profilefit.load("liang", "/nowhere/x.json"), r"/nowhere/x\.json: there is no such record"),
+        *(
+            (load, ["liang", which, where], r"belongs? to searchlight, n = 1, g = 0, got a request for")
+            for load in (profilefit.load, profilefit.albedo_law)
+            for which in ("regenerated", "published")
+            for where in (DIFFUSE, REFRACTED)
+        ),
     ],
 )
-def test_unknown_names_are_told_what_is_accepted(call, words):
+def test_what_there_is_not_is_told_with_what_is_accepted(load, arguments, words):
     with pytest.raises(InputError, match=words):
-        call()
+        load(*arguments)
 
 
-@pytest.mark.parametrize("constants", ["regenerated", "published"])
-@pytest.mark.parametrize("setting", [Setting("diffuse"), Setting(n=1.4)])
-def test_constants_of_another_setting_are_refused(constants, setting):
-    for call in (profilefit.load, profilefit.albedo_law):
-        with pytest.raises(SettingError, match=r"belongs? to searchlight, n = 1, g = 0, got a request for"):
-            call("liang", constants, setting)
-
-
-def test_a_record_of_another_setting_is_refused(tmp_path):
-    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"), setting=Setting("diffuse"))
+def test_a_record_of_another_setting_or_law_is_refused(tmp_path, mine):
+    path = make_record(tmp_path, "other", "burley", constants_of("burley"), setting=DIFFUSE)
     with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
         profilefit.load("burley", str(path), Setting())
-    assert profilefit.load("burley", str(path)).setting == Setting("diffuse")
-
-
-def test_a_record_of_another_law_is_refused(tmp_path):
-    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
+    assert profilefit.load("burley", str(path)).setting == DIFFUSE
     with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
-        profilefit.load("liang", str(path))
-    path = make_record(tmp_path, "map", "liang", {"p": 5.0, "q": 3.5, "w": 0.8}, pipeline="albedo")
-    with pytest.raises(RecordError, match=r"holds constants of law 'albedo liang', got a request for 'liang'"):
-        profilefit.load("liang", str(path))
+        profilefit.load("liang", str(mine))
 
 
 @pytest.mark.parametrize(
@@ -139,32 +138,17 @@ def test_a_record_of_another_law_is_refused(tmp_path):
         {"constants": {"s0": {"published": 1.0}}},
         {"constants": {"s0": {"regenerated": None}}},
         {"constants": {"s0": {"regenerated": "much"}}},
-        {"constants": None},
         {"constants": {"s9": {"regenerated": 1.0}}},
-        {"setting": None},
         {"setting": {"illumination": "searchlight", "colour": "red"}},
-        {"law": None},
+        *({key: value} for key in ("law", "setting", "constants") for value in (None, ...)),
     ],
     ids=str,
 )
-def test_damaged_records_are_told_in_one_line(tmp_path, damage):
-    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
-    path.write_text(json.dumps({**json.loads(path.read_text()), **damage}))
+def test_damaged_records_are_told_in_one_line(mine, damage):
+    content = {**json.loads(mine.read_text()), **damage}
+    mine.write_text(json.dumps({key: value for key, value in content.items() if value is not ...}))
     with pytest.raises(RecordError, match=r"mine"):
-        profilefit.load("burley", str(path))
-
-
-@pytest.mark.parametrize("key", ["law", "setting", "constants"])
-def test_records_that_lack_a_part_are_told_in_one_line(tmp_path, key):
-    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
-    content = json.loads(path.read_text())
-    del content[key]
-    path.write_text(json.dumps(content))
-    with pytest.raises(RecordError, match=r"mine"):
-        profilefit.load("burley", str(path))
-
-
-DIFFUSE, REFRACTED = Setting("diffuse"), Setting(n=1.4)
+        profilefit.load("burley", str(mine))
 
 
 @pytest.mark.parametrize(
@@ -192,78 +176,131 @@ def test_the_map_that_normalises_is_there_for_every_setting(setting):
     law = catalogue.normalisation(setting)
     assert law.setting == setting
     assert law == profilefit.albedo_law("rational", setting=setting)
-    assert profilefit.load("burley", str(fits_folder() / "burley-whole.json")).albedo == catalogue.normalisation(
-        Setting()
-    )
 
 
-def test_settings_without_a_record_are_told_which_there_are(tmp_path):
-    assert set(SETTINGS) <= set(Records(fits_folder()).settings("albedo-rational"))
+def test_settings_without_a_record_are_told_which_there_are():
+    assert set(SETTINGS) <= set(Records(FITS).settings("albedo-rational"))
     with pytest.raises(
         SettingError, match=r"albedo-rational belongs to .*diffuse, n in \(1, 1\.6\], g = 0.*, n = 1\.7, g = 0$"
     ):
         catalogue.normalisation(Setting(n=1.7))
     with pytest.raises(SettingError, match=r"got a request for searchlight, n = 1, g = 0\.8"):
         profilefit.albedo_law("rational", setting=Setting(g=0.8))
-    with pytest.raises(InputError, match=r"setting must be a mcml_sim\.Setting, got 'diffuse'"):
-        profilefit.load("burley", setting="diffuse")
 
 
 def test_a_law_is_found_by_its_setting(tmp_path):
-    values = {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0}
-    make_record(tmp_path, "burley-whole-diffuse", "burley", values, setting=DIFFUSE)
+    make_record(tmp_path, "burley-whole-diffuse", "burley", FOUR, setting=DIFFUSE)
     with pytest.warns(ShippedMap, match="albedo-rational-diffuse"):
         law = profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)
-    assert (law.constants(), law.setting, law.albedo.setting) == (values, DIFFUSE, DIFFUSE)
+    assert (law.constants(), law.setting, law.albedo.setting) == (FOUR, DIFFUSE, DIFFUSE)
     assert Records(tmp_path).settings("burley-whole") == (DIFFUSE,)
     with pytest.raises(RecordError, match=r"hazard\.json: there is no such record; .* hazard --out .* makes it"):
         profilefit.load("hazard", folder=tmp_path)
     with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request"):
         profilefit.load("burley", setting=REFRACTED, folder=tmp_path)
-
-
-def test_a_record_whose_name_is_of_another_setting_is_refused(tmp_path):
-    make_record(tmp_path, "burley-whole-diffuse", "burley", constants_of("burley", "published"))
+    # A record whose name is of another setting than its own.
+    make_record(tmp_path, "burley-whole-diffuse", "burley", FOUR)
     with pytest.raises(SettingError, match=r"belongs to searchlight, n = 1, g = 0, got a request for diffuse"):
         profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)
-
-
-def test_a_printed_set_brings_its_own_setting():
-    law = profilefit.load("burley", "published:diffuse")
-    assert (law.setting, law.albedo.setting) == (DIFFUSE, DIFFUSE)
-    assert profilefit.load("burley", "published:diffuse", DIFFUSE) == law
-    with pytest.raises(SettingError, match=r"belong to diffuse, n = 1, g = 0, got a request for searchlight"):
-        profilefit.load("burley", "published:diffuse", Setting())
 
 
 def test_a_law_without_constants_needs_no_record():
     """Nor a map: n = 1.35 has none."""
     for constants in ("regenerated", "published"):
         law = profilefit.load("dipole", constants, Setting(n=1.35))
-        assert law.constants() == {}
-        assert law.setting == Setting(n=1.35)
-    with pytest.raises(InputError, match=r"constants must be one of regenerated, the path of a record .*, got 'old'"):
-        profilefit.load("dipole", "old")
-
-
-def test_a_law_that_was_never_regenerated_says_what_there_is():
-    with pytest.raises(RecordError, match=r"of albedo chiang must be one of published, the path .*, got 'regenerated'"):
-        profilefit.albedo_law("chiang")
+        assert (law.constants(), law.setting) == ({}, Setting(n=1.35))
 
 
 def test_a_number_of_gaussians():
-    assert "gaussians" in profilefit.names()
-    assert not [name for name in profilefit.names() if ":" in name]
     assert profilefit.load("gaussians") == profilefit.load("gaussians:6")
     assert profilefit.load("gaussians:2").count() == 2
-    for name in ("gaussians", "gaussians:6"):
-        assert profilefit.load(name, str(fits_folder() / "gaussians-6.json")).count() == 6
-    for name in ("gaussians:0", "gaussians:9", "gaussians:two", "gaussians:"):
-        with pytest.raises(
-            InputError, match=rf"law must be gaussians:N with N a whole number in 1 \.\.\. 8, got '{name}'"
-        ):
-            profilefit.load(name)
-    with pytest.raises(RecordError, match=r"of gaussians:3 must be one of the path of a record .*, got 'regenerated'"):
-        profilefit.load("gaussians:3")
+    six = str(FITS / "gaussians-6.json")
+    assert [profilefit.load(name, six).count() for name in ("gaussians", "gaussians:6")] == [6, 6]
     with pytest.raises(RecordError, match=r"holds constants of law 'gaussians:6', got a request for 'gaussians:4'"):
-        profilefit.load("gaussians:4", str(fits_folder() / "gaussians-6.json"))
+        profilefit.load("gaussians:4", six)
+
+
+# By the name that a user has for it
+
+
+@pytest.mark.parametrize(
+    ("name", "constants", "law", "setting", "records"),
+    [
+        ("hazard-diffuse-refracting", None, "hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-refracting",)),
+        ("liang-whole", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
+        ("liang-as-published", None, "liang", Setting(), ("liang-as-published",)),
+        ("albedo-rational-refracting", None, "rational", REFRACTED, ("albedo-rational-refracting",)),
+        ("liang", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
+        ("gaussians", None, "gaussians:6", Setting(), ("gaussians-6",)),
+        ("burley", "published:diffuse", "burley", DIFFUSE, ()),
+        ("dipole", None, "dipole", Setting(), ()),
+        ("burley_diffuse_mfp", None, "burley_diffuse_mfp", Setting(), ()),
+        ("rational", None, "rational", Setting(), ("albedo-rational",)),
+        ("albedo liang", None, "liang", Setting(), ("albedo-liang",)),
+        ("van_de_hulst", None, "van_de_hulst", DIFFUSE, ()),
+        ("chiang", "published", "chiang", DIFFUSE, ()),
+    ],
+)
+def test_a_record_or_a_law_by_its_name(name, constants, law, setting, records):
+    found = find(name, FITS, constants)
+    assert (found.name, found.setting, found.records) == (law, setting, records)
+
+
+@pytest.mark.slow
+def test_every_record_of_a_fit_is_found_and_is_what_it_says():
+    for one in [*profile_laws(FITS, matched=False), *sampled_laws(FITS), *albedo_laws(FITS, matched=False)]:
+        for name in one.records:
+            again = find(name, FITS)
+            assert isinstance(again.law, AlbedoLaw) == isinstance(one.law, AlbedoLaw)
+            assert again.setting == one.setting
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "g", "record"),
+    [
+        ("hazard-diffuse", 1.0, None, "hazard-diffuse"),
+        ("hazard-diffuse", 1.001, None, "hazard-diffuse-refracting"),
+        ("hazard-diffuse", 1.37, None, "hazard-diffuse-refracting"),
+        ("hazard", 1.4, 0.0, "hazard-refracting"),
+        ("hazard", 1.4, 0.3, "hazard-forward"),
+        ("hazard", 1.4, 0.95, "hazard-forward"),
+    ],
+)
+def test_a_law_that_spans_indices_and_g_is_found_at_each(name, n, g, record):
+    found = find(name, FITS, n=n, g=g)
+    light = "diffuse" if "diffuse" in name else "searchlight"
+    assert (found.setting, found.records) == (Setting(light, n=n, g=g or 0.0), (record,))
+
+
+def test_refracting_surfaces_are_left_out_where_laws_are_compared():
+    assert {one.setting for one in profile_laws(FITS)} == {Setting(), DIFFUSE}
+    assert REFRACTED in {one.setting for one in profile_laws(FITS, matched=False)}
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "error", "words"),
+    [
+        ("hazard-diffuse", {"n": 1.61}, SettingError, r"n in \(1, 1.6\].* request for diffuse, n = 1.61, g = 0"),
+        ("burley", {"constants": "published", "n": 1.4}, SettingError, "constants of burley belong to searchlight, n"),
+        ("hazard", {"n": 1.4, "g": 0.97}, SettingError, r"g in \(0, 0.95\].* for searchlight, n = 1.4, g = 0.97"),
+        ("burley", {"constants": "published", "g": 0.5}, SettingError, "burley"),
+        ("hazzard-diffuse", {}, InputError, r"'hazzard-diffuse'; did you mean hazard-diffuse, .*\? `profilefit"),
+        ("Chiang", {}, InputError, r"got 'Chiang'; did you mean chiang, "),
+        ("zzz", {}, InputError, r"map or record, got 'zzz'; laws: liang, .* `profilefit report` lists"),
+        ("reproduction", {}, RecordError, r"'reproduction' holds no law"),
+        ("liang", {"constants": "mine"}, InputError, r"constants must be one of regenerated, published, .* got 'mine'"),
+        ("hazard-refracting", {"constants": "published"}, InputError, r"of a record are its own: .*hazard-refracting"),
+        ("gaussians:3", {}, InputError, r"^constants must be the path of a record .*gaussians:3 was not regenerated"),
+        ("burley_diffuse_mfp", {"constants": "regenerated"}, RecordError, r"none were regenerated, got 'regenerated'"),
+        *((name, {}, InputError, "") for name in ("hazzard", "burleyy", "gaussians:99", "albedo-rational-dif", "")),
+    ],
+)
+def test_what_is_not_there_is_named_in_one_short_line(name, options, error, words):
+    with pytest.raises(error, match=words) as told:
+        find(name, FITS, **options)
+    assert error is SettingError or len(str(told.value)) < 200
+    assert "\n" not in str(told.value)
+
+
+def test_what_was_not_regenerated_has_its_only_printed_constants():
+    assert find("burley_diffuse_mfp", FITS).constants == find("van_de_hulst", FITS).constants == "published"

@@ -7,14 +7,14 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.fitting.objectives import OBJECTIVES
+from profilefit.fitting.estimate import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import albedo_map, law
 from profilefit.recipes.recipe import available, find, read
 from profilefit.recipes.record import record_name, spanning_name
 from profilefit.recipes.schema import PIPELINES
-from profilefit.recipes.starts import require_known
+from profilefit.recipes.targets import require_known
 
 GOOD = """
 title = "A fit"

@@ -45,32 +45,14 @@ def test_numbers_to_twelve_digits_and_nan_to_null(tmp_path):
         value: np.float64
         where: Path
 
-    content = {
-        **CONTENT,
-        "third": 1 / 3,
-        "tiny": np.float64(5e-301),
-        "nan": np.nan,
-        "infinite": -np.inf,
-        "whole": np.int64(7),
-        "flag": np.bool_(True),
-        "array": np.array([[1.0, np.nan]]),
-        "zero_d": np.array(2.0),
-        "pair": (1, "two", None),
-        "part": Part(np.float64(3.0), Path("x")),
-        5: "key",
-    }
-    found = record.read(record.write(tmp_path, "mine", content, {}))
-    assert found["third"] == 0.333333333333
-    assert found["tiny"] == 5e-301
-    assert found["nan"] is None
-    assert found["infinite"] is None
-    assert found["whole"] == 7
+    given = {"third": 1 / 3, "tiny": np.float64(5e-301), "nan": np.nan, "infinite": -np.inf, "whole": np.int64(7)}
+    given |= {"flag": np.bool_(True), "array": np.array([[1.0, np.nan]]), "zero_d": np.array(2.0)}
+    given |= {"pair": (1, "two", None), "part": Part(np.float64(3.0), Path("x")), 5: "key"}
+    wanted = {"third": 0.333333333333, "tiny": 5e-301, "nan": None, "infinite": None, "whole": 7, "flag": True}
+    wanted |= {"array": [[1.0, None]], "zero_d": 2.0, "pair": [1, "two", None], "5": "key"}
+    found = record.read(record.write(tmp_path, "mine", {**CONTENT, **given}, {}))
+    assert found.items() >= (wanted | {"part": {"value": 3.0, "where": "x"}}).items()
     assert found["flag"] is True
-    assert found["array"] == [[1.0, None]]
-    assert found["zero_d"] == 2.0
-    assert found["pair"] == [1, "two", None]
-    assert found["part"] == {"value": 3.0, "where": "x"}
-    assert found["5"] == "key"
     assert "NaN" not in (tmp_path / "mine.json").read_text()
 
 
@@ -121,23 +103,34 @@ def test_what_is_no_record_is_named(tmp_path, text, words):
         record.read(path)
 
 
+def changed(tmp_path, name, change):
+    """The path of a copy of a shipped record that a function has changed."""
+    content = json.loads((fits_folder() / f"{name}.json").read_text())
+    change(content)
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
 ALWAYS = {**schema.NAMED, **schema.CONSTANTS}
 PROFILE_KEYS = {**ALWAYS, **schema.TOLD, **schema.PROFILE}
 
 
-def _spoiled(key, spoil):
+def _spoiled(tmp_path, key, spoil):
     """A shipped record of which the value at a dotted key is lost, or made true."""
-    content = json.loads((fits_folder() / "liang-whole.json").read_text())
-    *above, last = key.split(".")
-    part = content
-    for name in above:
-        part = part[next(iter(part)) if name == "*" else name]
-    last = next(iter(part)) if last == "*" else last
-    if spoil == "lost":
-        del part[last]
-    else:
-        part[last] = True
-    return content, last
+    names = key.split(".")
+
+    def change(content):
+        for place, name in enumerate(names):
+            names[place] = next(iter(content)) if name == "*" else name
+            if place < len(names) - 1:
+                content = content[names[place]]
+        if spoil == "lost":
+            del content[names[-1]]
+        else:
+            content[names[-1]] = True
+
+    return changed(tmp_path, "liang-whole", change), names[-1]
 
 
 @pytest.mark.parametrize("path", record.available(fits_folder()).values(), ids=lambda path: path.stem)
@@ -170,9 +163,7 @@ def test_format_1_is_read_in_the_words_of_format_2(tmp_path):
 @pytest.mark.parametrize("key", [key for key in PROFILE_KEYS if not key.endswith("*") and "?" not in key])
 @pytest.mark.parametrize("spoil", ["lost", "another type"])
 def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
-    content, last = _spoiled(key, spoil)
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(content))
+    path, last = _spoiled(tmp_path, key, spoil)
     got = "nothing" if spoil == "lost" else "true"
     if key in ALWAYS or (spoil != "lost" and f"{key}?" in ALWAYS):
         with pytest.raises(
@@ -188,11 +179,7 @@ def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
-        (
-            "liang-whole",
-            {"pipeline": "magic"},
-            'pipeline must be one of albedo, profile, as-published, .*, got "magic"',
-        ),
+        ("liang-whole", {"pipeline": "magic"}, 'pipeline must be one of albedo, profile, .*, got "magic"'),
         ("liang-whole", {"pipeline": ["x"]}, r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
         ("liang-whole", {"constants": {"a1": 3.0}}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
         ("liang-as-published", {"stages": []}, r"stages must be a table, got \[\]"),
@@ -202,8 +189,7 @@ def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
     ],
 )
 def test_each_pipeline_has_its_own_needs(tmp_path, name, change, words):
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps({**json.loads((fits_folder() / f"{name}.json").read_text()), **change}))
+    path = changed(tmp_path, name, lambda content: content.update(change))
     with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
         record.read(path, whole=True)
 
@@ -218,14 +204,10 @@ def test_each_pipeline_has_its_own_needs(tmp_path, name, change, words):
     ],
 )
 def test_what_a_recipe_may_ask_for_is_whole_if_it_is_there(tmp_path, part, key, value, words):
-    content = json.loads((fits_folder() / "albedo-rational-diffuse.json").read_text())
-    path = tmp_path / "mine.json"
-    content[part][key] = value
-    path.write_text(json.dumps(content))
+    path = changed(tmp_path, "albedo-rational-diffuse", lambda content: content[part].update({key: value}))
     with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
         record.read(path, whole=True)
-    del content[part]
-    path.write_text(json.dumps(content))
+    path = changed(tmp_path, "albedo-rational-diffuse", lambda content: content.pop(part))
     assert record.read(path, whole=True)["law"] == "rational"
 
 
@@ -234,18 +216,17 @@ BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u202
 
 
 @pytest.mark.parametrize("place", ["title", "equations", "law", "a key"])
-@pytest.mark.parametrize(
-    "strange", [*BREAKS, "\x1b[31m", "\x00", "\x9b", "\u202e", "\u2066", "\ud800", "x" * 1001], ids=ascii
-)
+@pytest.mark.parametrize("strange", [*BREAKS, *STRANGE], ids=ascii)
 def test_text_that_is_no_printable_line_is_refused(tmp_path, place, strange):
     """It would become a comment in code, and would be shown on a terminal."""
-    content = json.loads((fits_folder() / "hazard.json").read_text())
-    if place == "a key":
-        content["constants"][f"a{strange}"] = {"regenerated": 1.0}
-    else:
-        content[place] += f"{strange}import os"
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(content))
+
+    def spoilt(content):
+        if place == "a key":
+            content["constants"][f"a{strange}"] = {"regenerated": 1.0}
+        else:
+            content[place] += f"{strange}import os"
+
+    path = changed(tmp_path, "hazard", spoilt)
     with pytest.raises(
         RecordError, match=r"mine\.json: is (damaged: .*one line of printable text|not a record: .*surrogates)"
     ) as caught:
@@ -283,49 +264,39 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
     assert len(str(caught.value)) < 300 + len(str(tmp_path))
 
 
-def test_lists_that_belong_together_are_of_one_length(tmp_path):
-    for change, words in (
-        (
-            lambda c: c["quality"]["regenerated"]["rel"].pop(),
-            "quality.regenerated.rel must be as long as quality.alpha",
-        ),
-        (lambda c: c["covariance"]["model"].pop(), "covariance.model must be a square matrix of numbers, or null"),
-        (lambda c: c["covariance"]["names"].append("zz"), "covariance.names must be of its constants, got 'zz'"),
-        (lambda c: c["derived"]["value"].pop(), "derived.value must be as long as derived.alpha"),
-        (lambda c: c["quality"]["published"].pop("ks"), "quality.published.ks must be there"),
-    ):
-        content = json.loads((fits_folder() / "burley-whole.json").read_text())
-        change(content)
-        path = tmp_path / "mine.json"
-        path.write_text(json.dumps(content))
-        with pytest.raises(RecordError, match=words):
-            record.read(path, whole=True)
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("burley-whole", lambda c: c["quality"]["regenerated"]["rel"].pop(), "rel must be as long as quality.alpha"),
+        ("burley-whole", lambda c: c["covariance"]["model"].pop(), "covariance.model must be a square matrix"),
+        ("burley-whole", lambda c: c["covariance"]["names"].append("zz"), "names must be of its constants, got 'zz'"),
+        ("burley-whole", lambda c: c["derived"]["value"].pop(), "derived.value must be as long as derived.alpha"),
+        ("burley-whole", lambda c: c["quality"]["published"].pop("ks"), "quality.published.ks must be there"),
+        ("hazard-refracting", lambda c: c["quality"]["by_index"]["rel"].pop(), "by_index.rel must be as long as .*.n"),
+    ],
+)
+def test_lists_that_belong_together_are_of_one_length(tmp_path, name, change, words):
+    with pytest.raises(RecordError, match=words):
+        record.read(changed(tmp_path, name, change), whole=True)
 
 
-def test_what_a_law_of_many_indices_needs(tmp_path):
-    """Its own index, of which it is exported, is one of those; a table by index has a number for each."""
-    for change, whole, words in (
-        (lambda c: c["setting"].update(n=1.7), False, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
-        (lambda c: c["setting"].update(n=1.0), False, r"setting.n must be in \(1, 1.6\]"),
-        (lambda c: c.update(indices=[None, 1.6]), False, "indices must be a list of two numbers"),
-        (lambda c: c["quality"]["by_index"]["rel"].pop(), True, "by_index.rel must be as long as quality.by_index.n"),
-    ):
-        content = json.loads((fits_folder() / "hazard-refracting.json").read_text())
-        change(content)
-        path = tmp_path / "mine.json"
-        path.write_text(json.dumps(content))
-        with pytest.raises(RecordError, match=words):
-            record.read(path, whole=whole)
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("refracting", {"setting": {"n": 1.7}}, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
+        ("refracting", {"setting": {"n": 1.0}}, r"setting.n must be in \(1, 1.6\]"),
+        ("refracting", {"indices": [None, 1.6]}, "indices must be a list of two numbers"),
+        *(("forward", {"setting": {"g": g}}, rf"g must be in .*, as its cosines are, got {g:g}") for g in (0, 0.96)),
+    ],
+)
+def test_what_a_law_of_many_indices_and_g_needs(tmp_path, name, change, words):
+    """Its own index and g, of which it is exported, are among those."""
 
+    def own(content):
+        content |= {**change, "setting": {**content["setting"], **change.get("setting", {})}}
 
-def test_what_a_law_with_g_needs(tmp_path):
-    for g in (0.0, 0.96):
-        content = json.loads((fits_folder() / "hazard-forward.json").read_text())
-        content["setting"]["g"] = g
-        path = tmp_path / "mine.json"
-        path.write_text(json.dumps(content))
-        with pytest.raises(RecordError, match=rf"setting.g must be in \(0, 0.95\], as its cosines are, got {g:g}"):
-            record.read(path)
+    with pytest.raises(RecordError, match=words):
+        record.read(changed(tmp_path, f"hazard-{name}", own))
 
 
 def test_records_that_cannot_be_read_are_named(tmp_path):

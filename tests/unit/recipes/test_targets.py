@@ -1,13 +1,16 @@
-"""From a recipe to its truth: where albedos and rings stand, and which photons they get."""
+"""What a recipe names: where albedos, rings and fits begin, its photons, and what its laws are judged with."""
 
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, exact, simulate_orders
+from mcml_sim import Grid, Setting, exact, simulate_orders
 from profilefit.errors import RecipeError
+from profilefit.laws import published
+from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.recipes import catalogue, recipe
+from profilefit.recipes.pipelines import inversion_error, needs_photons, printed_sets
 from profilefit.recipes.recipe import Albedos, RingLayout
-from profilefit.recipes.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
+from profilefit.recipes.targets import RUN_EDGES, albedo_values, require_known, ring_edges, starting_law, truth_of
 
 FITS = catalogue.fits_folder()
 
@@ -59,3 +62,59 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
     # A negative control: a tally that lost one photon in twenty would be seen.
     lost = (0.95 * photons.energy - exactly.energy)[seen] / error
     assert np.max(np.abs(lost)) > 4.5
+
+
+def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
+    """Printed constants of the searchlight are numbers to start from elsewhere too."""
+    chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
+    law = starting_law(chosen, tmp_path)
+    assert law.constants() == published.constants("burley", "published")
+    assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
+    mapped = starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
+    assert mapped.setting == Setting(n=1.4)
+    assert mapped.constants() == RefractingRational.entry.start
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"start": "old"}, r"start must be one of published, diffuse.*, got 'old'"),
+        ({"start": "none"}, r"start must be one of published, diffuse.*, got 'none'"),
+        ({"law": "rational"}, r"law must be one of liang, burley.*, got 'rational'"),
+        ({"held": ("s0", "s1", "s2", "s3")}, r"held leaves no constant of burley free"),
+        ({"held": ("q",)}, r"held must name constants of burley, got q"),
+        ({"pipeline": "evidence", "truth": "orders"}, r"truth of pipeline 'evidence' must be 'exact', got 'orders'"),
+    ],
+    ids=str,
+)
+def test_what_a_recipe_must_name(change, words):
+    with pytest.raises(RecipeError, match=words):
+        require_known(recipe.find("burley-whole", FITS).changed(**change))
+
+
+def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
+    class Exactly:
+        setting = Setting()
+
+        class sampler:
+            sample = staticmethod(lambda xi, alpha: exact.quantile(xi, alpha))
+
+    alpha = np.array([0.3, 0.9])
+    assert inversion_error(Exactly(), alpha) == pytest.approx([0, 0], abs=1e-8)
+    assert np.all(inversion_error(catalogue.load("liang", "published"), alpha) > 0.03)
+
+
+def test_printed_sets_are_those_of_the_recipes_setting():
+    burley = recipe.find("burley-whole", FITS)
+    searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
+    assert searchlight["published"]["s0"] == 1.85
+    assert diffuse["published"]["s0"] == 1.9
+    assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
+    assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
+
+
+def test_who_needs_photons():
+    orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
+    assert needs_photons(orders)
+    assert not needs_photons(exactly)
+    assert needs_photons(exactly.changed(check="orders"))

@@ -1,16 +1,16 @@
 """Every law that loads, once, under its own light; and the tables that say how good each is."""
 
-import io
 import json
 import shutil
+from dataclasses import fields
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import profile_quality
+from profilefit.fitting.sampling import SamplerQuality
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import albedo_laws, profile_laws, sampled_laws
 from profilefit.report.tables.law_tables import (
@@ -19,11 +19,11 @@ from profilefit.report.tables.law_tables import (
     every_law,
     for_each,
     markdown_laws,
-    markdown_samplers,
     measured,
-    measured_profile,
     measured_samplers,
+    sampler_tables,
 )
+from tests.unit.report.test_tables import rendered
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])
@@ -37,11 +37,8 @@ def folder(tmp_path):
     return tmp_path
 
 
-def printed(parts) -> list[str]:
-    console = Console(width=100, file=io.StringIO(), highlight=False, color_system=None)
-    for part in parts:
-        console.print(part)
-    return console.file.getvalue().splitlines()
+def printed(parts, width=100) -> list[str]:
+    return rendered(parts, width).splitlines()
 
 
 def test_every_law_is_there_once():
@@ -128,7 +125,7 @@ def test_of_two_xi_that_draw_one_radius_the_one_meant_counts():
 
 def test_markdown_has_a_line_a_law(folder):
     laws = profile_laws(folder, ["burley-whole"])
-    [quality] = for_each(lambda one: measured_profile(one, ALPHA), laws)
+    [quality] = for_each(lambda one: profile_quality(one.law, ALPHA), laws)
     header, _, row = (
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in markdown_laws([(laws[0], quality)]).splitlines()
@@ -138,8 +135,6 @@ def test_markdown_has_a_line_a_law(folder):
     assert home == ("burley", "burley-whole", "searchlight", "1", "4")
     assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)
     assert float(cells["ks worst"]) == pytest.approx(quality.ks.max(), rel=0.06)
-    table = markdown_samplers(measured_samplers(laws[0], [0.9])).splitlines()
-    assert [line.split("|")[5].strip() for line in table[2:]] == ["exact", "xie", "unreal"]
 
 
 def test_maps_under_their_own_light(folder):
@@ -148,3 +143,23 @@ def test_maps_under_their_own_light(folder):
     assert row[1:3] == ["searchlight", "1"]
     assert float(row[3]) < 5e-6
     assert row[6:] == ["yes", "1", "nowhere", "0"]
+
+
+def sampler_lines(width: int, **given) -> list[str]:
+    measures = {field.name: np.zeros(2) for field in fields(SamplerQuality)} | {"alpha": np.array([0.5, 0.9])}
+    quality = SamplerQuality(**(measures | {name: np.array(values) for name, values in given.items()}))
+    return printed(sampler_tables({"a sampler": quality}), width)
+
+
+def test_numbers_of_samplers_the_worst_last_and_infinity():
+    lines = sampler_lines(
+        100, edge_bias=[-0.125, 0.01], bias_by_law_pdf=[0.0, np.inf], atom=[0.0154, 0.0], variance=[3e-7, 8.33]
+    )
+    assert lines[0] == "Sampler: a sampler"
+    rows = {line.split()[0]: line.split()[1:] for line in lines[3:6]}
+    assert rows["0.500"] == ["0", "0.015", "0", "0", "-0.12", "0", "0"]
+    assert rows["0.900"] == ["0", "0", "0", "∞", "0.010", "0", "8.3"]
+    assert rows["worst"] == ["0", "0.015", "0", "∞", "-0.12", "0", "8.3"]
+    narrow = sampler_lines(80, edge_bias=[-0.1234, 1e-5], variance=[0.1, 123.0])
+    assert max(map(len, narrow)) <= 80
+    assert "…" not in "".join(narrow)

@@ -1,16 +1,12 @@
 """What checks found, as tables: who passes, what is broken and where."""
 
-import io
-
-from rich.console import Console
-
 from profilefit.recipes import catalogue
 from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.dense_grid import Count, Spread
-from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck
+from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
-from profilefit.shader.check.map_check import MapCheck
+from tests.unit.report.test_tables import rendered
 
 FITS = catalogue.fits_folder()
 NONE = Count(0, 0, 0, 0)
@@ -32,38 +28,19 @@ def mapped(*bounds):
     return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, NONE, Count(0, 0, 0, 7), bounds, {})
 
 
-def shown(parts):
-    console = Console(width=100, file=io.StringIO())
-    for part in parts:
-        console.print(part)
-    return console.file.getvalue()
-
-
 def test_a_line_a_law_says_whether_it_passes():
-    text = shown(check_tables.check_tables([law(GOOD), law(GOOD, BAD)], [mapped(GOOD)], "a device"))
+    text = rendered(check_tables.check_tables([law(GOOD), law(GOOD, BAD)], [mapped(GOOD)], "a device"), 100)
     rows = [line.split() for line in text.splitlines() if "-refracting" in line]
-    assert rows[0] == [
-        "hazard-refracting",
-        "1.4",
-        "0.049",
-        "1.0e-06",
-        "0.0096",
-        "2.0e-07",
-        "4.0e-07",
-        "2.0e-07",
-        "0",
-        "0",
-        "pass",
-    ]
+    assert " ".join(rows[0]) == "hazard-refracting 1.4 0.049 1.0e-06 0.0096 2.0e-07 4.0e-07 2.0e-07 0 0 pass"
     assert rows[1][-1] == "FAIL"
-    assert rows[2] == ["albedo-rational-refracting", "1.4", "0.00040", "1.0e-07", "–", "2.0e-07", "0", "7", "pass"]
+    assert " ".join(rows[2]) == "albedo-rational-refracting 1.4 0.00040 1.0e-07 – 2.0e-07 0 7 pass"
     assert "a device" in text
 
 
 def test_a_record_that_says_nothing_of_the_sampler_shows_nothing_of_it():
     one = law(GOOD)
     del one.spreads[SAMPLE], one.spreads[OWN]
-    text = shown(check_tables.check_tables([one], [], "a device"))
+    text = rendered(check_tables.check_tables([one], [], "a device"), 100)
     assert next(line for line in text.splitlines() if "-refracting" in line).split()[6:8] == ["–", "–"]
 
 
@@ -91,7 +68,7 @@ def test_the_readme_has_laws_maps_broken_bounds_and_costs():
 def test_costs_fit_into_100_columns():
     """Of the longest name, and a ratio as on a software rasteriser."""
     costs = {"burley_diffuse_mfp": Cost(dict.fromkeys(WORKS, 123.0), dict.fromkeys(WORKS, 12.25))}
-    text = shown([check_tables.cost_table(costs, "a device")])
+    text = rendered([check_tables.cost_table(costs, "a device")], 100)
     (row,) = (line.split() for line in text.splitlines() if line.startswith("burley_diffuse_mfp"))
     assert row == ["burley_diffuse_mfp", *["123", "(12.25)"] * len(WORKS)]
 

@@ -4,7 +4,6 @@ import json
 import math
 
 import pytest
-from rich.console import Console
 
 from mcml_sim import Setting
 from profilefit.report.tables.choose_table import (
@@ -20,10 +19,10 @@ from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
-from profilefit.studies.choose.fur import FurNeed
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.requirements import Budget, Requirements
-from profilefit.studies.choose.sea import SeaNeed
+from profilefit.studies.choose.scenes import FurNeed, SeaNeed
+from tests.unit.report.test_tables import rendered
 
 ONE = ((0.5, 0.5),) * 3
 SCENE = Requirements("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
@@ -34,31 +33,15 @@ LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6, 0.003)
 
 @pytest.fixture(scope="module")
 def choice():
-    return chosen(
-        SCENE,
-        [
-            Predicted(NOTHING, Milliseconds(2.0, 1.0, 2.5), Error(0.1, 0.1, 0.0, 0.001, 0.0, 0, CURVED)),
-            Predicted(
-                Option("separable", 17), Milliseconds(3.0, 3.0, 3.5), Error(0.012, 0.01, 0.006, 0.001, 0.0, 1, CURVED)
-            ),
-            Predicted(
-                Option("sampled", 64, name="hazard-diffuse"),
-                Milliseconds(5.0, 4.0, 8.0),
-                Error(0.008, 0.0, 0.0, 0.001, 0.008, 2, CURVED),
-            ),
-        ],
-    )
-
-
-def printed(part):
-    console = Console(width=100, highlight=False)
-    with console.capture() as capture:
-        console.print(part)
-    return capture.get()
+    errors = [(0.1, 0.1, 0.0, 0.001, 0.0, 0), (0.012, 0.01, 0.006, 0.001, 0.0, 1), (0.008, 0.0, 0.0, 0.001, 0.008, 2)]
+    costs = [Milliseconds(2.0, 1.0, 2.5), Milliseconds(3.0, 3.0, 3.5), Milliseconds(5.0, 4.0, 8.0)]
+    options = (NOTHING, Option("separable", 17), SAMPLED)
+    every = zip(options, costs, errors, strict=True)
+    return chosen(SCENE, [Predicted(option, cost, Error(*error, CURVED)) for option, cost, error in every])
 
 
 def test_says_it_in_one_line_and_why(choice):
-    text = printed(choose_table(choice, shipped(), (LAYER,)))
+    text = rendered([choose_table(choice, shipped(), (LAYER,))], 100)
     chosen = "The cheapest option within tolerance and budget: separable, 17 taps (requested: 2.0 % within 4 ms)"
     assert text.splitlines()[0] == chosen
     rows = {line[:12]: line for line in text.splitlines()}
@@ -88,7 +71,7 @@ def test_the_worst_of_three_colours_is_told(choice):
     """Its verdict counts first, then its error; all three as data."""
     errors = {"red": (0.014, 0.0005), "green": (0.021, 0.0001), "blue": (0.022, 0.002)}
     layers = [OneLayer(0.4, 0.9, 1.2, 1.4, error, spread, 10**6, 0.003) for error, spread in errors.values()]
-    text = " ".join(printed(choose_table(choice, shipped(), layers)).split())
+    text = " ".join(rendered([choose_table(choice, shipped(), layers)], 100).split())
     assert "Layers, of three colours, green the worst: one layer is not enough: " in text
     assert "is off by 2.1 ± 0.010 %" in text
     made = json.loads(json.dumps(content(choice, shipped(), layers)))["one_layer"]
@@ -97,7 +80,7 @@ def test_the_worst_of_three_colours_is_told(choice):
         ("green", 0.021, "not enough"),
         ("blue", 0.022, "undecided"),
     ]
-    alike = printed(choose_table(choice, shipped(), layers[:1] * 3))
+    alike = rendered([choose_table(choice, shipped(), layers[:1] * 3)], 100)
     assert "Layers, of three colours, red the worst: one layer is enough." in " ".join(alike.split())
 
 
@@ -113,7 +96,7 @@ def test_says_when_nothing_serves(choice):
 def test_a_budget_within_the_range_is_likely_kept(choice):
     """3.0 ms, but 3.5 at worst."""
     tight = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=3.2)}), choice.predicted)
-    text = printed(choose_table(tight, shipped()))
+    text = rendered([choose_table(tight, shipped())], 100)
     assert "likely" in next(line for line in text.splitlines() if line.startswith("chosen"))
     assert "likely: the estimate is within the budget" in " ".join(text.split())
 

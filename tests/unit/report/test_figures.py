@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 from profilefit.errors import OutputError, RecordError
-from profilefit.fitting.derived import LawWithErrors
+from profilefit.fitting.discrepancy import LawWithErrors
 from profilefit.recipes import catalogue
 from profilefit.report import draw_all
-from profilefit.report.figures import residual_figure as residual_module
+from profilefit.report.figures import record_figures
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.corner_figure import corner_figure
-from profilefit.report.figures.record_figures import PAPER, plans
-from profilefit.report.figures.residual_figure import energy_within
+from profilefit.report.figures.record_figures import PAPER, corner_figure, energy_within, plans
 from profilefit.report.records import DRAWS, Source, coefficients
 
 pytestmark = pytest.mark.slow
@@ -149,8 +147,8 @@ def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name, tmp_path
     """Its error is 2.9e-3 at worst; taken for the medium's own, albedos that are reduced leave .35."""
     figures = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(residual_module, "save", lambda figure, *_: figures.append(figure) or [])
-        residual_module.residual_figure(name, source, tmp_path)
+        patch.setattr(record_figures, "save", lambda figure, *_: figures.append(figure) or [])
+        record_figures.residual_figure(name, source, tmp_path)
     [ax] = figures[0].axes
     left = np.asarray(ax.lines[0].get_ydata(), float)
     assert left.size > 20

@@ -8,7 +8,12 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.inverse_figure import caption_of, draw, inversion_figure, points_of
+from profilefit.report.figures.paper_figures import (
+    draw_inversion,
+    inversion_caption,
+    inversion_figure,
+    inversion_points,
+)
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
@@ -31,7 +36,7 @@ def folder(tmp_path_factory):
 
 
 def test_caption_says_where_the_printed_inverse_is_worst(folder):
-    caption = caption_of(Source(folder))
+    caption = inversion_caption(Source(folder))
     assert "up to 0.07 for α in [0.4, 0.6]" in caption
     assert caption.endswith("0.04 at α = 0.1, 0.083 at α = 0.9")
 
@@ -40,11 +45,11 @@ def test_lines_are_the_records_own_numbers(folder):
     source = Source(folder)
     ax = canvas(2.0).subplots()
     for name in ("liang-inverse-whole", "quantile", "hazard-diffuse"):
-        draw(ax, source, name)
+        draw_inversion(ax, source, name)
     labels = [line.get_label() for line in ax.get_lines()]
     assert labels == ["(19)-(21) as printed", "(19)-(21) regenerated", "rational in −ln(1 − ξ)"]
     np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), [0.04, 0.02, 0.07, 0.05, 0.083])
-    alpha, error = points_of(source.fitted("quantile"))
+    alpha, error = inversion_points(source.fitted("quantile"))
     np.testing.assert_array_equal(ax.get_lines()[2].get_xydata(), np.column_stack([alpha, error]))
     assert np.all(error <= 1e-3)
 

@@ -12,7 +12,6 @@ from rich.console import Console
 from profilefit.recipes import catalogue, record
 from profilefit.report.records import converged, known_errors, largest_error, z_score
 from profilefit.report.tables import cells, quality_tables, record_tables
-from profilefit.report.tables.evidence_tables import evidence_tables
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
 FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
@@ -60,7 +59,7 @@ def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
     content = FITS[name]
     lines = rendered([record_tables.constants_table(content)], 100).splitlines()
     headers = lines[2].split()
-    known = known_errors(content["constants"])
+    known = known_errors(content["constants"].values())
     assert lines[1].split() == ["±"] * len(known)
     assert [header for header in headers if header not in ("published", "regenerated", "z")] == list(known.values())
     for constant, values in content["constants"].items():
@@ -179,31 +178,23 @@ def test_brackets_of_units_are_no_markup():
     assert text.count("[bold]not bold[/bold]") == 2
 
 
-def test_readings_are_shown_best_first_and_any_key_may_be_absent():
-    near = {
-        "equation": "(8)",
-        "choices": "near",
-        "constants": {"p": 5.63},
-        "published": {"p": 5.67},
-        "verdict": "reproduced",
-        "curve_distance": 0.004,
-        "constant_distance": 0.008,
-        "evidence": "seen",
-    }
-    far = {"equation": "(8)", "choices": "far", "curve_distance": 0.5}
+def test_readings_are_shown_best_first():
+    far = {"equation": "(8)", "choices": "far", "constants": {}, "published": {}, "verdict": "no"}
+    far |= {"curve_distance": 0.5, "constant_distance": None}
+    near = {**far, "choices": "near", "constants": {"p": 5.63}, "published": {"p": 5.67}, "curve_distance": 0.004}
     rows = [
         {"material": "apple", "channel": "red", "model": "normalized diffusion", "mse_over_printed": [1.0, 0.9, 1.02]},
-        {"material": "apple", "channel": "red", "model": "paper", "ratio": 0.7},
-        {"material": "apple", "channel": "blue", "model": "normalized diffusion", "ratio": 9.0},
+        {"material": "apple", "channel": "red", "model": "paper", "mse_over_printed": [0.7]},
+        {"material": "apple", "channel": "blue", "model": "normalized diffusion", "mse_over_printed": [9.0]},
     ]
-    text = rendered(evidence_tables({"readings": [far, near], "table1": rows}), 100)
+    text = rendered(record_tables.evidence_tables({"readings": [far, near], "table1": rows}), 100)
     assert text.index("near") < text.index("far")
     assert "p 5.63 (printed 5.67)" in text
     assert "0.4 %" in text
     assert "0.700" in text
     # The channel is chosen by the other law's error, never by this one's.
     assert "blue" not in text
-    assert "no readings" in rendered(evidence_tables({}), 100)
+    assert "no readings" in rendered(record_tables.evidence_tables({"readings": [], "table1": []}), 100)
 
 
 @pytest.mark.parametrize(
@@ -271,3 +262,36 @@ def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
     assert any(line.startswith("Quality") and line.rstrip().endswith(ends) for line in lines)
     worst = quality_tables.worst_measures(content)[keys[0]]["regenerated"]
     assert worst == max(*found[keys[0]], *np.atleast_1d(content["quality"]["regenerated"][keys[0]]))
+
+
+def test_powers_of_ten_are_even_steps():
+    values = [10.0**power for power in range(8)]
+    assert cells.spark(values, cells.span([values])) == cells.BLOCKS
+    assert cells.spark(values[::-1], cells.span([values])) == cells.BLOCKS[::-1]
+
+
+def test_one_scale_for_several_rows():
+    good, bad = [1e-4, 2e-4], [0.5, 1.0]
+    ends = cells.span([good, bad])
+    assert ends == (1e-4, 1.0)
+    assert max(cells.spark(good, ends)) < min(cells.spark(bad, ends))
+    assert cells.spark([1e-9, 9.0], ends) == cells.BLOCKS[0] + cells.BLOCKS[-1], "beyond the ends it stays at them"
+
+
+def test_of_many_values_the_largest_of_each_stretch_is_shown():
+    values = [1.0] * 24
+    values[13] = 1e7
+    shown = cells.spark(values, cells.span([values]), 12)
+    assert shown == cells.BLOCKS[0] * 6 + cells.BLOCKS[-1] + cells.BLOCKS[0] * 5
+    assert len(cells.spark(values[:5], cells.span([values]), 12)) == 5
+
+
+@pytest.mark.parametrize("nothing", [None, math.nan, math.inf, 0.0, -1.0])
+def test_what_is_no_positive_number_is_a_gap(nothing):
+    assert cells.spark([1.0, nothing, 10.0], (1.0, 10.0)) == cells.BLOCKS[0] + " " + cells.BLOCKS[-1]
+    assert cells.spark([nothing, nothing], cells.span([[nothing, nothing]])) == "  "
+
+
+def test_equal_numbers_have_no_scale():
+    assert cells.spark([2.0, 2.0], cells.span([[2.0, 2.0]])) == cells.BLOCKS[0] * 2
+    assert cells.spark([], None) == ""

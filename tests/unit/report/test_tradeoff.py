@@ -1,25 +1,25 @@
-"""Charts of speed against accuracy: labels that keep off each other, marks that say where a point stands."""
+"""Speed against accuracy: charts with labels that keep off each other, CSV that says what its numbers mean."""
+
+import csv
+import io
+import re
 
 import matplotlib
 import numpy as np
 import pytest
-from rich.console import Console
 
+from profilefit.errors import InputError
 from profilefit.report.figures import tradeoff_figure as figure
 from profilefit.report.figures.canvas import canvas
 from profilefit.report.figures.tradeoff_figure import Label, box_of, place_labels, renderer_of
-from profilefit.report.tables.tradeoff_tables import tradeoff_tables
+from profilefit.report.tables import tradeoff_tables
+from profilefit.studies.tradeoff import parts, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
+from tests.unit.report.test_tables import rendered
 
 NUMBERS = {"a": (1.0, 0.5), "b": (2.0, 0.1), "normalized diffusion": (2.1, 0.11), "slow": (40.0, 0.8)}
 POINTS = tuple(
-    Point(
-        "p",
-        name,
-        "1e5 photons" if name == "a" else "",
-        WithSpread(x, 0.9 * x, 1.1 * x),
-        WithSpread(y, 0.8 * y, 1.2 * y),
-    )
+    Point("p", name, "1e5 photons" if x == 1.0 else "", *(WithSpread(v, 0.9 * v, 1.1 * v) for v in (x, y)))
     for name, (x, y) in NUMBERS.items()
 )
 PART = TradeoffPart("demo", "Demo", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",))
@@ -80,11 +80,62 @@ def test_figure_and_table(tmp_path):
     written = figure.tradeoff_figure(PART, "a chip", tmp_path)
     assert [path.name for path in written] == ["tradeoff-demo.png", "tradeoff-demo.svg"]
     assert all(path.stat().st_size > 5000 for path in written)
-    console = Console(width=100, record=True, file=open(tmp_path / "printed", "w"))  # noqa: SIM115
-    for table in tradeoff_tables(PART):
-        console.print(table)
-    console.file.close()
-    lines = console.export_text().splitlines()
+    lines = rendered(tradeoff_tables.tradeoff_tables(PART), 100).splitlines()
     assert lines[0] == "demo, R_d of p"
     assert any(line.split()[:1] == ["slow"] and not line.rstrip().endswith("front") for line in lines)
     assert lines[-1].strip() == "left out: three"
+
+
+MEASURED = (
+    Point(
+        "p", "one", "few", WithSpread(1.0, 0.9, 1.1), WithSpread(0.5, 0.4, 0.6), WithSpread.exactly(0.7), {"photons": 3}
+    ),
+    Point("p", 'two, "quoted"', "", WithSpread.exactly(2.0), WithSpread.exactly(1 / 3), None, {"stated": 0.25}),
+)
+TOLD = TradeoffPart("demo", "A title", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", MEASURED),), ("left out",))
+
+
+def test_csv_reads_back_with_its_comments():
+    text = tradeoff_tables.as_csv(TOLD, {"processor": "a chip"})
+    comments = [line for line in text.splitlines() if line.startswith("#")]
+    assert comments[:2] == ["# demo: A title", "# processor: a chip"]
+    assert "# panel p: R_d of p; cost: time [s]; error, worst: error [-]" in comments
+    assert comments[-1] == "# left out"
+    rows = list(csv.DictReader(io.StringIO("\n".join(text.splitlines()[len(comments) :]))))
+    assert [row["method"] for row in rows] == [point.method for point in MEASURED]
+    assert [float(rows[0][key]) for key in ("cost_low", "cost", "cost_high", "worst")] == [0.9, 1.0, 1.1, 0.7]
+    assert (rows[0]["photons"], rows[0]["stated"], rows[1]["photons"], rows[1]["stated"]) == ("3", "", "", "0.25")
+    assert (rows[1]["worst"], rows[1]["error"]) == ("", "0.333333")
+    assert [row["standing"] for row in rows] == ["front", "front"]
+
+
+def test_every_column_is_documented():
+    columns = [
+        *("panel", "method", "label", "cost", "error", "worst", "standing", "times_yardstick", "constants"),
+        *("functions", "setup_nanoseconds", "ks", "worst_ks", "photons", "first_call", "stated", "samples"),
+        *("standardised", "light_seconds", "seeds", "converged"),
+    ]
+    told = re.findall(r"\w+", tradeoff_tables.__doc__)
+    assert [column for column in columns if column not in told] == []
+
+
+def test_json_has_the_same():
+    numbers = tradeoff_tables.as_numbers(TOLD)
+    point = numbers["panels"]["p"]["points"][0]
+    assert point["cost"] == {"value": 1.0, "low": 0.9, "high": 1.1}
+    assert point["standing"] == "front"
+    assert numbers["notes"] == ["left out"]
+
+
+def test_machine_is_named():
+    facts = stopwatch.facts(pinned=True)
+    assert facts["processor"]
+    assert facts["cores"].endswith("pinned to one")
+    assert all(version in stopwatch.caption(facts) for version in (facts["jax"], facts["processor"]))
+
+
+def test_parts_come_in_their_own_order():
+    assert parts.chosen([]) == ["truth", "laws", "samplers", "fits"]
+    assert parts.chosen(["fits", "truth", "fits"]) == ["truth", "fits"]
+    with pytest.raises(InputError, match="part must be one of truth, laws, samplers, fits, sea, fur, got 'light'"):
+        parts.chosen(["laws", "light"])

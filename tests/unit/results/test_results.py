@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium, simulate_orders
-from mcml_sim.results.tally import Tally
-from mcml_sim.results.tally_file import read_results, write_results
+from mcml_sim.results.tally import Tally, read_results, write_results
 from mcml_sim.runs.simulation import simulate
 from mcml_sim.tracing.deposits import Deposits, shapes
 

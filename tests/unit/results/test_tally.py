@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mcml_sim.results.estimate import Estimate, covariance_factor, estimate
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.order_bins import Counts
 
 
 def photon_by_photon(counts, weights, photons):

@@ -13,11 +13,11 @@ import pytest
 
 from mcml_sim import Grid, InputError
 from mcml_sim.errors import ClusterError
-from mcml_sim.runs import cluster
+from mcml_sim.runs import batches as cluster
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing import orders_batch
-from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.order_bins import Counts
 
 GRID = Grid(0.5, 8)
 BATCH, BATCHES = 1000, 24

@@ -52,10 +52,7 @@ def start(tmp_path):
 
         def start(*store):
             child = subprocess.Popen(
-                [sys.executable, "-c", CHILD, *store],
-                env=os.environ | cache,
-                stdout=subprocess.PIPE,
-                text=True,
+                [sys.executable, "-c", CHILD, *store], env=os.environ | cache, stdout=subprocess.PIPE, text=True
             )
             children.enter_context(child)
             children.callback(child.kill)

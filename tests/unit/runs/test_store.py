@@ -13,8 +13,8 @@ import pytest
 from mcml_sim import Grid, StoreError, simulate_orders
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
-from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.deposits import Deposits, shapes
+from mcml_sim.tracing.order_bins import Counts
 
 GRID = Grid(0.5, 3)
 MADE_BY = {"seed": 1, "grid": "abc"}

@@ -6,16 +6,37 @@ from dataclasses import replace
 
 import pytest
 
-from profilefit.errors import ShaderError
+from profilefit.errors import InputError, ShaderError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.diffusion import BeamDiffusion
 from profilefit.recipes import catalogue
+from profilefit.scenes.fur.law import strand_text
+from profilefit.scenes.sea.source import blur_text, segment_text
 from profilefit.shader import emit
 from profilefit.shader.context import program
+from profilefit.shader.phase_text import phase_text
+from tests.unit.shader.test_phase_text import SEA
+from tests.unit.shader.test_sea_file import BLURS, C
 
 FITS = catalogue.fits_folder()
 ALL = [*catalogue.profile_laws(FITS), *catalogue.albedo_laws(FITS)]
 LAWS = {emit.prefix(one.law): one.law for one in ALL if not isinstance(one.law, BeamDiffusion)}
+# Texts that are no law's, and calls of all their functions.
+OTHERS = {
+    "fur": (
+        strand_text,
+        "fur_shadow(u.x, u.y) + fur_shared(u.x, u.y, u.z, u.x) + fur_visibility(u.x, u.y, u.z) + fur_slice(u.x, u.y)"
+        " + fur_swept(u.x, u.y, u.z, u.x, u.y, u.z)",
+    ),
+    "segment": (segment_text, "sea_segment_integral(u.x, u.y, u.z, u.x, u.y) + sea_segment_between(u.x, u.y, u.z)"),
+    "blur": (
+        lambda lang: blur_text(BLURS, C, lang),
+        "sea_blur_unscattered(u.x) + sea_blur_weight1(u.x) + sea_blur_sigma3(u.x) + sea_blur_share(u.y, u.x)"
+        " + sea_blur_mtf(u.z, u.x)",
+    ),
+    "phase": (lambda lang: phase_text(SEA, lang), "phase_pdf(u.x) + phase_sample(u.y)"),
+}
+ALL_TEXTS = (*LAWS, *OTHERS)
 HEADS = {"glsl": "#version 330\n", "glsl-es": "#version 300 es\nprecision highp float;\n"}
 VERTEX = "void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
 MAIN = "uniform vec3 u;\nout vec4 made;\nvoid main() {{ made = vec4({calls}); }}\n"
@@ -24,12 +45,16 @@ HLSL_COMPILER = "glslangValidator"  # Debian's glslang-tools
 
 
 def text(name, lang="glsl"):
+    if name in OTHERS:
+        return OTHERS[name][0](lang)
     law = LAWS[name]
     return emit.map_text(law, lang) if isinstance(law, AlbedoLaw) else emit.law_text(law, lang)
 
 
 def calls(name):
     """Every function that the contract of the texts names."""
+    if name in OTHERS:
+        return OTHERS[name][1]
     if isinstance(LAWS[name], AlbedoLaw):
         return f"{name}_alpha(u.x) + {name}_map_reflectance(u.y)"
     lengths = [f"{name}_{one}(u.x, u.y, u.z)" for one in ("profile", "cdf", "sample", "pdf")]
@@ -39,9 +64,9 @@ def calls(name):
 
 
 @pytest.mark.parametrize("head", HEADS)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", ALL_TEXTS)
 def test_glsl(context, name, head):
-    fragment = HEADS[head] + text(name) + MAIN.format(calls=calls(name))
+    fragment = HEADS[head] + 2 * text(name) + MAIN.format(calls=calls(name))
     program(context, name, fragment, HEADS[head] + VERTEX).release()
 
 
@@ -67,6 +92,12 @@ def require_hlsl(folder, source, calls):
     assert ran.returncode == 0, ran.stdout
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", ALL_TEXTS)
 def test_hlsl(tmp_path, name):
     require_hlsl(tmp_path, 2 * text(name, "hlsl"), calls(name))
+
+
+@pytest.mark.parametrize("name", ["hazard", *OTHERS])
+def test_an_unknown_language_is_named(name):
+    with pytest.raises(InputError, match="lang must be one of glsl, hlsl, python, got 'wgsl'"):
+        text(name, "wgsl")

@@ -1,4 +1,4 @@
-"""From a law to its text: constants, prefixes, repeated blocks, and laws that have none."""
+"""From a law to its text, and to numpy and HLSL: constants, prefixes, blocks; laws without one, lines that are none."""
 
 import re
 from dataclasses import replace
@@ -107,3 +107,78 @@ def test_the_map_that_normalises_is_the_rational_one():
     other = catalogue.albedo_law("chiang", "published")
     with pytest.raises(InputError, match="albedo of Burley must be a Rational map to become a shader, got Chiang"):
         emit.law_text(replace(BURLEY, albedo=other))
+
+
+TEXT = """
+#ifndef P_STEPS
+#define P_STEPS 3 // of doubling
+#endif
+const float P_scale = 1e-2; // a line
+struct P_Shape {
+    float linear; // [-]
+    float other;
+};
+
+// what it does
+P_Shape P_shape(float alpha) {
+    P_Shape s;
+    s.linear = P_scale * alpha;
+    s.other = max(alpha,
+        0.5);
+    return s;
+}
+
+float P_value(float x, P_Shape s) {
+    float y = x;
+    bool small = x < 1.0;
+    for (int i = 0; i < P_STEPS; ++i) {
+        float twice = 2.0 * y;
+        y = twice;
+    }
+    y += s.linear;
+    return PF_SELECT(small, y, -exp(s.other)); // a choice
+}
+"""
+
+
+def test_numpy_computes_what_the_text_says():
+    names = {}
+    exec(emit.translated(TEXT, "python"), names)
+    x = np.array([0.5, 3.0])
+    given = x.copy()
+    got = names["P_value"](x, names["P_shape"](np.array(0.25)))
+    np.testing.assert_allclose(got, [4.0 + 0.0025, -np.exp(0.5)], rtol=1e-15)
+    np.testing.assert_array_equal(x, given)
+
+
+def test_hlsl_has_its_own_constants_and_keeps_off_its_own_words():
+    lines = emit.translated(TEXT, "hlsl").splitlines()
+    assert "static const float P_scale = 1e-2; // a line" in lines
+    assert "    s.linear_ = P_scale * alpha;" in lines
+    assert emit.translated(TEXT, "glsl") == TEXT
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("if (x > 0.0) {", "if"),
+        ("while (x > 0.0) {", "while"),
+        ("for (int i = 1; i < 4; ++i) {", "for"),
+        ("float y = x > 0.0 ? 1.0 : 2.0;", "'?'"),
+        ("bool y = x > 0.0 && x < 1.0;", "'&&'"),
+        ("float y = 1 / 2.0;", "'1'"),
+        ("float y = 2.0f;", "'0f'"),
+        ("float y = mix(x, x, 0.5);", "'mix'"),
+        ("vec2 y = vec2(x, x);", "'vec2'"),
+        ("y++;", "y\\+\\+"),
+        ("discard;", "discard"),
+    ],
+)
+def test_a_line_that_is_not_common_is_an_error(line, named):
+    with pytest.raises(InputError, match=f"what GLSL, HLSL and numpy share.*{named}"):
+        emit.translated(f"float P_f(float x) {{\n    {line}\n}}\n", "python")
+
+
+def test_an_unknown_language_is_an_error():
+    with pytest.raises(InputError, match="lang must be one of glsl, hlsl, python, got 'wgsl'"):
+        emit.translated(TEXT, "wgsl")

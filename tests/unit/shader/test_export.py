@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -15,9 +16,15 @@ import pytest
 from profilefit.errors import InputError, ShippedMap
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import find
+from profilefit.scenes.fur.law import source as fur_source
+from profilefit.scenes.sea.source import export_blur
+from profilefit.scenes.sea.source import source as sea_source
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.law_file import LANGUAGES, TARGETS, commented, export
+from profilefit.shader.phase_text import export_phase
+from tests.unit.shader.test_phase_text import RECORD
+from tests.unit.shader.test_sea_file import BLURS, DEPTH, C
 
 FITS = catalogue.fits_folder()
 MAIN = """
@@ -225,9 +232,27 @@ def test_the_clamps_are_those_that_it_states(name):
         assert cdf(0.5, 0.0, 1.0) == cdf(0.5, 1e-6, 1.0) != cdf(0.5, 1e-3, 1.0)
 
 
+EXPORTERS = {
+    "law": partial(export, find("hazard", FITS), FITS),
+    "phase": partial(export_phase, RECORD),
+    "segment": partial(sea_source, "sea-segment"),
+    "blur": partial(export_blur, BLURS, C, DEPTH),
+    "fur": partial(fur_source, "fur"),
+}
+
+
+@pytest.mark.parametrize("exporter", EXPORTERS)
+def test_what_no_file_can_be_is_refused_by_name(exporter):
+    for given, message in (
+        (("wgsl",), "lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
+        (("json", "fog"), "name must be left out where lang is json, .*, got 'fog'"),
+        (("glsl", "gl_fog"), "name must be letters, digits"),
+    ):
+        with pytest.raises(InputError, match=message):
+            EXPORTERS[exporter](*given)
+
+
 def test_what_cannot_be_exported_is_named():
-    with pytest.raises(InputError, match=r"lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"):
-        export(find("hazard", FITS), FITS, "wgsl")
     with pytest.raises(InputError, match=r"map or record, got 'hazzard'; did you mean hazard"):
         find("hazzard", FITS)
     with pytest.raises(InputError, match=r"record 'reproduction' holds no law of a fit that converged"):

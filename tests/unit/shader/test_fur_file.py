@@ -6,21 +6,15 @@ import numpy as np
 import pytest
 
 from benchmarks.fur_feet import shared_shadow
-from profilefit.errors import InputError
 from profilefit.scenes.fur import law, truth
 from profilefit.scenes.fur.law import source, strand_text
 from profilefit.shader.check.shader_law import _Pass
-from profilefit.shader.context import program
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.cells import RoundedText
-from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
+from tests.unit.shader.test_phase_text import functions
 
 TEXT = strand_text("python", "law")
 SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
-CALLS = (
-    "fur_shadow(u.x, u.y) + fur_shared(u.x, u.y, u.z, u.x) + fur_visibility(u.x, u.y, u.z) + fur_slice(u.x, u.y)"
-    " + fur_swept(u.x, u.y, u.z, u.x, u.y, u.z)"
-)
 DRAW = """#version 330
 {text}
 uniform sampler2D arguments;
@@ -39,12 +33,6 @@ STEPS = np.geomspace(1e-8, 1e-6, 100)
 AROUND = 1.0 + np.concatenate([-STEPS, np.linspace(-1e-6, 1e-6, 1001), STEPS])  # the root's edge, where acos fails
 ANGLES = np.radians(np.concatenate([np.linspace(0.0, 89.0, 90), [89.9]]))
 SIZES = np.array([0.0, 0.02, -0.02, 0.05, -0.05, 1.0, -1.0, 0.5, 1e-3, 60.0])  # of which degenerate rays are made
-
-
-def functions(text):
-    names: dict = {}
-    exec(text, names)
-    return names
 
 
 def rounded(*values):
@@ -244,16 +232,6 @@ def test_degenerate_rays_on_opengl(context, r):
     require_roots(found, given)
 
 
-@pytest.mark.parametrize("head", HEADS)
-def test_glsl(context, head):
-    fragment = HEADS[head] + 2 * strand_text("glsl") + MAIN.format(calls=CALLS)
-    program(context, "fur", fragment, HEADS[head] + VERTEX).release()
-
-
-def test_hlsl(tmp_path):
-    require_hlsl(tmp_path, 2 * strand_text("hlsl"), CALLS)
-
-
 @pytest.mark.parametrize("lang", LANGUAGES)
 def test_whole_files(lang):
     text = source("fur", lang)
@@ -274,17 +252,3 @@ def test_whole_files(lang):
     assert "fur_" not in source("fur", lang, "hair")
     if lang == "python":
         assert functions(text)["fur_shadow"](2.0, 0.0) == pytest.approx(4.0 * np.pi)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: strand_text("wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: source("fur", "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: source("fur", "json", "hair"), "name must be left out where lang is json, .*, got 'hair'"),
-        (lambda: source("fur", "glsl", "gl_hair"), "name must be letters, digits"),
-    ],
-)
-def test_refused(make, message):
-    with pytest.raises(InputError, match=message):
-        make()

@@ -5,16 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit.laws.beam_diffusion import BeamDiffusion
 from profilefit.laws.burley import BurleyDiffuseMfp
-from profilefit.laws.diffusion import DiffusionLaw
+from profilefit.laws.diffusion import BeamDiffusion, DiffusionLaw
 from profilefit.laws.gaussians import law_class
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
-from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.printed_maps import LiangAlbedo
 from profilefit.laws.quantile import Quantile
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
+from profilefit.studies.stability.cells import Rounded
 
 FITS = catalogue.fits_folder()
 LAWS = {
@@ -32,23 +32,11 @@ X_32 = np.concatenate([[0.0, 1e-30, 1e-10], np.geomspace(1e-6, 200.0, 150), [1e3
 XI_32 = np.concatenate([[0.0, 1e-30], XI, [1.0 - 6e-8, 1.0]])
 
 
-class Rounded:
-    """numpy with every result in float32."""
-
-    def __getattr__(self, name):
-        function = getattr(np, name)
-
-        def call(*arguments):
-            arrays = [np.asarray(one) for one in arguments]
-            return function(*(one if one.dtype == bool else one.astype(np.float32) for one in arrays))
-
-        return call
-
-
 class CoarseLog(Rounded):
-    """The same with a logarithm that is off by `most` next to 0: OpenGL allows 2^-21, NVIDIA's takes 2^-22."""
+    """numpy in float32, whose logarithm is off by `most` next to 0: OpenGL allows 2^-21, NVIDIA's takes 2^-22."""
 
     def __init__(self, most):
+        super().__init__(np.float32)
         self.most = most
 
     def log(self, x):
@@ -58,7 +46,7 @@ class CoarseLog(Rounded):
 
 def twin(text, rounded=False, coarse=0.0):
     """The functions of a text in Python, by name."""
-    names = {"np": CoarseLog(coarse) if coarse else Rounded()} if rounded else {}
+    names = {"np": CoarseLog(coarse) if coarse else Rounded(np.float32)} if rounded else {}
     exec(text.replace("import numpy as np\n", "") if rounded else text, names)
     return names
 

@@ -8,10 +8,9 @@ import pytest
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, from_table
 from profilefit.errors import InputError
 from profilefit.recipes.kinds.phase import named
-from profilefit.shader.context import program
+from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.phase_text import export_phase, phase_text
-from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 RECORD = named("petzold")
 SEA = RECORD.phase()
@@ -50,8 +49,6 @@ def test_float64(phase):
 
 @PHASES
 def test_float32_on_opengl(context, phase):
-    from profilefit.shader.check.shader_law import _Pass
-
     run = _Pass(context, "phase", DRAW.format(text=phase_text(phase)), "f4")
     density, drawn, *_ = run(OFF, XI, 0.0, 0.0)
     off = OFF.astype(np.float32).astype(float)
@@ -59,16 +56,6 @@ def test_float32_on_opengl(context, phase):
     np.testing.assert_allclose(density, exact["phase_pdf"](off), rtol=3e-5)
     share = 1 - phase.invert(1 - np.sort(drawn))
     np.testing.assert_allclose(share, XI, atol=1.5 / XI.size + 1e-6)
-
-
-@pytest.mark.parametrize("head", HEADS)
-def test_glsl(context, head):
-    calls = "phase_pdf(u.x) + phase_sample(u.y)"
-    program(context, "phase", HEADS[head] + phase_text(SEA) + MAIN.format(calls=calls), HEADS[head] + VERTEX).release()
-
-
-def test_hlsl(tmp_path):
-    require_hlsl(tmp_path, phase_text(SEA, "hlsl"), "phase_pdf(u.x) + phase_sample(u.y)")
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)
@@ -94,10 +81,6 @@ def test_a_whole_file(lang):
             "phase must be terms of Henyey and Greenstein to become a shader",
         ),
         (lambda: phase_text(Mixture((0.2,) * 5, (SEA.phases[0],) * 5)), "at most 4 terms to become a shader, got 5"),
-        (lambda: phase_text(SEA, "wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: export_phase(RECORD, "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: export_phase(RECORD, "json", "sea"), "name must be left out where lang is json"),
-        (lambda: export_phase(RECORD, "glsl", "gl_sea"), "name must be letters, digits"),
     ],
 )
 def test_refused(make, message):

@@ -9,26 +9,12 @@ from profilefit.errors import InputError
 from profilefit.scenes.sea import law
 from profilefit.scenes.sea.source import blur_text, export_blur, segment_text, source
 from profilefit.shader.check.shader_law import _Pass
-from profilefit.shader.context import program
 from profilefit.shader.law_file import LANGUAGES
-from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
+from tests.unit.shader.test_phase_text import functions
 
 LOBES = ((0.7, 0.95), (0.3, 0.6))
 C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
 BLURS = [law.water_gaussians(omega, c * DEPTH, LOBES, 3) for omega, c in zip(OMEGA, C, strict=True)]
-TEXTS = {
-    "segment": lambda lang: segment_text(lang),
-    "blur": lambda lang: blur_text(BLURS, C, lang),
-}
-CALLS = {
-    "segment": "sea_segment_integral(u.x, u.y, u.z, u.x, u.y) + sea_segment_between(u.x, u.y, u.z)",
-    "blur": " + ".join(
-        (
-            *("sea_blur_unscattered(u.x)", "sea_blur_weight1(u.x)", "sea_blur_sigma3(u.x)"),
-            *("sea_blur_share(u.y, u.x)", "sea_blur_mtf(u.z, u.x)"),
-        )
-    ),
-}
 DRAW = """#version 330
 {text}
 uniform sampler2D arguments;
@@ -39,12 +25,6 @@ void main() {{
 }}
 """
 WAY = np.append(0.0, np.geomspace(1e-4, 1e3, 4095))  # [m]
-
-
-def functions(text):
-    names: dict = {}
-    exec(text, names)
-    return names
 
 
 def test_the_segment_in_float64():
@@ -70,24 +50,12 @@ def test_the_blur_in_float64(channel):
 
 
 def test_in_float32_on_opengl(context):
-    text = "".join(one("glsl") for one in TEXTS.values())
+    text = segment_text("glsl") + blur_text(BLURS, C, "glsl")
     m = np.linspace(-1.0, 1.0, WAY.size).astype(np.float32).astype(float)
     share, mtf, segment, _ = _Pass(context, "sea", DRAW.format(text=text), "f4")(WAY, WAY, m, 0.0)
     np.testing.assert_allclose(share, BLURS[2].share(C[2] * WAY), rtol=3e-6)
     np.testing.assert_allclose(mtf, BLURS[1].mtf(WAY / C[1]), rtol=3e-6)
     np.testing.assert_allclose(segment, law.segment_integral(0.4, 1.0, 0.5, m, 3.0), rtol=3e-6)
-
-
-@pytest.mark.parametrize("head", HEADS)
-@pytest.mark.parametrize("which", TEXTS)
-def test_glsl(context, which, head):
-    fragment = HEADS[head] + 2 * TEXTS[which]("glsl") + MAIN.format(calls=CALLS[which])
-    program(context, which, fragment, HEADS[head] + VERTEX).release()
-
-
-@pytest.mark.parametrize("which", TEXTS)
-def test_hlsl(tmp_path, which):
-    require_hlsl(tmp_path, TEXTS[which]("hlsl"), CALLS[which])
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)
@@ -110,11 +78,6 @@ def test_whole_files(lang):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: segment_text("wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
-        (lambda: source("sea-segment", "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
-        (lambda: source("sea-segment", "json", "fog"), "name must be left out where lang is json"),
-        (lambda: export_blur(BLURS, C, DEPTH, "json", "fog"), "name must be left out where lang is json"),
-        (lambda: source("sea-segment", "glsl", "gl_fog"), "name must be letters, digits"),
         (lambda: blur_text(BLURS[:2], C), "blurs must be three of one number of Gaussians, .*, got 3, 3"),
         (lambda: blur_text([], C), "blurs must be three .*, got none"),
         (

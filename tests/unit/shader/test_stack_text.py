@@ -19,6 +19,7 @@ from profilefit.shader.emit import law_text
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 from tests.fixtures import slow
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
+from tests.unit.shader.test_phase_text import functions
 
 NAMES = StackLaw.constant_names()
 # Of each channel alpha and mfp of its layers, and near what fits of heart muscle and of skin give for its interfaces.
@@ -84,14 +85,8 @@ QUICK = ("two layers",)
 every = pytest.mark.parametrize("label", [*QUICK, *slow(*(one for one in LAWS if one not in QUICK))])
 
 
-def twin(text):
-    names = {}
-    exec(text, names)
-    return names
-
-
 def twin_of(laws):
-    return twin(stack_text(laws, "python", "s"))
+    return functions(stack_text(laws, "python", "s"))
 
 
 def mismatch(names, law, channel):
@@ -296,7 +291,7 @@ def directions():
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_light_scattered_once(context, n, g, count):
     three, (cos_in, cos_out, turned) = media(count, n, g), directions()
-    names = twin(single_text(three, "python", "s"))
+    names = functions(single_text(three, "python", "s"))
     found = _Pass(context, "once", ONCE.format(text=single_text(three, name="s")), "f4")
     for thickness in np.float32(THICKNESS).astype(float):
         by_opengl = found(cos_in, cos_out, turned, thickness)
@@ -366,8 +361,7 @@ SUMS = [
 
 
 def test_sums_of_gaussians_are_the_laws():
-    names = {}
-    exec(compile(gaussians_text(SUMS, "python", "sums"), "sums.py", "exec"), names)
+    names = functions(gaussians_text(SUMS, "python", "sums"))
     x, xi = np.geomspace(1e-3, 20.0, 50), np.linspace(0.0, 0.999, 50)
     for channel, law in enumerate(SUMS):
         shape = names["sums_shape"](float(channel))

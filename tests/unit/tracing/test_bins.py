@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid
-from mcml_sim.tracing import bins
+from mcml_sim.tracing import deposits as bins
 
 VALUES = np.random.default_rng(0).exponential(2, 10**5).astype(np.float32)
 

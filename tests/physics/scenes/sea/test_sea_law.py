@@ -23,8 +23,7 @@ from profilefit.scenes.sea.law import (
 )
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import full_screen, program
-from profilefit.shader.emit import read_text
-from profilefit.shader.languages import translated
+from profilefit.shader.emit import read_text, translated
 
 ONE = ((1.0, 0.924),)
 TWO = ((0.995, 0.935), (0.005, -0.41))

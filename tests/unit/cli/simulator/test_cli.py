@@ -1,23 +1,25 @@
 """mcml-sim as a user meets it: what it writes and prints, what it refuses, and in how many lines."""
 
 import json
+import math
 import os
 import re
-import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mcml_sim.cli import app, printed
-from mcml_sim.cli.run import FIRST_LOOKS, QUANTITIES
+from mcml_sim import Estimate, Layer, Medium
+from mcml_sim.cli import app
+from mcml_sim.cli.app import FIRST_LOOKS, QUANTITIES, TOTALS
 from mcml_sim.errors import ClusterError
 from mcml_sim.files.version import __version__
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import half_space
 from mcml_sim.results.mci import read_mci
-from mcml_sim.results.tally import Precision, quantities
-from mcml_sim.results.tally_file import read_results
+from mcml_sim.results.tally import Precision, Results, quantities, read_results
 from mcml_sim.runs import input_runs
 from mcml_sim.runs.batches import FIRST_LOOK
 from mcml_sim.runs.simulation import batch_photons, simulate
@@ -34,8 +36,6 @@ RUN = """{name} A
 1.4 {mu_a} 90 0.5 0.05
 1.0
 """
-
-
 REMEDY = "use --out elsewhere, or delete it if that run is over\n"
 KEPT = "stopped; the finished batches are kept, the same command resumes\n"
 
@@ -46,18 +46,8 @@ def runs(*rows: tuple[str, int, float]) -> str:
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    """Run `mcml-sim WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["mcml-sim", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            app.main()
-        printed = capsys.readouterr()
-        return int(stop.value.code or 0), printed.out, printed.err
-
-    return run
+def command(program):
+    return partial(program, "mcml-sim")
 
 
 @pytest.fixture
@@ -78,9 +68,8 @@ def names(folder: Path = Path()) -> set[str]:
 
 
 @pytest.mark.slow
-def test_runs_everything_and_tells_it_with_errors(command, mci):
-    status, out, err = command("run", mci)
-    assert (status, err) == (0, "")
+def test_runs_everything_and_tells_it_with_errors(done, mci):
+    out = done("run", mci)
     assert names() == {"two.mci", "first.mco", "first.npz", "second.mco", "second.npz"}
     told = out.split("run 2 of 2: second.mco")
     assert told[0].startswith("run 1 of 2: first.mco\n  2000 photons, seed 0, ")
@@ -235,7 +224,7 @@ def test_a_link_named_as_output_is_followed(command, mci):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("--resume",)])
-def test_the_same_command_resumes(command, mci, monkeypatch, more):
+def test_the_same_command_resumes(command, done, mci, monkeypatch, more):
     """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
     photons = 2 * layered_batch.BATCH_PHOTONS + 77
     words = ("run", mci, "--photons", photons)
@@ -257,8 +246,7 @@ def test_the_same_command_resumes(command, mci, monkeypatch, more):
     assert {name for name in names() if not name.startswith("at-once")} == kept | {"two.mci"}
 
     monkeypatch.setattr(layered_batch, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
-    status, out, err = command(*words, *more)
-    assert (status, err) == (0, "")
+    out = done(*words, *more)
     assert sorted(traced) == [0, 0, 1, 1, 2, 2]
     assert re.search(rf"run 1 of 2: first.mco\n  {photons} photons, seed 0, finished before\n  specular", out)
     assert re.search(rf"run 2 of 2: second.mco\n  {photons} photons, seed 0, [0-9.]+ s.*, resumed\n  specular", out)
@@ -279,23 +267,19 @@ def test_batches_of_another_run_are_not_mixed_in(command, mci):
     assert command(*words)[0] == 0
     Path("first.npz").unlink()  # else they are but what a finished run left
     status, _, err = command(*words, "--seed", 5)
-    assert status == 2
-    assert err == "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; " + REMEDY
+    assert (status, err) == (2, "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; " + REMEDY)
 
 
 @pytest.mark.parametrize("words", [("--seed", 5), ("--photons", 2500), ("--precision", 1e-4), ()])
-def test_a_precision_that_was_not_reached_blocks_no_run(command, mci, words):
+def test_a_precision_that_was_not_reached_blocks_no_run(command, done, mci, words):
     """Its photons wait for a run with more of them, until another one replaces its results."""
     mci.write_text(runs(("one.mco", 2000, 10)))
     assert command("run", mci, "--precision", 1e-4)[0] == 0
     assert Path("one.photons").is_dir()
-    status, _, err = command("run", mci, *words)
-    assert (status, err) == (0, "")
-    status, _, err = command("run", mci, "--precision", 1e-4, "--seed", 7)
-    assert (status, err) == (0, "")
+    done("run", mci, *words)
+    done("run", mci, "--precision", 1e-4, "--seed", 7)
     mci.write_text(runs(("one.mco", 2000, 20)))
-    status, out, err = command("run", mci, "--precision", 1e-4)
-    assert (status, err) == (0, "")
+    out = done("run", mci, "--precision", 1e-4)
     assert "finished before" not in out
 
 
@@ -332,9 +316,8 @@ def test_another_runs_store_is_found_before_any_photon(command, mci):
     assert "b/first.mco" not in names()
     Path("c").mkdir()
     Path("c/second.photons").write_text("")
-    status, out, err = command("run", mci, "--out", "c")
-    assert (status, out) == (2, "")
-    assert err == "mcml-sim: cannot use c/second.photons as a store: it is there already, and no folder\n"
+    told = "mcml-sim: cannot use c/second.photons as a store: it is there already, and no folder\n"
+    assert command("run", mci, "--out", "c") == (2, "", told)
 
 
 def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci, monkeypatch):
@@ -461,98 +444,63 @@ def test_a_full_disk_is_one_line_and_nothing_half_written(command, mci, monkeypa
     assert read_results(mci.parent / "first.npz").photons == 2000
 
 
-def lines_of(run: str) -> str:
-    return f"1.0\n1\n{run}"
+LEADS_OUT = "output files must lie in the current folder, or have a name and --out FOLDER, got "
 
 
 @pytest.mark.parametrize(
-    ("content", "words", "said"),
+    ("words", "said"),
     [
-        (None, ("run",), "Missing argument 'file'. .*"),
-        (None, ("run", "none.mci"), "none.mci: expected a file that can be read, got: No such file or directory"),
-        (None, ("run", "two.mci", "--nonsense"), "No such option: --nonsense .*"),
-        (None, ("run", "two.mci", "--photons", "many"), "photons must be a whole number >= 1 .*, got 'many'"),
-        (None, ("run", "two.mci", "--photons", "1e400"), "photons must be a whole number >= 1 .*, got inf"),
-        (None, ("run", "two.mci", "--seed", "0.5"), "seed must be a whole number >= 0, got 0.5"),
+        ("run", "Missing argument 'file'. .*"),
+        ("run none.mci", "none.mci: expected a file that can be read, got: No such file or directory"),
+        ("run two.mci --nonsense", "No such option: --nonsense .*"),
+        ("run two.mci --photons many", "photons must be a whole number >= 1 .*, got 'many'"),
+        ("run two.mci --photons 1e400", "photons must be a whole number >= 1 .*, got inf"),
+        ("run two.mci --seed 0.5", "seed must be a whole number >= 0, got 0.5"),
         (
-            None,
-            ("run", "two.mci", "--workers", "2", "--scheduler", "tcp://here:1"),
+            "run two.mci --workers 2 --scheduler tcp://here:1",
             "workers must be None where a scheduler is given, whose workers they are, got 2",
         ),
-        (None, ("two.mci",), "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
-        (None, ("run", "two.mci", "--photons", "0"), "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
-        (None, ("run", "two.mci", "--seed", "-1"), "seed must be a whole number >= 0, got -1"),
-        (None, ("run", "two.mci", "--workers", "0"), "workers must be a whole number >= 1 and <= 4096, got 0"),
+        ("two.mci", "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
+        ("run two.mci --photons 0", "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
+        ("run two.mci --seed -1", "seed must be a whole number >= 0, got -1"),
+        ("run two.mci --workers 0", "workers must be a whole number >= 1 and <= 4096, got 0"),
+        ("run two.mci --precision 2", r"precision must be a relative standard error in \(0, 1\), got 2.0"),
+        ("run two.mci --precision nan", "precision must be .*, got nan"),
+        ("run two.mci --quantity absorbed", "quantity is what --precision looks at, got 'absorbed' .*"),
         (
-            None,
-            ("run", "two.mci", "--precision", "2"),
-            r"precision must be a relative standard error in \(0, 1\), got 2.0",
-        ),
-        (None, ("run", "two.mci", "--precision", "nan"), "precision must be .*, got nan"),
-        (
-            None,
-            ("run", "two.mci", "--quantity", "absorbed"),
-            "quantity is what --precision looks at, got 'absorbed' .*",
-        ),
-        (
-            None,
-            ("run", "two.mci", "--precision", "0.1", "--quantity", "colour"),
+            "run two.mci --precision 0.1 --quantity colour",
             "quantity must be one of specular_reflectance, .*, got 'colour'",
         ),
-        (None, ("walk", "two.mci"), "No such command 'walk'. .*"),
-        (None, ("run", "two.mci", "--out", "two.mci"), "cannot write into two.mci: .*"),
-        (
-            None,
-            ("run", "two.mci", "--out", "a/folder"),
-            "cannot write a/folder/first.mco: it is a folder",
-        ),
-        (lines_of("x.mco A\nten\n"), ("run", "two.mci"), "two.mci:4: expected the number of photons, .*, got 'ten'"),
-        (
-            runs(("two.mci", 9, 1)),
-            ("run", "two.mci"),
-            "cannot write two.mci for two.mci: it belongs to the input file .*",
-        ),
-        (
-            runs(("x.mco", 9, 1), ("x", 9, 1)),
-            ("run", "two.mci"),
-            "cannot write x.npz for x: it belongs to x.mco",
-        ),
+        ("walk two.mci", "No such command 'walk'. .*"),
+        ("run two.mci --out two.mci", "cannot write into two.mci: .*"),
+        ("run two.mci --out a/folder", "cannot write a/folder/first.mco: it is a folder"),
+    ],
+)
+def test_what_a_user_can_mend_is_one_line(refused, mci, words, said):
+    Path("a/folder/first.mco").mkdir(parents=True)
+    before = names()
+    assert re.fullmatch(f"mcml-sim: {said}\n", refused(words, ""))
+    assert names() == before, "nothing was written"
+
+
+@pytest.mark.parametrize(
+    ("outputs", "more", "said"),
+    [
+        (("x.mco A\nten #",), "", "two.mci:5: expected the number of photons, .*, got 'ten'"),
+        (("two.mci",), "", "cannot write two.mci for two.mci: it belongs to the input file .*"),
+        (("x.mco", "x"), "", "cannot write x.npz for x: it belongs to x.mco"),
+        (("x.mco", "x.photons"), "", "cannot write x.photons for x.photons: it belongs to x.mco"),
+        (("/x/y.mco", "../y.mco"), " --out o", "cannot write o/y.mco for ../y.mco: it belongs to /x/y.mco"),
         *(
-            (
-                runs(("x.mco", 9, 1), (name, 9, 1)),
-                ("run", "two.mci", *words),
-                "output files must lie in the current folder, or have a name and --out FOLDER, got " + re.escape(name),
-            )
-            for name, words in (
-                ("../y.mco", ()),
-                ("/dev/null", ()),
-                ("a/../../y.mco", ()),
-                ("a/../y.mco", ()),
-                ("..", ("--out", "o")),
-                ("a/..", ("--out", "o")),
-                ("/", ("--out", "o")),
-            )
-        ),
-        (
-            runs(("/x/y.mco", 9, 1), ("../y.mco", 9, 1)),
-            ("run", "two.mci", "--out", "o"),
-            "cannot write o/y.mco for ../y.mco: it belongs to /x/y.mco",
-        ),
-        (
-            runs(("x.mco", 9, 1), ("x.photons", 9, 1)),
-            ("run", "two.mci"),
-            "cannot write x.photons for x.photons: it belongs to x.mco",
+            (("x.mco", name), " --out o" if name in ("..", "a/..", "/") else "", LEADS_OUT + re.escape(name))
+            for name in ("../y.mco", "/dev/null", "a/../../y.mco", "a/../y.mco", "..", "a/..", "/")
         ),
     ],
 )
-def test_what_a_user_can_mend_is_one_line(command, mci, content, words, said):
-    Path("a/folder/first.mco").mkdir(parents=True)
+def test_outputs_that_cannot_be_are_one_line(refused, mci, outputs, more, said):
+    mci.write_text(runs(*((name, 9, 1) for name in outputs)))
     before = names()
-    if content is not None:
-        mci.write_text(content)
-    status, out, err = command(*words)
-    assert (status, out) == (2, "")
-    assert re.fullmatch(f"mcml-sim: {said}\n", err), err
+    assert re.fullmatch(f"mcml-sim: {said}\n", refused(f"run two.mci{more}", ""))
     assert names() == before, "nothing was written"
 
 
@@ -573,24 +521,22 @@ def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, m
         raise ClusterError(f"the scheduler at here has gone; {RESUMES}")
 
     monkeypatch.setattr(input_runs, "simulate", gone)
-    status, _, err = command("run", mci)
-    assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command resumes\n")
+    assert command("run", mci)[::2] == (2, "mcml-sim: the scheduler at here has gone; the same command resumes\n")
 
 
-def test_json_is_the_totals_with_their_errors_and_nothing_else(command, mci):
-    status, out, err = command("run", mci, "--json")
-    assert (status, err) == (0, "")
+def test_json_is_the_totals_with_their_errors_and_nothing_else(command, done, mci):
+    out = done("run", mci, "--json")
     told = json.loads(out)["runs"]
     assert [one["mco"] for one in told] == ["first.mco", "second.mco"]
     for one in told:
         kept = read_results(one["npz"])
         assert (one["photons"], one["seed"]) == (kept.photons, 0)
-        assert set(one["estimates"]) == {*printed.TOTALS, "energy"}
+        assert set(one["estimates"]) == {*TOTALS, "energy"}
         for name, estimate in one["estimates"].items():
             assert estimate["value"] == kept.estimates[name].value
             error = kept.estimates[name].standard_error
             assert estimate["standard_error"] == (error if np.isfinite(error) else None)
-    status, out, err = command("run", mci, "--json", "--precision", 0.5, "--quantity", "absorbed")
+    out = command("run", mci, "--json", "--precision", 0.5, "--quantity", "absorbed")[1]
     assert [one["precision"] for one in json.loads(out)["runs"]] == [
         {"quantity": "absorbed", "goal": 0.5, "reached": True}
     ] * 2
@@ -619,3 +565,44 @@ def test_version_and_help(command):
     assert "[default: (diffuse_reflectance)]" in out
     assert re.search(r"first at\s+(│\s+│\s+)?2.1 million", out)
     assert command()[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "samples", "text"),
+    [
+        (0.237834, 0.000421, 9, "0.23783 ± 0.00042"),
+        (1.0, 0.0, math.inf, "1"),
+        (0.0, 0.0, math.inf, "0"),
+        (0.0, 0.0, 0.0, "0 (no photon seen)"),
+        (0.5, math.inf, 1, "0.5 ± unknown"),
+        (9.83e-7, 9.83e-7, 1, "9.8e-07 ± 9.8e-07"),
+        (1.23456e-6, 1.2e-9, 9, "1.2346e-06 ± 1.2e-09"),
+        (2e-7, 3e-6, 1, "2e-07 ± 3.0e-06"),
+        (12.3, 4.56, 9, "12.3 ± 4.6"),
+        (1.0, 1e-15, 9, "1.000000000000 ± 0.000000000000"),
+    ],
+)
+def test_a_value_with_two_digits_of_its_error(value, error, samples, text):
+    assert app.with_error(Estimate(value, error, samples)) == text
+
+
+@pytest.mark.parametrize(
+    ("photons", "seconds", "compiling", "text"),
+    [
+        (10**6, 8.0, 3.9, "4.1 s and 3.9 s to compile, 0.244 M photons/s"),
+        (10**6, 4.1, 0.0, "4.1 s, 0.244 M photons/s"),
+        (20_000, 10.0, 0.01, "10.0 s, 2002 photons/s"),
+        (20_000, 1.0, 1.0, "0.0 s and 1.0 s to compile, 20 M photons/s"),
+    ],
+)
+def test_speed_leaves_out_compiling(photons, seconds, compiling, text):
+    assert app.speed(photons, seconds, compiling) == text
+
+
+def test_light_that_was_cut_is_a_line_of_the_sum():
+    estimates = dict.fromkeys((*TOTALS, "energy"), Estimate(0.2, 0.01, 99))
+    medium = Medium((Layer(1, 1, 1, 0, 1),))
+    kept = Results(medium=medium, grid=Grid(1, 1), photons=9, seed=0, version="", cut=0.1234, estimates=estimates)
+    lines = list(app.totals(kept))
+    assert lines[-2:] == ["at scattering limit    0.12", "all of these           0.200 ± 0.010"]
+    assert len(list(app.totals(replace(kept, cut=0.0)))) == len(lines) - 1

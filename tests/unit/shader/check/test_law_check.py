@@ -8,13 +8,11 @@ import pytest
 from profilefit.errors import InputError, RecordError
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
-from profilefit.shader.check import bounds, dense_grid, validity
+from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import Bound
 from profilefit.shader.check.chosen import COSINES, INDICES, chosen, printed, regenerated
-from profilefit.shader.check.half import ALPHA, REFLECTANCE, check_half
-from profilefit.shader.check.law_check import OWN, check_law, check_laws
+from profilefit.shader.check.law_check import HALVES, OWN, check_half, check_law, check_laws, check_map
 from profilefit.shader.check.law_cost import WORKS, costs
-from profilefit.shader.check.map_check import check_map
 from profilefit.shader.check.shader_law import Values
 
 FITS = catalogue.fits_folder()
@@ -110,7 +108,7 @@ def test_an_index_between_has_the_worse_of_its_neighbours_errors():
     content = json.loads((FITS / "hazard-refracting.json").read_text())
     known = {n: rel for n, rel in zip(*(content["quality"]["by_index"][key] for key in ("n", "rel")), strict=True)}
     for n, near in ((1.2, (1.2,)), (1.25, (1.2, 1.3)), (1.4, (1.4,)), (1.55, (1.5, 1.6)), (1.6, (1.6,))):
-        found = bounds.of_profile(catalogue.find("hazard-refracting", FITS, n=n), FITS)
+        found = bounds.model_of_profile(catalogue.find("hazard-refracting", FITS, n=n), FITS)
         assert found.values["rel"] == max(known[one] for one in near)
         assert found.source == "hazard-refracting"
 
@@ -125,17 +123,17 @@ def test_a_map_passes_and_a_wrong_sign_does_not(context):
 
 def test_what_the_paper_promises_is_judged_of_its_constants_alone():
     laws, maps = chosen(["liang"], "published", FITS)
-    valid = validity.of_profile(laws[0], FITS)
+    valid = bounds.valid_profile(laws[0], FITS)
     assert str(valid.alpha) == "[1e-06, 1]"
     assert str(valid.xi) == "[0, 1]"
-    assert str(validity.of_map(maps[0], FITS)[0]) == "[0, 1]"
+    assert str(bounds.valid_map(maps[0], FITS)[0]) == "[0, 1]"
     whole = catalogue.find("liang-whole", FITS)
-    assert str(validity.of_profile(whole, FITS).xi) == "[0.01, 1]"
-    fitted, _ = validity.of_map(catalogue.find("albedo-liang", FITS), FITS)
+    assert str(bounds.valid_profile(whole, FITS).xi) == "[0.01, 1]"
+    fitted, _ = bounds.valid_map(catalogue.find("albedo-liang", FITS), FITS)
     assert (fitted.low, fitted.high) == pytest.approx((0.05, 0.9), abs=1e-4)
     inverse = next(one for one in catalogue.sampled_laws(FITS) if one.label == "liang-inverse-as-published")
-    assert validity.of_profile(inverse, FITS).alpha is None
-    assert set(bounds.of_profile(inverse, FITS).values) == {"inversion_error"}
+    assert bounds.valid_profile(inverse, FITS).alpha is None
+    assert set(bounds.model_of_profile(inverse, FITS).values) == {"inversion_error"}
 
 
 @pytest.mark.slow
@@ -220,4 +218,4 @@ def test_costs_are_counted_in_normalized_diffusion(context):
 @pytest.mark.slow
 def test_a_stored_reflectance_loses_less_than_a_stored_albedo(context):
     found = check_half(context, HAZARD)
-    assert 1e-5 < found.rel[REFLECTANCE] < 0.5 * found.rel[ALPHA] < 0.01
+    assert 1e-5 < found.rel[HALVES[1]] < 0.5 * found.rel[HALVES[0]] < 0.01

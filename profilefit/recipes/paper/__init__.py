@@ -1,1 +1,0 @@
-"""Liang et al.'s own fit, step by step: protocol, readings of it, Table 1."""
