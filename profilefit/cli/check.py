@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -70,7 +70,7 @@ def check(
     parts += tables.place_tables(found.laws) if names else []
     parts += [tables.cost_table(found.costs, found.device)] if found.costs else []
     parts += [tables.half_table(found.halves)] if found.halves else []
-    lacking = [found.lacking] if in_half and found.lacking else []
+    lacking: list[Any] = [found.lacking] if in_half and found.lacking else []
     note = "" if out is None else f"wrote {out / 'check.json'}"
     lines = [*lacking, *tables.verdict_lines(found.checks)]
     answer(body, parts, lines, as_json, out, "check.json", note, quiet)
