@@ -73,7 +73,7 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
     if result.walk is None or not result.moving:
         return []
     free = result.fit.spec.free  # no two that say the same, where one coordinate alone was free
-    names = [name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving]
+    names: list[str] = [name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving]
     names = names if len(free) != 1 else [("alpha", "l", "scale")[free[0]]]
     samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)

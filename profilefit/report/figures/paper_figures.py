@@ -249,7 +249,11 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
     for place, (low, high) in enumerate(((0.0, 1.0), (0.9, 1.0))):
         top, bottom = axes[0, place], axes[1, place]
         alpha = np.linspace(max(low, 0.02), high, 500)
-        draw_curves(top, alpha, lines, lambda law, alpha=alpha: coefficients(law, alpha)[column])
+
+        def value(law: Any, alpha: Floats = alpha) -> Floats:
+            return coefficients(law, alpha)[column]
+
+        draw_curves(top, alpha, lines, value)
         points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
         top.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
         _ratios(bottom, column, lines, data)
@@ -257,7 +261,7 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
             ax.set_xlim(low, high + 0.02 * (high - low))
         bottom.set_xlabel("single-scattering albedo α [-]")
         if place:  # scaled to what it shows
-            shown = [coefficients(law, alpha)[column] for _, law, _, _ in lines]
+            shown = [value(law) for _, law, _, _ in lines]
             values = np.concatenate([*shown, points[data.arrays["alpha"] >= low]])
             margin = 0.08 * np.ptp(values)
             top.set_ylim(values.min() - margin, values.max() + margin)

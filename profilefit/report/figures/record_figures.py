@@ -273,11 +273,12 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
 
     A row of panels for each light, one for all surfaces that refract. `names` are the records, all of them if None.
     """
-    contents = {one: source.content(one) for one in names or source.paths if measures(source.content(one), "rel")}
+    known = {owner: source.content(owner) for owner in names or source.paths}
+    contents = {owner: content for owner, content in known.items() if measures(content, "rel")}
     groups: dict[str, list[tuple[str, Content]]] = {kind: [] for kind in KINDS}
-    for one, content in contents.items():
+    for owner, content in contents.items():
         light, n, g = (content["setting"][key] for key in ("illumination", "n", "g"))
-        groups[light if (n, g) == (1, 0) else "refracting"].append((one, content))
+        groups[light if (n, g) == (1, 0) else "refracting"].append((owner, content))
     shown = {kind: list(_lines(group)) for kind, group in groups.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)

@@ -211,10 +211,10 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
     lines = []
     for name, one in {"worst": choice.nearest, "the best cheaper": choice.cheaper}.items():
         if one is not None:
-            case, part = one.error.case, max(PARTS, key=lambda name, error=one.error: getattr(error, name))
+            case, parts = one.error.case, {part: getattr(one.error, part) for part in PARTS}
             shape = "flat" if case.is_flat else f"radius {significant(case.radius)} {scene.unit}"
             at = f"{CHANNELS[one.error.channel]}, pixel {significant(case.pixel)} {scene.unit}, {shape}"
-            lines.append(f"{name}: {at}; mostly {CAUSES[part]}.")
+            lines.append(f"{name}: {at}; mostly {CAUSES[max(parts, key=parts.__getitem__)]}.")
     lines += [
         f"error: root mean square of radiance within {scene.within.mfp:g} transport mean free paths (at least "
         f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "

@@ -152,7 +152,8 @@ def _short(records: Mapping[str, Content]) -> str:
     searchlight = {name: c for name, c in records.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    return _quality([(one + at_index(records.get(one, {})), *rest) for one, *rest in chosen], ("rel", "ks"), "law")
+    named = [(owner + at_index(records.get(owner, {})), which, values) for owner, which, values in chosen]
+    return _quality(named, ("rel", "ks"), "law")
 
 
 def _maps(records: Mapping[str, Content]) -> str:
