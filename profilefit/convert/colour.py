@@ -14,17 +14,17 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers
 from profilefit.errors import InputError
 from profilefit.laws import published
 from profilefit.laws.printed_maps import Chiang, VanDeHulst
 
-Floats = NDArray[np.float64]
 # Below this A the root is sought in alpha, above it in sqrt(1 - alpha): each is where A has a finite slope.
 MIDDLE = 0.5
 LEAST_ROOT = 1e-16  # of sqrt(1 - alpha): below 1e-8 alpha is 1 to the last bit, and A has steps

@@ -29,12 +29,13 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
 from mcml_sim.files.text_file import parse_toml
+from mcml_sim.media.arrays import Floats
 from profilefit.convert.colour import MAPS, mapped_colour, reflectance_of, reflectance_rough, wrenninge_colour
 from profilefit.convert.lengths import (
     Factor,
@@ -51,7 +52,6 @@ from profilefit.convert.lengths import (
 )
 from profilefit.laws.diffusion import BeamDiffusion
 
-Floats = NDArray[np.float64]
 Colour = Callable[[Floats, float, float], Floats]  # of reduced albedo, index n of the surface, and g
 METRES = {"um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 

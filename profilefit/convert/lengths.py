@@ -20,13 +20,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from profilefit.convert.colour import reflectance_of
 from profilefit.laws import published
 
-Floats = NDArray[np.float64]
 Factor = Callable[[Floats, float], Floats]  # of reduced albedo and g
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from profilefit.convert.colour import LARGEST, checked, reflectance_of
 from profilefit.convert.engine import TYPED_LENGTHS
 from profilefit.convert.lengths import QUANTITIES, Length
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 LENGTHS = (*QUANTITIES, *TYPED_LENGTHS)
 BY_NAME = {length.name: length for length in LENGTHS}
 

@@ -29,16 +29,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from mcml_sim.exact.compiled import filter_jit
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
 from profilefit.fitting.solver import Solution
 
-Floats = NDArray[np.float64]
 # emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
 LENGTHS = 50
 FIRST_LOOK = 1000  # steps after which the autocorrelation time is estimated first

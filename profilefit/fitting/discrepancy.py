@@ -36,6 +36,7 @@ from scipy.stats import norm
 from mcml_sim.errors import InputError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
 from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, likeliest, matern
@@ -46,7 +47,6 @@ from profilefit.laws.base import OF_MAPS
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.surface import surface_of
 
-Floats = NDArray[np.float64]
 Live = NDArray[np.bool_]
 # Of rings along r: the process is smooth on that scale, and a matrix of as many rows as all have is inverted.
 GROUPS, FEWEST_GROUPS, MOST_ROWS = 20, 8, 1000

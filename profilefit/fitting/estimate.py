@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import reduced, unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import require_own_process
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
@@ -42,7 +43,6 @@ from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.surface import RefractingSurface, surfaces_of
 
-Floats = NDArray[np.float64]
 JACKKNIFE_GROUPS = 6
 JACKKNIFE_WORTH = 1e-7  # as of `solve`, of its refits: errors are right to a hundredth
 # Half of float64's digits: J^T J has the square of this condition number, and nothing is left of its inverse.

@@ -21,15 +21,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special, stats
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import brentq
 
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.solver import minimise
 
-Floats = NDArray[np.float64]
 DETECTED = 1e-3  # p-value below which a misfit counts as one
 DRAWS = 10_000
 TINY = float(np.finfo(float).tiny)

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim import exact
 from mcml_sim.errors import InputError
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results.orders import Orders
 
-Floats = NDArray[np.float64]
 # Albedos of one ring are reweightings of the same photons and nearly dependent: few directions carry their variance,
 # and each record states the largest share of any one variance that is left out.
 COVARIANCE_RANK = 8

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import trimmed_radius
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 
-Floats = NDArray[np.float64]
 NEAREST = 0.01
 ENERGY_WITHIN = 0.995
 RADII = 400

@@ -30,10 +30,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.compiled import filter_jit
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 
-Floats = NDArray[np.float64]
 SEARCHLIGHT = Setting()
 # The integrals run over t = -ln(1 - xi), where tails are exponential: to the last of a float's 2^24 steps.
 LAST = 24.0 * np.log(2.0)

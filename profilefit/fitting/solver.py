@@ -23,8 +23,8 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.exact.compiled import filter_jit, jit
+from mcml_sim.media.arrays import Floats
 
-Floats = NDArray[np.float64]
 Bounds = tuple[Floats | float, Floats | float]
 Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"

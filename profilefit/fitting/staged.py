@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact.compiled import filter_jit, jit
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.estimate import scaled_inverse
 from profilefit.fitting.profiles import Profiles, trimmed_radius
 from profilefit.fitting.solver import Solution, least_squares, solve_batch
 from profilefit.laws.liang import Liang
 
-Floats = NDArray[np.float64]
 COEFFICIENTS = ("a", "b", "c")
 CONSTANTS_OF = {"a": ("a1", "a2", "a3"), "b": ("b0", "b1", "b2", "b3", "b4"), "c": ("c1", "c2", "c3")}
 

@@ -14,17 +14,16 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from numpy.typing import NDArray
 
 from mcml_sim.exact import single_scattering
 from mcml_sim.media import fresnel
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 
-Floats = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 # ln x [mfp] that bracket every radius of use: nearer than 1e-11 or farther than 1e17 mfp nothing is drawn.
 NEAREST, FARTHEST = -25.0, 40.0

@@ -12,14 +12,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
 
-Floats = NDArray[np.float64]
 # Numbers at a time: a length compiles nothing new, and at most three quarters of a block are filling.
 BLOCKS = (64, 256, 1024, 4096, 16384)
 # Compiled methods that are kept, those of other settings and laws go: a program takes a megabyte and thirty memory maps

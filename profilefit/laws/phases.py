@@ -15,13 +15,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import is_number, shown
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Mixture, Phase
 
-Floats = NDArray[np.float64]
 LEAST_G = 0.30664  # at which the second term of Haltrin's form has h = 0
 CUBIC = (-0.3061446, 1.000568, -0.01826332, 0.03643748)
 MOST_TERMS = 4

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import shown
 from mcml_sim.media.medium import Layer, Medium
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 # The judgement of a misfit decomposes matrices of rows by rows: seconds at this many, minutes at four times as many.
 MOST_ROWS = 500
 # Products of four numbers in these bounds, as in a fourth moment, are floats; no unit of length or light is near them.

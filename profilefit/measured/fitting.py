@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.misfit import Misfit, gaussianised, lack_of_fit, misfit, waves
@@ -31,7 +32,6 @@ from profilefit.measured.problem import (
     slopes_by_ranges,
 )
 
-Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
 ROUNDS = 1  # the errors of a law are those at the medium of the fit, which they hardly move

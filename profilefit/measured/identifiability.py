@@ -16,10 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, covariance
@@ -38,7 +38,6 @@ from profilefit.measured.problem import (
     finite_cost,
 )
 
-Floats = NDArray[np.float64]
 # A quantity is not identified if its standard error is more than half of its value: it may as well be twice as much.
 LOOSE = 0.5
 # Two coordinates are not separately identifiable if all but a tenth of the variance of one is shared with the other.

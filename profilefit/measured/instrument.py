@@ -23,14 +23,13 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import i0e
 
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.measured.data import length
 
-Floats = NDArray[np.float64]
 Nodes = tuple[Floats, Floats]
 PANEL = np.polynomial.legendre.leggauss(6)
 PANELS, REACH = 12, 6.0  # of a Gaussian beam: as wide as its standard deviation twice, so many w to either side

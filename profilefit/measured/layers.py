@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
@@ -29,7 +29,6 @@ from profilefit.measured.noise import Noise, noise
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Known
 
-Floats = NDArray[np.float64]
 NAME = re.compile(r"(d|mu_a|mu_s)([1-9][0-9]?)")
 FIELDS = {"d": "thickness", "mu_a": "mu_a", "mu_s": "mu_s"}
 # Enough for 2e-5 of the light of a stack, in a quarter of the time of the standard ones.

@@ -36,7 +36,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.special import expit, roots_genlaguerre
 
@@ -48,12 +47,12 @@ from mcml_sim.exact.forwards import decay_rate
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated, unreduced
 from mcml_sim.files.npz import kept
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import FORWARD_N, Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.diffusion import exitance_factors
 from profilefit.measured.instrument import PENCIL, Instrument
 
-Floats = NDArray[np.float64]
 NAMES = ("alpha", "l", "scale")
 U, LENGTH, SCALE = range(3)
 BLOCK = 32  # radii

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import waves
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
@@ -37,7 +38,6 @@ from profilefit.measured.data import Measured
 from profilefit.measured.model import EXACT, Light, u_of
 from profilefit.recipes.record import Folder, Records, record_setting
 
-Floats = NDArray[np.float64]
 # b^T b is the share of the photons that the rings hold: 1 only if none is lost, and more only by rounding.
 LARGEST_SHARE = 1.0 - 1e-6
 RMS = 1.5

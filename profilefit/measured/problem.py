@@ -20,10 +20,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
-from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import brentq
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting import solver
@@ -34,7 +34,6 @@ from profilefit.measured.instrument import PENCIL, Gaussian, Instrument
 from profilefit.measured.model import EXACT, LENGTH, NAMES, SCALE, Light, Model, Oblique, U, light_at_hand, u_of
 from profilefit.measured.noise import Noise, Origin
 
-Floats = NDArray[np.float64]
 Ranges = Mapping[str, tuple[float, float]]
 MEDIUM = ("n", "g")
 LEAST, MOST = 1e-9, 1.0 - 1e-9  # albedos that can be held

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.chains import Node, Ridge, Walk, sample
@@ -43,7 +43,6 @@ from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, FitSpec, Known,
 from profilefit.measured.reading import read
 from profilefit.recipes import catalogue, record
 
-Floats = NDArray[np.float64]
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
 HOLDABLE = ("alpha", "A", "l")

@@ -20,10 +20,10 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from mcml_sim import Orders
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.estimate import (
     JACKKNIFE_GROUPS,
     Fit,
@@ -38,7 +38,6 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws.base import Constants
 
-Floats = NDArray[np.float64]
 # A random start multiplies each constant by e^(SPREAD * normal): two of three within a factor of two. It keeps its
 # sign, since most laws are not defined beyond; a constant that is 0 starts at SPREAD * normal.
 SPREAD = float(np.log(2.0))

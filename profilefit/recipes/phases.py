@@ -26,6 +26,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.phase import Phase, Tabulated, as_table, from_table
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
@@ -34,7 +35,6 @@ from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.schema import ERRORS
 
-Floats = NDArray[np.float64]
 MAX_BYTES = 2**20
 MOST_ROWS, FEWEST_ROWS = 5000, 8
 DEGREES = ("", "deg", "degrees")

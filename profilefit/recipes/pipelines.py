@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Orders, Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.chains import LEVELS, Posterior, posterior
 from profilefit.fitting.discrepancy import LawWithErrors, discrepancy
 from profilefit.fitting.discrepancy import summary as quantities
@@ -29,7 +30,6 @@ from profilefit.recipes.recipe import Albedos, Recipe
 from profilefit.recipes.run import COMPARISONS, LAWS, MAPS, RecipeRun, RecordContent, Work
 from profilefit.recipes.targets import albedo_values, free, law_class, require_known, starting_law, truth_of
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, np.ndarray]
 Pipeline = Callable[[Recipe, RecipeRun, Orders | None], RecordContent]
 QUALITY_ALBEDOS = Albedos(low=0.05, high=0.995, count=24)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.fitting.solver import CONVERGED, Solution, least_squares, solve_batch
@@ -26,7 +27,6 @@ from profilefit.laws import published
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, Material
 
-Floats = NDArray[np.float64]
 Content = dict[str, Any]  # a row of the record
 EPSILON = 0.005  # of the trimming (6)
 # MCML's usual hundredth of a mean free path; beyond 25 mfp (6) never walks for alpha <= .9986 [mfp].

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import Orders, Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit import laws
 from profilefit.errors import RecipeError, SettingError
 from profilefit.fitting.profiles import Profiles
@@ -18,7 +18,6 @@ from profilefit.laws.base import Constants, Entry
 from profilefit.recipes import catalogue
 from profilefit.recipes.recipe import Albedos, Recipe, RingLayout
 
-Floats = NDArray[np.float64]
 # Where a law with published constants begins at those of its entry: one without such constants always does.
 OWN_START = "none"
 SEARCHLIGHT = Setting()

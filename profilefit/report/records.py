@@ -10,9 +10,10 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
@@ -97,7 +98,6 @@ def regenerated_worst(content: Content, measure: str) -> float:
     return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 
 
-Floats = NDArray[np.float64]
 # Draws of the posterior that a band is made of: enough for its 95 % edges to a tenth of the band.
 DRAWS = 200
 LEVEL = 0.95

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import __version__
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
@@ -26,7 +26,6 @@ from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
-Floats = NDArray[np.float64]
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 ENDINGS = {"glsl": "glsl", "hlsl": "hlsl", "glsl-es": "glsl", "python": "py", "json": "json"}
 MARKS = {"python": "#"}

@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 from scipy.ndimage import binary_dilation, uniform_filter
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")

@@ -26,13 +26,13 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, solve_triangular
 from scipy.special import ellipe, ellipk
 
 from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.misfit import DETECTED, waves
 from profilefit.fitting.solver import CONVERGED, Solution, best_apart, covariance, lowest, solve
 from profilefit.measured import model
@@ -42,7 +42,6 @@ from profilefit.measured.noise import WAVE
 from profilefit.measured.photo.rings import SpotRings, over_rings
 from profilefit.measured.problem import ALBEDOS, BLACK, FARTHEST_LN, FARTHEST_U, LENGTHS, WHITE, Known
 
-Floats = NDArray[np.float64]
 Hashable = tuple[bytes, tuple[int, ...]]
 MEDIUM = ("mu_s'", "mu_a")
 HALO, ALIKE = 0.5, np.log(2.0)  # error of a halo's share over that of all glare; ln a within which shares are alike

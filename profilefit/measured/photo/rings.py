@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, grey_dilation, label
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
 from profilefit.measured.data import length
 from profilefit.measured.instrument import RING
 from profilefit.measured.photo.exposure import Exposure, Picture, Plane, library
 
-Floats = NDArray[np.float64]
 FARTHEST = 1e6  # pixels, between two points of a ruler
 PER_PIXEL = re.compile(r"(?P<length>.+?)\s*/\s*(?:px|pixel)")
 NUMBER = r"[0-9]+(?:\.[0-9]+)?"

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mcml_sim.exact.half_space import require_solved
@@ -30,7 +29,6 @@ from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, Spo
 from profilefit.measured.problem import Known
 from profilefit.recipes.declared import LISTED, Declared, Misplaced, Refused, Share, Tolerance, words
 
-Floats = NDArray[np.float64]
 MAX_BYTES, LEAST_SIDE, MOST_SIDE = 1 << 16, 50, 12_000
 OURS, HEAD = b"profilefit", 4096  # in the first bytes of each file
 MOST = 1e6  # 1/mm

@@ -23,6 +23,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter
 from scipy.special import gamma, j0, j1, kv
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
@@ -31,7 +32,6 @@ from profilefit.errors import InputError
 from profilefit.measured.instrument import between
 from profilefit.measured.model import exact_light
 
-Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]
 CHANNELS = ("red", "green", "blue")
 PATTERN = (("red", "green"), ("green", "blue"))  # of a Bayer sensor's first two rows

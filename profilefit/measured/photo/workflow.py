@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.model import exact_light
@@ -18,7 +18,6 @@ from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
 from profilefit.measured.photo.rings import MARKER, PixelScale, Spot, SpotRings, pixel_scale, spot
 from profilefit.measured.problem import Known
 
-Floats = NDArray[np.float64]
 MOST_SHOTS = 20
 UNIT = "mm"
 LATE, WORTH = 0.03, 2  # relative error of a stated time, and of how many exposures that is worth

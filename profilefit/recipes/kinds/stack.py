@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, model_validator
 
 from mcml_sim import Medium, Setting, exact
 from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
@@ -34,7 +34,6 @@ from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
 from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
 
-Floats = NDArray[np.float64]
 PIPELINE = "stack"
 TITLE = "Layers under a first one of any thickness"
 EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + (g_i d)^2, c_i = e^(-b_i d / l)"

@@ -18,11 +18,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
 from mcml_sim.exact import half_space
 from mcml_sim.exact.stack.solution import MAX_LAYERS
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
@@ -35,7 +36,6 @@ from profilefit.recipes.declared import Refused, at
 from profilefit.recipes.run import PHOTONS, RecipeRun
 from profilefit.recipes.stack.file import LayerStack
 
-Floats = NDArray[np.float64]
 THIN, THICK, LONGEST = 0.1, 3.0, 12.0  # thicknesses that are fitted: mean free paths; decay lengths; mean free paths
 COUNT = 5
 INSIDE = (0.6, 1.0, 1.6)  # thicknesses of a layer below another, in its own: there it has no other

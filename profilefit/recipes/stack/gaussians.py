@@ -11,6 +11,7 @@ from scipy.optimize import nnls
 from scipy.special import expit, log_softmax
 
 from mcml_sim import Medium, exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
@@ -22,7 +23,6 @@ from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.fit import USUAL, Tracing
 
-Floats = NDArray[np.float64]
 NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
 WIDEST = 0.5  # and of the widest, over that within which all light counts
 # Narrowest and widest sigma of a dense sum, over the first and the last ring; steps of ln sigma.

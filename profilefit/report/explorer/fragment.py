@@ -25,9 +25,9 @@ from string import Template
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
 from mcml_sim import Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, MATERIALS
 from profilefit.recipes import catalogue
@@ -39,7 +39,6 @@ from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 
-Floats = NDArray[np.float64]
 # In this order: each file uses only what comes before it, but for what runs later.
 SCRIPTS = ("exact", "laws", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")
 LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the ends of its slider

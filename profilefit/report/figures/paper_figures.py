@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting import discrepancy
 from profilefit.fitting.staged import COEFFICIENTS, CONSTANTS_OF
 from profilefit.recipes import catalogue
@@ -55,7 +55,6 @@ from profilefit.report.records import (
     z_score,
 )
 
-Floats = NDArray[np.float64]
 Points = tuple[Floats, ...]
 PANELS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)  # of a record's albedos, in order: more of them near alpha = 1
 RINGS_SHOWN = 26

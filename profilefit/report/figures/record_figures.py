@@ -21,6 +21,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.fitting.measures import MEASURES
 from profilefit.laws.base import ProfileLaw
@@ -61,8 +62,6 @@ from profilefit.report.figures.paper_figures import (
 from profilefit.report.kinds import published
 from profilefit.report.records import SETS, Content, Fitted, Source, converged, measures
 from profilefit.report.tables.cells import significant
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.convert import ENGINES, LENGTHS, QUANTITIES, Engine, Optical
 from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant
 
-Floats = NDArray[np.float64]
 DIGITS, COLOUR_PLACES = 5, 4
 NONE = "none"
 MEMO = "Falloffs, s and eq. 5, 6 and 8: Christensen and Burley, Pixar Technical Memo 15-04"

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
@@ -32,7 +32,6 @@ from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.report.tables.quality_tables import albedo_number
 
-Floats = NDArray[np.float64]
 Measured = TypeVar("Measured")
 Track = Callable[[Iterator[Any], str, int], Iterator[Any]]
 """Items as they come, what they are, how many -> the items, as they are shown to come."""

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.world import Camera
 
-Floats = NDArray[np.float64]
 SKIN, NOTHING = -1.0, -2.0  # in place of a height
 
 

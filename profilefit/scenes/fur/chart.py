@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.fur.ball import FurView
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch, cast, random_patch
@@ -15,7 +15,6 @@ from profilefit.scenes.fur.ways import WAYS, LayerTechnique
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.renderer import Renderer
 
-Floats = NDArray[np.float64]
 WIDER = 1.3  # than a ray's way over the skin
 AWAY = 3.0  # lengths of a strand, from the tips to where rays start
 

@@ -12,15 +12,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
 from profilefit.shader import emit
 from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
-Floats = NDArray[np.float64]
 MOST_LAYERS = 4096
 NODES = 48  # of quadratures over directions
 LEAST_X, MOST_X = 0.64, 6.4  # N r0 / L for which an exponent is fitted

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.checks import checked_whole
@@ -20,7 +19,6 @@ from profilefit.scenes.stage.technique import RADIANCE
 from profilefit.scenes.stage.world import Light, Rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
-Floats = NDArray[np.float64]
 HITS = "hit_map"
 FINE = 8.0  # texels of a strand's radius in the maps of nearest feet
 MOST_TEXELS = 2048

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from mcml_sim.media.arrays import Floats
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, Tolerance, words
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import EXPONENTS, HITS, RIM, SHIFTS, STRENGTHS, Coat, FurSurface, Shading
@@ -20,7 +21,6 @@ from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, T
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance, Samples, TechniqueTable, Viewpoint, ViewRequest
 
-Floats = NDArray[np.float64]
 KINDS = ("swept", "shells")
 VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
 LARGEST = 150.0  # of the ball, and of strands [mm]

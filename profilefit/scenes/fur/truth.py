@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole, is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import MOST_LAYERS
 
-Floats = NDArray[np.float64]
 MOST_STRANDS = 1 << 20
 
 

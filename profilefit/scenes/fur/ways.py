@@ -8,14 +8,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
 
-Floats = NDArray[np.float64]
 MOST = 256  # layers of a picture
 LEAST_SHARE = 1e-3  # of a goal, that an error of 0 is taken for
 

@@ -25,6 +25,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements
@@ -34,7 +35,6 @@ from profilefit.scenes.stage.technique import Unwraps, maps
 from profilefit.scenes.stage.world import Mesh, Part
 from profilefit.shader.emit import text_beside
 
-Floats = NDArray[np.float64]
 EIGHT = np.ones((3, 3))  # a texel and its neighbours
 LEAST = 2  # texels of a margin: linear reads next to an edge
 REACH = 3.3  # of a blur's taps, in its sigma

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.scene import HeartRender, HeartRequest
 from profilefit.scenes.heart.truth import Elements, summed
@@ -14,7 +15,6 @@ from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import ChartPoint
 
-Floats = NDArray[np.float64]
 SURE = Sampling(64)  # where the error of a technique is asked for, not its noise
 
 

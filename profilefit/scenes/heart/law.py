@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.heart.truth import surface_blur
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

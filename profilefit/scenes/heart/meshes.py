@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.world import Mesh, parameters, sheet, unit
 
-Floats = NDArray[np.float64]
 KINDS = ("heart", "ball", "bumps")
 PERIODS = 3.0  # of a sheet of bumps
 EDGE, MOST_EDGE = 3.0, 0.3  # of a sheet, where nothing is judged: in sigma of the widest Gaussian, in its side at most

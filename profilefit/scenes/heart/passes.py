@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.gaussians import MediumGaussians
 from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel, split
@@ -19,7 +19,6 @@ from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 from profilefit.shader.stack_text import gaussians_text
 
-Floats = NDArray[np.float64]
 NEAR, FAR = "near_map", "far_map"
 ATLAS, SCREEN = 1e30, -1.0  # thresholds: no share is above the one, all are above the other
 

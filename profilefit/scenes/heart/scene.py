@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
@@ -37,7 +38,6 @@ from profilefit.scenes.stage.surface import evenly, world
 from profilefit.scenes.stage.technique import Lambert, Technique, TechniquePair, alone
 from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
-Floats = NDArray[np.float64]
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
 GAUSSIANS, TEXEL, TOLERANCE = 6, 0.4, 0.02

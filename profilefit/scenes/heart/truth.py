@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import require
 
-Floats = NDArray[np.float64]
 NEIGHBOURS = 24  # points that gather together
 COARSE = 0.6  # sigma, in the spacing of elements, below which a Gaussian is none: light comes out where it went in
 TOGETHER = 1.0 / 6.0  # sigma within which elements count as one: wider by 2e-3 of the variance at most

@@ -7,15 +7,15 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Medium
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 
-Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # right to 1e-4
 WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
 RINGS, NEAREST, FARTHEST = 200, 1e-3, 200.0  # that light is summed over [mfp]

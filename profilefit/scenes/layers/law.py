@@ -30,9 +30,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
@@ -41,7 +42,6 @@ from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 from profilefit.recipes.stack.fit import stack_law as stack_law
 
-Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
 PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
 STEP = 1e-6  # of ln of a constant, for derivatives

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Medium
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.scenes.layers.law import Plate, single_scattering
@@ -21,7 +22,6 @@ from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Tec
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import single_text, stack_text
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 SCATTERED = "scattered_map"
 COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
@@ -32,7 +33,6 @@ from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import TechniquePair, alone
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
-Floats = NDArray[np.float64]
 KINDS = ("stack", "dipole", "half space", "none")
 OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
 POSES = ("rest", "turn", "nod")

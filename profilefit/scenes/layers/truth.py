@@ -9,15 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from mcml_sim import Medium, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
-Floats = NDArray[np.float64]
 Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A
 NODES = exact.Nodes(12, 16, 16, 10)
 THICKNESSES, WIDEST = 9, 0.5  # of the table, even in ln d: so many at least, and so far apart at most

@@ -12,15 +12,14 @@ from typing import NamedTuple
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
-Floats = NDArray[np.float64]
 STEPS = 16  # of the search for a hit on an uneven floor
 MOST_PIXELS, MOST_VERTICES = 4096, 4096  # of a side
 FOLDS = 1.0  # F from which on faces lie over one another

@@ -13,13 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.phase import Phase
 from profilefit.scenes.sea.law import segment_between
 
-Floats = NDArray[np.float64]
 FINE = 1 << 16  # prisms a period, whose sum is the reference: second order in their width, right to 1e-5
 PIXELS, RAYS_A_PIXEL = 512, 16  # of a caustic map, a period
 

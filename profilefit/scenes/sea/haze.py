@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ellipe
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.sea.law import Lobes, beam_share, water_mtf
 
-Floats = NDArray[np.float64]
 BROADENED, SCALED, SINGLE = KINDS = ("broadened", "scaled", "single")
 # Fitted to all orders of light of Petzold's three terms, omega 0.2 to 0.8 and ct 0.5 to 3.5, within 60 degrees of the
 # sun: rms 7 %, of omega to 0.5 5 %. The scene had no part in it.

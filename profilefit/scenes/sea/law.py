@@ -20,12 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.special import hankel1
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.phases import haltrin as haltrin
 
-Floats = NDArray[np.float64]
 Lobes = Sequence[tuple[float, float]]
 ROUNDING = 1e-9  # by which weights may exceed 1
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from profilefit.scenes.sea.caustics import Caustics, Splat
@@ -19,7 +20,6 @@ from profilefit.scenes.stage.renderer import Pass, Read, Renderer
 from profilefit.scenes.stage.world import Camera, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
-Floats = NDArray[np.float64]
 VIEW, SHAFTS = "view_map", "shaft_map"
 SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view
 GAUSSIANS = 4  # of the floor's light

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
@@ -19,7 +20,6 @@ from profilefit.scenes.sea.truth import Photons, boxes
 from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, first_hit, newton_hit, refracted
 
-Floats = NDArray[np.float64]
 LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile
 TOGETHER = 1 << 16  # paths in memory at once
 SUNWARD = 0.25  # share of all turns that are drawn around the way to the sun, from where most light comes

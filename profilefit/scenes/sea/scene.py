@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.phase import Mixture
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, words
 from profilefit.recipes.kinds import phase
@@ -36,7 +36,6 @@ from profilefit.scenes.stage.request import (
 )
 from profilefit.scenes.stage.world import Camera
 
-Floats = NDArray[np.float64]
 PHASE = "petzold"
 FORM = "3-terms"  # of its record: four are nearer, and cost a third more
 INDEX = 1.34

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
 from profilefit.scenes.stage.buffers import require
 
-Floats = NDArray[np.float64]
 Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
 PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
 MOST_SAMPLES = 2**23

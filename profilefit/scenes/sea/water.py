@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 
-Floats = NDArray[np.float64]
 Rgb = tuple[float, float, float]
 ROUNDING = 1e-6  # by which weights may miss a sum of 1
 

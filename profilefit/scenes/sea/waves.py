@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS
 from profilefit.scenes.stage.buffers import require
 
-Floats = NDArray[np.float64]
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for

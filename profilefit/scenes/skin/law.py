@@ -22,13 +22,12 @@ from scipy.optimize import brentq
 from scipy.special import erf
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.skin.truth import exact_quartile
 from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

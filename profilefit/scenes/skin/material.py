@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
 from mcml_sim import Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
 from profilefit.recipes.declared import Range
@@ -21,7 +22,6 @@ from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.world import Rgb, rgb
 
-Floats = NDArray[np.float64]
 AROUND, UP = 500.0, 320.0  # lengths that u and v in [0, 1] span on the head [mm], near its middle
 FRECKLES, HAIRS = 1500, 9000
 # What is left of A in red, green and blue at the heart of a freckle, and under a hair.

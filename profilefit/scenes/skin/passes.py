@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.skin.law import FOLLOW, Separable, transmitted
 from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Technique, maps, through_text
 from profilefit.shader.emit import text_beside
 
-Floats = NDArray[np.float64]
 HALFWAY = "halfway_map"
 
 

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from mcml_sim import Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError, SettingError
 from profilefit.shader.emit import literal, text_beside
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 DIFFUSE = Setting("diffuse")  # the light that irradiance is
 NAME = "exact"

@@ -6,11 +6,10 @@ Millimetres; x to the head's left (the picture's right), y up, z out of the face
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.world import Mesh, parameters, sheet
 
-Floats = NDArray[np.float64]
 SKULL = np.array([72.0, 104.0, 88.0])  # semi-axes
 ROUNDNESS = 2.5  # power of the skull's superellipsoid: 2 is an egg, more a box
 # Bumps of the face, pushed out along z: (x, y, half width, half height, amount), x < 0 mirrored by `TWICE`.

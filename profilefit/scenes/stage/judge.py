@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
@@ -20,7 +21,6 @@ from profilefit.scenes.stage.surface import exitance_of, own_error
 from profilefit.scenes.stage.technique import TechniquePair
 from profilefit.scenes.stage.world import Scene
 
-Floats = NDArray[np.float64]
 TURNS = 5
 EXPOSURE = 1.1  # of pictures whose lamp is chosen for it: few of their pixels are clipped by it
 SQUARE = 7  # pixels of a side, over which a map of errors that are noisy takes a mean

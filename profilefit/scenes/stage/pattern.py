@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 WRAPS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 1, 2)
 KINDS = ("uniform", "importance", "importance blue")
 CHANNELS = ("longest", "mixture")

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
@@ -18,7 +17,6 @@ from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import TechniquePair
 from profilefit.scenes.stage.world import Camera, Light, Rgb, Scene, unit
 
-Floats = NDArray[np.float64]
 MOST_CHART = 8  # numbers of samples
 # The reference sums over all pairs of pixels, six minutes on a core for so many.
 MOST_PIXELS = 2**16

@@ -15,8 +15,9 @@ from typing import Any, Self
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
@@ -28,7 +29,6 @@ from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, un
 from profilefit.shader.context import seconds
 from profilefit.shader.emit import text_beside
 
-Floats = NDArray[np.float64]
 DEFAULT = Sampling()
 By = Law | Technique
 MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most

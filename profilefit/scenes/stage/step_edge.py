@@ -28,13 +28,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import Setting, exact
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError, SettingError
 from profilefit.fitting.sampling import ExactTarget, LawTarget, Target
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.buffers import require
 
-Floats = NDArray[np.float64]
 NODES, PANEL = 12, 1.0  # Gauss nodes of a panel, and the greatest width in u of one
 FARTHEST = 1e7  # radius [mfp] beyond which less than 1e-7 of white light leaves, and none of any other
 HALVINGS = 80

@@ -30,13 +30,13 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, STEP, Curves, CurveTable, exact_table
 from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.world import Camera
 
-Floats = NDArray[np.float64]
 FORWARD = np.array([0.0, 0.0, -1.0])
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
 LEAST_COSINE = 0.05

@@ -7,16 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, Read
 from profilefit.scenes.stage.world import Part, Rgb, Scene, unit
 from profilefit.shader.emit import text_beside
 
-Floats = NDArray[np.float64]
 LAW = "law"  # the prefix of the law in every shader of the stage
 EXITANCE, RADIANCE = "exitance_map", "radiance_map"
 # How a pixel of the one half space takes its law: by its own A, or by a fixed albedo.

@@ -12,9 +12,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 
-Floats = NDArray[np.float64]
 Rgb = tuple[float, float, float]
 KINDS = ("perspective", "orthographic")
 # Of central differences, over the largest coordinate: there rounding, eps / step, is as large as the rest, step^2.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
@@ -26,7 +27,6 @@ from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records, record_setting
 from profilefit.recipes.targets import albedo_values
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 ULP = 2.0**-24  # half a step of float32 below 1: what rounding a share costs
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.shader.check.bounds import ULP, Bound, ModelError
 from profilefit.shader.check.shader_law import Values
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SMALLEST = 2.0**-126  # below it a float32 loses digits, or is 0 on many GPUs

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw, Range
@@ -36,7 +37,6 @@ from profilefit.shader.check.dense_grid import XI, Arguments, Count, ShaderCheck
 from profilefit.shader.check.shader_law import ShaderLaw, ShaderMap, Values, half_extension
 from profilefit.shader.emit import translated
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
 STEP = 1e-4

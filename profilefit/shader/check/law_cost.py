@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
@@ -24,7 +24,6 @@ from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import check_errors, full_screen, program, seconds
 
-Floats = NDArray[np.float64]
 YARDSTICK = "burley"
 SIZE = 256, 128
 TURNS = 7

@@ -17,11 +17,11 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.shader import emit
 from profilefit.shader.context import check_errors, full_screen, program, renderer
 
-Floats = NDArray[np.float64]
 WIDTH, ROWS = 1024, 64  # of the textures; every OpenGL has more
 NUMPY_TYPES = {"f4": np.float32, "f2": np.float16}
 # Extensions that let GLSL compute in half precision, each with the name that it gives the type.

@@ -9,12 +9,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 
-Floats = NDArray[np.float64]
 SAMPLES = (4, 8, 16, 32, 64, 128, 256)
 TAPS = (9, 17, 33)
 GAUSSIANS = (2, 3, 4)

@@ -31,6 +31,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from mcml_sim import Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.fitting.sampling import LawTarget
 from profilefit.fitting.solver import differences, solve
@@ -42,7 +43,6 @@ from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_resp
 from profilefit.scenes.stage.world import Rgb
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
 
-Floats = NDArray[np.float64]
 NEAR = 0.03  # d = NEAR sinh u [mfp]: F is smooth in d at the edge and in ln d far away
 FARTHEST = 300.0  # [mfp]
 KNOTS = 72  # of F: within 2e-5 of itself

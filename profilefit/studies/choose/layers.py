@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack
 from profilefit.scenes.layers.half_space import (
@@ -32,7 +32,6 @@ from profilefit.scenes.layers.half_space import (
 from profilefit.scenes.layers.passes import alike_error
 from profilefit.studies.choose.case import Within
 
-Floats = NDArray[np.float64]
 FEWEST, MOST = 2**18, 2**22  # photons
 PRECISE = 10.0  # photons as its square over that of the tolerance: the light's error is then a twentieth of it
 REPLICATES, SEED = 200, 1

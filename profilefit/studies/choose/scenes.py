@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.fur.truth import random_patch
@@ -29,7 +29,6 @@ from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.surface import evenly, sees, world
 from profilefit.studies.stability.scenes import SEARCHES
 
-Floats = NDArray[np.float64]
 CHOSEN = 400  # pixels
 # What is hidden has a part in an error from this share of the tolerance on: in random scenes (`python -m
 # benchmarks.heart`) where the screen breaks it and less is hidden, coarse pixels do.

@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.laws.evaluate import POSITIVE
 from profilefit.shader import emit
 
-Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Mask = NDArray[np.bool_]
 PROFILE, CDF, SAMPLE, PDF = "R_d", "cdf", "sample", "pdf"

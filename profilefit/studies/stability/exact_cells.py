@@ -12,18 +12,17 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.exact import by_albedo
 from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.rational import Normalisation
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentAxis, Cells, Mask, absolute, axis, relative, steps_down, steps_up
 
-Floats = NDArray[np.float64]
 DECAY = "κ(α)"
 # What its own docstring promises of profile and cdf, and of a map that is fitted to A.
 BOUNDS = {cells.PROFILE: 1e-6, cells.CDF: 1e-9, cells.SAMPLE: 1e-9, cells.REFLECTANCE_OF: 1e-5, DECAY: 1e-10}

@@ -15,8 +15,8 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.estimate import NO_LIMITS, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
@@ -25,7 +25,6 @@ from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.laws.liang import Liang
 from profilefit.recipes.checks import spread_out
 
-Floats = NDArray[np.float64]
 ALBEDOS, RINGS = 8, 40
 ORDINARY = tuple(np.linspace(0.2, 0.95, ALBEDOS).tolist())
 DARK = tuple(np.geomspace(1e-4, 0.02, ALBEDOS).tolist())

@@ -15,15 +15,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Cells, Mask, axis
 from profilefit.studies.stability.map_cells import map_label
 
-Floats = NDArray[np.float64]
 Triple = tuple[Floats, Floats, Floats]
 Axes = tuple[cells.ArgumentAxis, ...]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting import quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.liang import Liang
@@ -29,7 +30,6 @@ from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentGrid, Cells, Mask, RoundedText, absolute, axis, relative
 
-Floats = NDArray[np.float64]
 Axes = tuple[cells.ArgumentAxis, ...]
 # Of laws without a record: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
 MEASURED: dict[str, dict[str, float]] = {

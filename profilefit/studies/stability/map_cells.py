@@ -9,10 +9,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, Range
@@ -23,7 +23,6 @@ from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentAxis, Cells, RoundedText, Verdict, absolute, axis, steps_down
 
-Floats = NDArray[np.float64]
 FACTOR = 1.5  # of what a record states
 # Against the exact half space: of A, and of sqrt(1 - alpha), in which every law of alpha is smooth.
 MODEL_BOUND = 0.02

@@ -13,9 +13,9 @@ from typing import Any
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
+from mcml_sim.media.arrays import Floats
 from profilefit.scenes.fur.law import shadow, shell_shadow, strand_text
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, LayerTechnique, trial
@@ -46,7 +46,6 @@ from profilefit.studies.stability.cells import (
     relative,
 )
 
-Floats = NDArray[np.float64]
 DIGITS = 1e-6  # relative: a few roundings in float32
 
 HITS, BEAM, SEGMENT = "rays with a wrong hit", "beam, cw 0.1", "segment"  # quantities

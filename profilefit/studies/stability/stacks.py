@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, Setting
+from mcml_sim.media.arrays import Floats
 from profilefit.errors import RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
@@ -25,7 +25,6 @@ from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Cells, Mask, RoundedText, absolute, axis, relative, steps_down
 from profilefit.studies.stability.law_cells import MODEL_BOUNDS
 
-Floats = NDArray[np.float64]
 PROFILE, CDF, SAMPLE, PDF = cells.QUANTITIES
 FLOAT64, TEXT32, MODEL = cells.FLOAT64, cells.TEXT32, cells.MODEL
 TOTAL, ENERGY, ONCE = "A(d)", "energy", "L, once"

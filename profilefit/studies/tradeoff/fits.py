@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, exact, simulate_orders
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting import staged
 from profilefit.fitting.chains import posterior
 from profilefit.fitting.estimate import Fit, fit
@@ -35,7 +36,6 @@ from profilefit.recipes import catalogue
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
-Floats = NDArray[np.float64]
 ALPHAS = 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 12) ** 2
 EDGES = np.linspace(0.0, 20.0, 101)  # of what is fitted, even, as in the paper [mfp]
 RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]

@@ -22,9 +22,10 @@ import numpy as np
 from jax import Array
 from jax.extend import core
 from jax.interpreters import partial_eval
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim import exact
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.fitting.quality import profile_quality
@@ -48,7 +49,6 @@ from profilefit.studies.tradeoff import stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
 
-Floats = NDArray[np.float64]
 Function = Callable[[Array, Array], Any]
 YARDSTICK, TABLE = "normalized diffusion", "exact, tabulated"
 

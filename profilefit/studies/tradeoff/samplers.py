@@ -21,9 +21,9 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from mcml_sim.exact.light import unreduced
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
@@ -40,7 +40,6 @@ from profilefit.studies.tradeoff.laws import SPECS, YARDSTICK, Contender, conten
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
 
-Floats = NDArray[np.float64]
 SAMPLES = 16  # of one estimate
 BLOCKS = 5  # of trials: how far the variance itself is known
 PLACES = np.array([-3.0, -1.0, -0.3, -0.1])  # on the dark side of the edge [l*]

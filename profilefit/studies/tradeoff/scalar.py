@@ -15,12 +15,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mcml_sim.media.arrays import Floats
 
 WEIGHT_THRESHOLD, ROULETTE_CHANCE = 1e-4, 0.1  # MCML's
 ABSENT = "needs numba: pip install numba"
-
-Floats = NDArray[np.float64]
 
 
 def trace(

@@ -12,11 +12,10 @@ from importlib.metadata import version
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from profilefit.recipes.evidence import processor
 
-Floats = NDArray[np.float64]
 Work = Callable[[int], int]
 """Does its work once, with that seed; returns how many of whatever it did (photons, points, fits)."""
 Track = Callable[[range, str], Iterable[int]]

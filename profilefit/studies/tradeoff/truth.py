@@ -22,12 +22,12 @@ from mcml_sim.exact import by_albedo, refracting
 from mcml_sim.exact.stack import solution
 from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
-Floats = NDArray[np.float64]
 RingEnergies = tuple[Floats, Floats | None]
 """Ring energies (albedos, rings) [-], and the relative error (albedos, rings) that the method states itself."""
 Method = Callable[[int], RingEnergies]
