@@ -237,7 +237,9 @@ def _located(model: type[BaseModel], content: Any, place: tuple[Any, ...]) -> tu
             tables += [key] * bool(key)
             key, schema = str(part), schema["properties"][part]
             value = value.get(part) if isinstance(value, dict) else None
-        elif isinstance(part, int) and "items" in schema and isinstance(value, list) and isinstance(value[part], dict):
+        elif isinstance(part, int) and isinstance(value, list):
+            if "items" not in schema or part >= len(value) or not isinstance(value[part], dict):
+                break  # within a key's value, of which no place is told
             key, schema, value = f"{key} {part + 1}", schema["items"], value[part]
         schema = resolved(schema, whole.get("$defs", {}), isinstance(value, dict))
     return tables, key, schema, value
