@@ -74,7 +74,7 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
         others[f"gaussians:{count}"] = alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:
-            for kind, found in chart.ways(stage, replace(request, pose=pose), table, WAYS, others).items():
+            for kind, found in chart.ways(stage, request.changed(pose=pose), table, WAYS, others).items():
                 for one in found:
                     rows.append((pose, kind, str(one.samples), f"{one.rmse:.3g}", f"{min(one.milliseconds):.3g}"))
         device = renderer(context)
