@@ -31,6 +31,13 @@ pytest_plugins = ["tests.seconds", "tests.fixtures"]  # which import jax, and so
 MOST_MAPS = 20_000  # of 65530 that Linux gives a process; a file of tests takes a few thousand
 
 
+def pytest_collection_modifyitems(items):
+    """Give a slow test without a time of its own half an hour: a slower machine is no failure."""
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(1800))
+
+
 def pytest_collection_finish():
     """What stays to the end, modules and tests, is not searched for garbage with each new test: a tenth of the time."""
     gc.collect()
