@@ -214,18 +214,17 @@ def _refusal(
         where = ".".join(filter(None, (*tables, key * is_table)))
         kind = type(cause) if issubclass(type(cause), error) else error
         return kind(f"{file}: {f'[{where}] ' * bool(where)}{cause}")
-    where = f"[{'.'.join(tables)}] " * bool(tables)
-    if isinstance(cause, Refused):
-        return error(
-            f"{file}: {where}{key} must be {cause.accepted}, got {'nothing' if cause.got is None else shown(cause.got)}"
-        )
-    got = "nothing" if value is None else shown(value)
-    if not is_table:
-        return error(f"{file}: {where}{key} must be {accepted(schema)}, got {got}")
     name, is_one = ".".join((*tables, key)), schema.get("type") == "object"
-    if value is None:
+    if isinstance(cause, Refused):
+        told, value = cause.accepted, cause.got
+    elif not is_table:
+        told = accepted(schema)
+    elif value is None:
         return error(f"{file}: table {f'[{name}]' if is_one else f'[[{name}]]'} is missing")
-    return error(f"{file}: {where}{key} must be {f'a table [{name}]' if is_one else f'tables [[{name}]]'}, got {got}")
+    else:
+        told = f"a table [{name}]" if is_one else f"tables [[{name}]]"
+    where, got = f"[{'.'.join(tables)}] " * bool(tables), "nothing" if value is None else shown(value)
+    return error(f"{file}: {where}{key} must be {told}, got {got}")
 
 
 def _located(model: type[BaseModel], content: Any, place: tuple[Any, ...]) -> tuple[list[str], str, Table, Any]:
