@@ -41,9 +41,8 @@ def test_json_of_quality_is_measured(done):
     assert (told["quality"]["profiles"], told["quality"]["samplers"]) == ([], [])
 
 
-def test_json_has_null_for_what_is_not_finite(command):
-    status, out, _ = command("convert", "--alpha", "1", "--mfp", "1mm", "--json")
-    assert status == 0
+def test_json_has_null_for_what_is_not_finite(done):
+    out = done("convert", "--alpha", "1", "--mfp", "1mm", "--json", said=None)
     assert strict(out)["dmfp"] == [None]
 
 
@@ -74,10 +73,9 @@ def test_an_unknown_record_names_the_nearest(command, name, near):
 
 @pytest.mark.parametrize("width", [40, 80, *(pytest.param(one, marks=pytest.mark.slow) for one in (60, 100, 120))])
 @pytest.mark.parametrize("words", [("report",), ("report", "liang-whole", "reproduction"), ("report", "skin")])
-def test_tables_are_whole_at_any_width(command, monkeypatch, width, words):
+def test_tables_are_whole_at_any_width(command, done, monkeypatch, width, words):
     monkeypatch.setenv("COLUMNS", str(width))
-    status, out, _ = command(*words)
-    assert status == 0
+    out = done(*words, said=None)
     assert width < 80 or max(map(len, out.splitlines())) <= width
     monkeypatch.setenv("COLUMNS", "400")
     assert Counter(out.split()) == Counter(command(*words)[1].split()), "nothing cut, nothing broken"
