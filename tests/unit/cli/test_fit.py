@@ -145,10 +145,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
     [
         ("nothing.csv", "nothing.csv: expected a file that can be read, got: No such file"),
         ("phantom.csv --law hazzard", "law must be one of exact, liang, burley"),
-        (
-            "phantom.csv --law hazard --n 1.7",
-            "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these",
-        ),
+        ("phantom.csv --law hazard --n 1.7",
+         "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these"),
         ("phantom.csv --n 0.9", "exact light needs n >= 1 where g = 0, and n from 1.33 to 1.45 where"),
         ("phantom.csv --g 0.9", "got searchlight, n = 1, g = 0.9: simulate it instead"),
         ("phantom.csv --n 1.4 --g 0.95:0.7", "--g must be a mean cosine in (-1, 1), or a range such as"),
@@ -158,10 +156,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("two_layers.mco --layers two_layers.toml", "--free must name quantities such as d1, mu_a2 or mu_s2, got ''"),
         ("two_layers.mco --layers two_layers.toml --free d3", "--free must name one of 2 layers, got 'd3'"),
         ("two_layers.mco --layers two_layers.toml --free d1 --g 0.9", "--g must be left out where --layers say what"),
-        (
-            "two_layers.mco --layers two_layers.toml --free d1 --beam 1mm:2mm",
-            "--beam must be one width where layers are",
-        ),
+        ("two_layers.mco --layers two_layers.toml --free d1 --beam 1mm:2mm",
+         "--beam must be one width where layers are"),
         ("two_layers.mco --layers none.toml --free d1", "none.toml: expected a file that can be read"),
         ("two_layers.mco --layers skin.toml --free d1", "g = 0"),
         ("phantom.csv --beam 0.7mm:0.3mm", "--beam must have a range that rises, such as 0.3mm:0.7mm"),
@@ -177,10 +173,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("phantom.csv --beam none.csv", "none.csv"),
         ("phantom.csv --beam phantom.csv", "phantom.csv:3: expected a radius >= 0 and an irradiance >= 0, got"),
         ("phantom.csv --fibre 0", "--fibre must be a length > 0 such as 1.2mm"),
-        (
-            "phantom.csv --constants published",
-            "--constants must be left out where light is solved exactly, got 'published'",
-        ),
+        ("phantom.csv --constants published",
+         "--constants must be left out where light is solved exactly, got 'published'"),
         ("half_space.mco --fibre 2mm", "--fibre must be left out where rows are averages"),
         ("phantom.csv --n -1", "--n must be a refractive index > 0"),
         ("phantom.csv --light sun", "--light must be one of searchlight, diffuse, got 'sun'"),
@@ -205,6 +199,6 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("phantom.csv --seed -1", "--seed must be a whole number >= 0, got -1"),
         ("phantom.csv --out /proc/nowhere", "cannot write into /proc/nowhere"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_one_line_and_status_2(refused, words, said):
     refused(f"fit {words}", said)

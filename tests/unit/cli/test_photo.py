@@ -246,10 +246,8 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("cut.dng --scale 0.1mm/px", "cut.dng: cannot be read as a raw file"),
         ("empty.dng --scale 0.1mm/px", "expected a photograph of 1 byte"),
         ("eight.tif --scale 0.1mm/px", "of an unknown curve"),
-        (
-            "four.tif --scale 0.1mm/px",
-            "four.tif: expected one or three values a pixel, got an array of shape (30, 40, 4)",
-        ),
+        ("four.tif --scale 0.1mm/px",
+         "four.tif: expected one or three values a pixel, got an array of shape (30, 40, 4)"),
         ("huge.tif --scale 0.1mm/px", "huge.tif: expected finite numbers, got others"),
         ("six.tif --scale 0.1mm/px", "six.tif: cannot be read as a TIFF"),
         ("ten.tif --scale 0.1mm/px", "ten.tif: cannot be read as a TIFF"),
@@ -268,10 +266,8 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("SPOT --scale 0.1mm/px --glare 2+-2", "--glare must be a value between 0 and 1 with an error"),
         ("SPOT --scale 0.1mm/px --reflectance 0.2+-0.01", "--reflectance must be left out"),
         ("SPOT --scale 0.1mm/px --grey SPOT --reflectance 97.1", "got '97.1' (a share: 0.971 for 97.1 %)"),
-        (
-            f"SPOT --scale 0.1mm/px --surface {'9' * 5000}",
-            f"--surface must be a value with its error, such as 0.02+-0.02, got '{'9' * 59}...",
-        ),
+        (f"SPOT --scale 0.1mm/px --surface {'9' * 5000}",
+         f"--surface must be a value with its error, such as 0.02+-0.02, got '{'9' * 59}..."),
         ("SPOT --scale 0.1mm/px --beam fwhm:wide", "such as 0.5mm+-0.05mm or fwhm:0.6mm+-0.06mm, got 'fwhm:wide'"),
         ("SPOT --scale 0.1mm/px --n 3", "n = 3"),
         ("SPOT --scale 0.1mm/px --n 1.7 --g 0 --out out", "without --out the medium alone is measured"),
@@ -280,7 +276,7 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("SPOT --simulate SETUP.toml --out out", "SHOT must be left out"),
     ],
     ids=str,
-)
+)  # fmt: skip
 def test_bad_input_is_one_line_and_writes_nothing(refused, folder, tmp_path, words, said):
     files = {path.name: str(path) for path in folder.iterdir()} | {"SPOT": several(folder, "spot")[0]}
     out = "" if "--out" in words or "--simulate" in words else " --out out"

@@ -1,14 +1,23 @@
-"""What a shell completes, and how fast."""
+"""What shells and editors are offered, the library in words of the command line, and which records a command takes."""
 
 import os
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
+import jsonschema
 import pytest
 
+from mcml_sim.files.text_file import as_json
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.cli import options
+from profilefit.cli.options import in_options, records_folder
+from profilefit.cli.schema import FILES
+from profilefit.errors import InputError, OtherRecords
 from profilefit.recipes import catalogue, recipe, record
+from profilefit.recipes.folder import fits_folder
+from profilefit.report.tables.keys_table import models, schema_of
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.atlas import FUNCTIONS
 from profilefit.studies.tradeoff.parts import PARTS
@@ -92,3 +101,77 @@ print("LOADED", [name for name in {HEAVY!r} if name in sys.modules])
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "LOADED []"
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ("out must be another folder, got out", "--out must be another folder, got out"),
+        ("held alpha must be in (0, 1)", "--fix alpha must be in (0, 1)"),
+        ("x.csv: no row is left between `r_min` and `r_max`", "x.csv: no row is left between --r-min and --r-max"),
+        ("x.csv:1: column r: out must be", "x.csv:1: column r: out must be"),
+        ("constants of a record are its own", "constants of a record are its own"),
+        (
+            "lang must be glsl; `profilefit report` lists `names`",
+            "lang must be glsl; `profilefit report` lists `names`",
+        ),
+    ],
+)
+def test_arguments_are_named_by_their_options(told, said):
+    assert in_options(told) == said
+
+
+def test_content_is_gone_through_and_numbers_stay():
+    told = {"data": {"notes": ("left out by `r_min`",), "rows": 3}, "result": "hold it with `held` alpha=..."}
+    assert in_options(told) == {
+        "data": {"notes": ["left out by --r-min"], "rows": 3},
+        "result": "hold it with --fix alpha=...",
+    }
+
+
+def test_what_was_asked_for_comes_first_then_what_is_here_then_what_is_shipped(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert records_folder() == fits_folder()
+    assert all((fits_folder() / f"hazard.{kind}").is_file() for kind in ("toml", "json")), "recipes and records"
+    Path("fits").mkdir()
+    assert records_folder() == fits_folder(), "an empty folder has nothing to show"
+    Path("fits/one.json").write_text("{}")
+    with pytest.warns(OtherRecords, match="records of 'fits' in the folder that you are in; --fits chooses others"):
+        assert records_folder(quiet=True) == Path("fits")
+    Path("mine").mkdir()
+    with pytest.warns(OtherRecords, match="records of 'mine'$"):
+        assert records_folder(Path("mine")) == Path("mine")
+    assert records_folder(Path("mine"), quiet=True) == Path("mine")
+    assert records_folder(fits_folder()) == fits_folder()
+    with pytest.raises(InputError, match=r"--fits must be a folder of records, got 'asked', which is none"):
+        records_folder(Path("asked"))
+
+
+ROOT = Path(__file__).resolve().parents[3]
+SHIPPED = [path for folder in ("examples", "fits", "fits/stacks") for path in sorted((ROOT / folder).glob("*.toml"))]
+
+
+def kind_of(content):
+    if "scene" in content:
+        return "scene"
+    return "stack" if "layers" in content else "photo" if "medium" in content else "recipe"
+
+
+@pytest.fixture(scope="module")
+def schemas():
+    return {kind: jsonschema.Draft202012Validator(schema_of(models()[kind])) for kind in FILES}
+
+
+def test_shipped_files_are_valid(schemas):
+    contents = [tomllib.loads(path.read_text(encoding="utf-8")) for path in SHIPPED]
+    assert {kind_of(content) for content in contents} == set(FILES)
+    for path, content in zip(SHIPPED, contents, strict=True):
+        assert [error.message for error in schemas[kind_of(content)].iter_errors(content)] == [], path
+        assert not schemas[kind_of(content)].is_valid({**content, "colour": 1})
+    assert not schemas["photo"].is_valid({"medium": {"n": -1.0}})
+
+
+def test_the_command_prints_it_or_names_the_kinds(done, refused, schemas):
+    assert done("schema", "stack") == as_json(schemas["stack"].schema)
+    said = "profilefit: KIND must be one of scene, stack, recipe, photo, got 'fog'\n"
+    assert refused("schema fog", said) == said

@@ -402,13 +402,10 @@ def test_a_damaged_batch_is_named_and_done_again(command, mci):
     [
         ("mco", "cannot write first.mco: No space left on device"),
         ("npz", "cannot write first.npz: No space left on device"),
-        (
-            "photons",
-            "cannot write first.photons/run.json: No space left on device; what the store holds is whole, "
-            "the same command resumes",
-        ),
+        ("photons", "cannot write first.photons/run.json: No space left on device; what the store holds is whole, "
+         "the same command resumes"),
     ],
-)
+)  # fmt: skip
 def test_a_full_disk_is_one_line_and_nothing_half_written(command, mci, monkeypatch, end, told):
     mci.write_text(runs(("first.mco", 2000, 10)))
     sync = os.fsync
@@ -441,10 +438,8 @@ LEADS_OUT = "output files must lie in the current folder, or have a name and --o
         ("run two.mci --photons many", "photons must be a whole number >= 1 .*, got 'many'"),
         ("run two.mci --photons 1e400", "photons must be a whole number >= 1 .*, got inf"),
         ("run two.mci --seed 0.5", "seed must be a whole number >= 0, got 0.5"),
-        (
-            "run two.mci --workers 2 --scheduler tcp://here:1",
-            "workers must be None where a scheduler is given, whose workers they are, got 2",
-        ),
+        ("run two.mci --workers 2 --scheduler tcp://here:1",
+         "workers must be None where a scheduler is given, whose workers they are, got 2"),
         ("two.mci", "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
         ("run two.mci --photons 0", "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
         ("run two.mci --seed -1", "seed must be a whole number >= 0, got -1"),
@@ -452,15 +447,13 @@ LEADS_OUT = "output files must lie in the current folder, or have a name and --o
         ("run two.mci --precision 2", r"precision must be a relative standard error in \(0, 1\), got 2.0"),
         ("run two.mci --precision nan", "precision must be .*, got nan"),
         ("run two.mci --quantity absorbed", "quantity is what --precision looks at, got 'absorbed' .*"),
-        (
-            "run two.mci --precision 0.1 --quantity colour",
-            "quantity must be one of specular_reflectance, .*, got 'colour'",
-        ),
+        ("run two.mci --precision 0.1 --quantity colour",
+         "quantity must be one of specular_reflectance, .*, got 'colour'"),
         ("walk two.mci", "No such command 'walk'. .*"),
         ("run two.mci --out two.mci", "cannot write into two.mci: .*"),
         ("run two.mci --out a/folder", "cannot write a/folder/first.mco: it is a folder"),
     ],
-)
+)  # fmt: skip
 def test_what_a_user_can_mend_is_one_line(refused, mci, words, said):
     Path("a/folder/first.mco").mkdir(parents=True)
     before = names()
