@@ -74,22 +74,21 @@ def several(folder, name):
     return [str(path) for path in sorted(folder.glob(f"{name}-*.dng"))]
 
 
-def test_a_setup_becomes_photographs_and_what_they_could_tell(command, tmp_path):
+def test_a_setup_becomes_photographs_and_what_they_could_tell(done, tmp_path):
     (tmp_path / "SETUP.toml").write_text(SETUP)
-    status, out, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
-    assert (status, err) == (0, "wrote 12 photographs into shots\n")
+    out = done("photo", "--simulate", "SETUP.toml", "--out", "shots", said="wrote 12 photographs into shots\n")
     assert len(list((tmp_path / "shots").glob("*.dng"))) == 12
     best = {line.split("  ")[0]: line for line in out.splitlines() if "green" in line}
     alone, both = (float(best[name].split()[-2]) for name in ("no cards", "both"))
     assert both < 0.7 * alone
 
 
-def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
+def test_a_bracket_and_its_cards_give_the_medium(done, folder, tmp_path):
     """Every option that takes files takes all that follow it, as a shell writes them out."""
     cards = ["--card", *several(folder, "card"), "--grey", *several(folder, "grey")]
     words = ["--scale", "0.1mm/px", "--beam", "0.5mm+-0.05mm", "--out", "skin"]
-    status, out, err = command("photo", *several(folder, "spot"), *cards, *words)
-    assert (status, err) == (0, "wrote photo.html, photo.json, medium.glsl and 4 figures into skin\n")
+    said = "wrote photo.html, photo.json, medium.glsl and 4 figures into skin\n"
+    out = done("photo", *several(folder, "spot"), *cards, *words, said=said)
     assert max(map(len, out.splitlines())) <= 100
     found = json.loads((tmp_path / "skin" / "photo.json").read_text())
     for one in found["colours"].values():
