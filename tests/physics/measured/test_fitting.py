@@ -1,6 +1,6 @@
-"""Fits of one's own data, whole: what they find, what is not identifiable, what they advise; whitening of rings that share
-photons; the model against the law itself. One file, since its tests share one compiled law; those over hundreds of
-replicates are in test_coverage.
+"""Fits of one's own data: what they find, what is not identifiable, what they advise; the whitening of rings; and the
+model against the law itself. One file, since its tests share one compiled law; those over hundreds of replicates are
+in test_coverage.
 """
 
 from dataclasses import replace
@@ -38,6 +38,10 @@ def light(inner, outer, scale=1.0) -> np.ndarray:
     return Model(LAW).predicted(point[None], inner, outer)[0, :-1]
 
 
+def measured(inner, outer, value, sigma) -> Measured:
+    return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
+
+
 def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
     """Averages over rings, of this relative error, with noise if there is a seed."""
     inner, outer = EDGES[:-1][EDGES[1:] <= most], EDGES[1:][EDGES[1:] <= most]
@@ -45,7 +49,7 @@ def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
     sigma = error * value
     if seed is not None:
         value = value + sigma * np.random.default_rng(seed).standard_normal(value.size)
-    return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
+    return measured(inner, outer, value, sigma)
 
 
 def fit(data, total=None, scale_error=None, **held) -> MediumFit:
@@ -193,7 +197,7 @@ def small(generator) -> MediumFit:
     r = np.geomspace(first, first * generator.choice([1.5, 4.0, 20.0]), int(generator.integers(4, 8)))
     value = np.asarray(LAW.profile(r, 1.0 - generator.choice([0.0, 1e-3, 0.05, 0.3]), MFP))
     drawn = value * (1.0 + noise * generator.standard_normal(r.size))
-    data = Measured("made up", "", r, r, drawn, noise * value, np.full(r.size, np.inf), "as given", "mm")
+    data = measured(r, r, drawn, noise * value)
     return fit(data, **({} if generator.random() < 0.2 else {"scale": 1.0}))
 
 
@@ -275,8 +279,7 @@ def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
     r = np.array([0.002, 0.05, 0.2, 0.28, 1.2, 70.0, 990.0])
     value = np.array([-2.4e-11, -2.5e-3, 9.3e18, -8.1e15, 5e-5, 1.2e7, 2.7e-18])
     sigma = np.array([1.6e-15, 1.6e-7, 6.1e14, 5.3e11, 3.3e-9, 770.0, 1.8e-22])
-    data = Measured("made up", "", r, r, value, sigma, np.full(r.size, np.inf), "as given", "mm")
-    result = judged(fit(data))
+    result = judged(fit(measured(r, r, value, sigma)))
     assert result.fit.minimum.result != "converged"
     assert (result.identifiability, result.identified, result.draws) == (None, (), {})
     assert {result.value(name) for name in result.moving} == {None}
@@ -321,8 +324,7 @@ def test_rows_that_share_nothing_are_divided_by_their_errors():
     data = counted(energies(0.9), np.inf)
     rows = np.ones((data.value.size, 2))
     np.testing.assert_array_equal(noise(counted(energies(0.9))).whitened(rows).shape, rows.shape)
-    sigma = np.full(data.value.size, 0.5)
-    alone = Measured("made up", "", INNER, OUTER, data.value, sigma, data.freedom, "as given", "mm")
+    alone = measured(INNER, OUTER, data.value, np.full(data.value.size, 0.5))
     np.testing.assert_array_equal(noise(alone, widening=4.0).whitened(rows), rows)
 
 

@@ -1,5 +1,5 @@
-"""What data leave open of ranges, against fits at many values one by one. Fits to light of beams that have a width: with
-the width they hold the truth, without it they say what is amiss.
+"""What data leave open of ranges, against fits at many values one by one; and fits to light of beams that have a width:
+with it they hold the truth, without it they say what is amiss.
 """
 
 from dataclasses import replace
@@ -40,9 +40,8 @@ def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
     """Mean and error of g, and the covariance of the coordinates, are those of sixty fits."""
     spec = asked({"g": RANGE})
     found = fitted(measured.within(nearest, None), spec)
-    ends = np.clip(
-        found.range_marginal.mean["g"] + 6.0 * found.range_marginal.error["g"] * np.array([-1.0, 1.0]), *RANGE
-    )
+    left = found.range_marginal
+    ends = np.clip(left.mean["g"] + 6.0 * left.error["g"] * np.array([-1.0, 1.0]), *RANGE)
     g = ends[0] + (ends[1] - ends[0]) * (np.arange(60) + 0.5) / 60
     fits, start = [], found.minimum
     for value in g:
@@ -54,14 +53,13 @@ def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
     share = np.exp(log - log.max())
     share /= share.sum()
     mean = share @ g
-    assert found.range_marginal.mean["g"] == pytest.approx(mean, abs=0.02 * found.range_marginal.error["g"])
-    assert found.range_marginal.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
+    assert left.mean["g"] == pytest.approx(mean, abs=0.02 * left.error["g"])
+    assert left.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
     points = np.array([one.parameters[:2] for one in fits])
     off = points - share @ points
-    np.testing.assert_allclose(
-        np.diag(np.cov(found.range_marginal.offsets[:, :2].T)), np.diag((share[:, None] * off).T @ off), rtol=0.1
-    )
-    assert (found.range_marginal.error["g"] < 0.5 * (RANGE[1] - RANGE[0]) / 12**0.5) == (nearest < 1.0)
+    variances = np.diag((share[:, None] * off).T @ off)
+    np.testing.assert_allclose(np.diag(np.cov(left.offsets[:, :2].T)), variances, rtol=0.1)
+    assert (left.error["g"] < 0.5 * (RANGE[1] - RANGE[0]) / 12**0.5) == (nearest < 1.0)
 
 
 def test_data_find_the_width_of_a_beam(measured):
@@ -133,10 +131,9 @@ def test_open_ranges_hold_media_that_a_misfit_hides_in(at):
     errors = found.errors(found.total_covariance)
     for name, truth in {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}.items():
         assert abs(found.values[name] - truth) < found.quantile * errors[name], name
+    left = found.range_marginal
     for name in ranges:
-        assert (
-            abs(found.range_marginal.mean[name] - getattr(one.setting, name)) < 3 * found.range_marginal.error[name]
-        ), name
+        assert abs(left.mean[name] - getattr(one.setting, name)) < 3 * left.error[name], name
 
 
 @pytest.mark.slow
@@ -212,10 +209,8 @@ def test_a_pencil_beam_is_not_accused_and_the_width_that_would_matter_does():
     assert not width.noticed
     assert width.telling is not None
     there = fit(rings(PENCIL), Instrument(Gaussian(width.telling)), held={"scale": 1.0})
-    moved = (
-        abs(there.values[width.moved] - found.values[width.moved]) / found.errors(found.total_covariance)[width.moved]
-    )
-    assert moved == pytest.approx(1.0, abs=0.3)
+    moved, error = (each[width.moved] for each in (there.values, found.errors(found.total_covariance)))
+    assert abs(moved - found.values[width.moved]) / error == pytest.approx(1.0, abs=0.3)
     assert beam_width(there) is None, "it has a beam"
 
 
