@@ -187,15 +187,12 @@ def test_exposures_of_one_time_are_a_bracket(light):
         np.testing.assert_allclose(found.value, 1.0, rtol=0.02)
 
 
-def test_the_order_of_exposures_of_one_stated_time_does_not_matter(shots):
+def test_stated_times_of_one_value_have_any_order_and_those_that_pictures_contradict_are_named(shots):
     """A grey filter before the lens, say."""
     alike = [replace(one, seconds=0.1) for one in shots[0]]
     forth, back = bracket.times(alike), bracket.times(alike[::-1])
     np.testing.assert_array_equal(forth.value, back.value[::-1])
     assert forth.value[0] < 0.01
-
-
-def test_times_that_the_pictures_contradict_are_named(shots):
     (short, long, *_), _ = shots
     said = r"^1: expected less light than 0 has, which states a longer time, got 3\.94 times"
     with pytest.raises(InputError, match=said):

@@ -27,25 +27,19 @@ def test_prints_the_text_or_writes_it(command):
     assert Path("hazard.hlsl").read_text() == text
 
 
-def test_a_law_with_constants_of_ones_choice(command):
+def test_a_law_with_constants_of_ones_choice_and_by_a_name_of_its_own(command, done):
+    """What was only printed needs no word for it."""
     _, published, _ = command("export", "burley", "--constants", "published")
     _, regenerated, _ = command("export", "burley")
     assert "burley_s0 = 1.85;" in published
     assert "record burley-whole" in regenerated
     assert "record burley-whole" not in published
-
-
-def test_a_medium_by_a_name_of_its_own(command):
+    for name in ("burley_diffuse_mfp", "van_de_hulst", "chiang"):
+        assert f"\n// {name}, published: " in done("export", name, said=None)
     _, text, _ = command("export", "hazard", "--name", "skin")
     assert "float skin_profile(float r" in text
     assert "// skin_profile(r, alpha, mfp)" in text
     assert "hazard_" not in text
-
-
-def test_what_was_only_printed_needs_no_word_for_it(done):
-    for name in ("burley_diffuse_mfp", "van_de_hulst", "chiang"):
-        text = done("export", name, said=None)
-        assert f"\n// {name}, published: " in text
 
 
 def test_records_that_are_not_the_shipped_ones_are_named(command):

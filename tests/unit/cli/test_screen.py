@@ -35,6 +35,8 @@ def test_json_of_records_is_what_they_hold(command, done):
     records = {name: record.read(path) for name, path in record.available(FITS).items()}
     assert strict(done("report", "--json")) == {"records": records}
     assert list(strict(command("report", "hazard", "--json")[1])["records"]) == ["hazard"]
+    told = strict(done("convert", "--alpha", "1", "--mfp", "1mm", "--json", said=None))
+    assert told["dmfp"] == [None], "null for what is not finite"
 
 
 @pytest.mark.slow
@@ -45,10 +47,6 @@ def test_json_of_quality_is_measured(done):
     assert rational["quality"]["delta_A"] == pytest.approx(stated, rel=1e-3)
     assert rational["setting"] == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
     assert (told["quality"]["profiles"], told["quality"]["samplers"]) == ([], [])
-
-
-def test_json_has_null_for_what_is_not_finite(done):
-    assert strict(done("convert", "--alpha", "1", "--mfp", "1mm", "--json", said=None))["dmfp"] == [None]
 
 
 def test_a_mistake_is_no_json(refused):
@@ -142,7 +140,9 @@ def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):
     assert {one.name for one in tmp_path.iterdir()} == {"one.svg", "two.json"}
 
 
-def test_every_example_is_copied_and_named(done):
+def test_every_example_is_copied_and_named(done, refused):
+    Path("file").write_text("")
+    refused("examples --out file/inside", "profilefit: cannot write")
     out = done("examples")
     assert out.splitlines() == [f"examples/{name}" for name in EXAMPLES]
     assert all(Path("examples", name).read_bytes() == Path(path).read_bytes() for name, path in EXAMPLES.items())
@@ -157,8 +157,3 @@ def test_what_is_there_is_never_replaced_and_nothing_is_half_copied(refused, the
     assert refused("examples --out trial", said) == f"profilefit: {said}\n"
     assert [path.name for path in Path("trial").iterdir()] == ["skin.toml"]
     assert taken.is_symlink() or taken.read_text() == "mine"
-
-
-def test_where_nothing_can_be_written_is_one_line(refused):
-    Path("file").write_text("")
-    refused("examples --out file/inside", "profilefit: cannot write")

@@ -197,6 +197,8 @@ def test_a_mistake_is_one_line(refused):
     Path("scene.toml").write_text("[view]\npixel = -1\n", encoding="utf-8")
     older = 'keys are of an older format: write scene = "skin" and [choose] pixel for [view] pixel'
     assert refused("choose scene.toml", older) == f"profilefit: scene.toml: {older}\n"
+    shallow = changed(SEA, "depth = 4.0", "depth = 0.01")
+    assert refused(f"choose {shallow}", "").startswith("profilefit: scene.toml: "), "a sea that there is not"
 
 
 @pytest.mark.parametrize("kind", ["heart", "sea", "fur"])
@@ -246,10 +248,6 @@ def test_what_a_sea_needs(chosen):
     assert lines.startswith("terms: broadened; off the broadened haze at worst: ")
     for text in (scaled, single, "(requested: 10 %)", f"(F {told['focus']:.2g})", "views 16 (S 11)"):
         assert text in lines
-
-
-def test_a_sea_that_there_is_not(refused):
-    assert refused(f"choose {changed(SEA, 'depth = 4.0', 'depth = 0.01')}", "").startswith("profilefit: scene.toml: ")
 
 
 @pytest.fixture

@@ -73,16 +73,16 @@ def test_rings(table):
     np.testing.assert_array_equal(found.inner, [0, 1, 4])
     np.testing.assert_array_equal(found.outer, [1, 2, 5])
     assert found.unit == "um"
+    two_ways = table("r_in [µm],r_out (um),value,sigma\n0,1,.5,.01\n1,2,.2,.01\n4,5,.1,.01\n")
+    assert UNITS[two_ways.unit] == UNITS["um"]
 
 
-def test_values_per_another_area_are_converted(table):
+def test_values_per_another_area_are_converted_or_of_a_free_scale(table):
     for scaled in (False, True):  # a free scale of light per area is near 1 as well
         found = table("r [mm],value [1/cm^2],sigma\n1,50,1\n2,20,1\n3,10,1\n", scaled=scaled)
         np.testing.assert_allclose(found.value, [0.5, 0.2, 0.1])
         np.testing.assert_allclose(found.sigma, 0.01)
-
-
-def test_any_measure_will_do_if_the_scale_is_free(table):
+    # Any measure will do if the scale is free.
     text = "r [mm],value [a.u.],sigma\n1,50,1\n2,20,1\n3,10,1\n"
     np.testing.assert_array_equal(table(text, scaled=True).value, [50, 20, 10])
     with pytest.raises(InputError, match=r":1: column value: expected light per area .*, got \[a.u.\]"):
@@ -117,11 +117,6 @@ def test_headers_as_people_write_them(table, text):
     np.testing.assert_allclose(found.r * scale, [1, 2, 3])
     np.testing.assert_allclose(found.value / scale**2, [0.5, 0.2, 0.1])
     np.testing.assert_allclose(found.sigma / scale**2, 0.01)
-
-
-def test_rings_may_spell_one_unit_in_two_ways(table):
-    found = table("r_in [µm],r_out (um),value,sigma\n0,1,.5,.01\n1,2,.2,.01\n4,5,.1,.01\n")
-    assert UNITS[found.unit] == UNITS["um"]
 
 
 def test_replicates_that_agree_by_accident(table):
@@ -304,16 +299,14 @@ def test_records_of_a_colour_are_replicates(tls):
         ({"change": lambda rows: [*rows[:5], "1, 5"]}, "red", True, ":6: expected a record, a pixel and a value"),
     ],
 )
-def test_what_is_wrong_is_named(tls, given, colour, scaled, message):
+def test_what_is_wrong_in_records_is_named(tls, given, colour, scaled, message):
     with pytest.raises(InputError, match=rf"skin\.txt.*{message}"):
         read(tls(**given), None, scaled, colour)
 
 
-def test_another_table_has_no_colour(tmp_path):
-    path = tmp_path / "own.csv"
-    path.write_text("r,value,sigma\n1,1,.1\n2,.5,.1\n3,.2,.1\n")
+def test_another_table_has_no_colour(table):
     with pytest.raises(InputError, match="colour must be left out but for records of a TLS850, got 'red'"):
-        read(path, "mm", colour="red")
+        table(GOOD, unit="mm", colour="red")
 
 
 DATA = Path(__file__).parents[3] / "examples"
@@ -422,10 +415,12 @@ def points(rows):
     return Measured("made up", "", r, r, r**-2, 0.02 * r**-2, np.full(rows, np.inf), "as given", "mm")
 
 
-def test_what_can_be_worked_with_passes():
+def test_what_can_be_worked_with_passes_and_too_many_rows_name_the_way_out():
     require_workable(points(MOST_ROWS))
     dark = points(20)
     require_workable(replace(dark, value=np.where(dark.r > 5, 0.0, dark.value)))
+    with pytest.raises(InputError, match=r"at most 500 rows, got 501: average neighbours over annuli .* or .* `r_min`"):
+        require_workable(points(MOST_ROWS + 1))
 
 
 @pytest.mark.parametrize(
@@ -443,11 +438,6 @@ def test_numbers_whose_squares_are_no_floats(change, message):
     data = points(20)
     with pytest.raises(InputError, match=message):
         require_workable(replace(data, **{name: getattr(data, name) * times for name, times in change.items()}))
-
-
-def test_too_many_rows_name_the_way_out():
-    with pytest.raises(InputError, match=r"at most 500 rows, got 501: average neighbours over annuli .* or .* `r_min`"):
-        require_workable(points(MOST_ROWS + 1))
 
 
 def test_lengths_come_in_the_unit_of_the_data():
