@@ -1,5 +1,5 @@
-"""`profilefit check` and `export` as a user meets them: what passes, what fails and where, and what is no machine for it;
-what is written, what is refused, and in how many lines.
+"""`profilefit check` and `export` as a user meets them: what passes, what fails and where, and what is no machine for
+it; what is written, what is refused, and in how many lines.
 """
 
 import json
