@@ -52,18 +52,18 @@ def alpha_of(reflectance: ArrayLike, illumination: str, n: float = 1.0, g: float
     """
     white = float(reflectance_of(1.0, illumination, n, g))
     values = checked("reflectance", reflectance, 0.0, white)
-    return np.vectorize(lambda value: _alpha(value, white, illumination, n, g), otypes=[float])(values)
 
+    def inverse(value: float) -> float:
+        def excess(alpha: float) -> float:
+            return float(reflectance_of(alpha, illumination, n, g)) - value
 
-def _alpha(reflectance: float, white: float, illumination: str, n: float, g: float) -> float:
-    def excess(alpha: float) -> float:
-        return float(reflectance_of(alpha, illumination, n, g)) - reflectance
+        if value in (0.0, white):
+            return float(value > 0.0)
+        if value < MIDDLE:
+            return float(brentq(excess, 0.0, 1.0, xtol=1e-300, rtol=TIGHTEST))
+        return 1.0 - float(brentq(lambda s: excess(1.0 - s * s), 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST)) ** 2
 
-    if reflectance in (0.0, white):
-        return float(reflectance > 0.0)
-    if reflectance < MIDDLE:
-        return float(brentq(excess, 0.0, 1.0, xtol=1e-300, rtol=TIGHTEST))
-    return 1.0 - float(brentq(lambda s: excess(1.0 - s * s), 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST)) ** 2
+    return np.vectorize(inverse, otypes=[float])(values)
 
 
 def reflectance_by_cosine(alpha: ArrayLike, cosine: ArrayLike) -> Floats:
@@ -143,10 +143,10 @@ WRENNINGE = np.array(
 ).reshape(6, 8)
 
 
-def mapped_colour(name: str, alpha: Floats) -> Floats:
+def mapped_colour(name: str, alpha: Floats, n: float = 1.0, g: float = 0.0) -> Floats:
     """Return the colour [-] of one of `MAPS` at the reduced albedo [-], which by similarity holds whatever g.
 
-    Chiang's is 1 from its last albedo, 0.9989, on.
+    It is the same at any n. Chiang's is 1 from its last albedo, 0.9989, on.
     """
     return np.asarray(MAPS[name].reflectance(alpha))
 

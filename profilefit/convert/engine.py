@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from typing import Any
 
@@ -94,33 +95,27 @@ def dipole_reflectance(alpha: ArrayLike, index: float) -> Floats:
     return 0.5 * values * (1.0 + np.exp(-4.0 / 3.0 * (1.0 + fresnel) / (1.0 - fresnel) * s)) * np.exp(-s)
 
 
-def _by_map(name: str) -> Colour:
-    return lambda alpha, n, g: mapped_colour(name, alpha)
-
-
 def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
     """Return A [-] by photon beam diffusion per light that entered, which pbrt inverts; at most 1 can be typed."""
     law = BeamDiffusion(Setting(n=n))
     return np.minimum(np.asarray(law.reflectance(alpha)) / law.entered, 1.0)
 
 
-def _entered(alpha: Floats, n: float, g: float) -> Floats:
-    """Return A [-] under a pencil beam and this surface per light that entered."""
-    return reflectance_of(alpha, "searchlight", n, g) / reflectance_of(1.0, "searchlight", n, g)
-
-
 def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
     return UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
 
 
-# Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface.
+# Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface, "entered" is
+# A under a pencil beam and the medium's surface, per light that entered.
 COLOURS: dict[str, Colour] = {
-    **{name: _by_map(name) for name in MAPS},
+    **{name: partial(mapped_colour, name) for name in MAPS},
     "Wrenninge": lambda alpha, n, g: wrenninge_colour(alpha, g),
     "diffuse": lambda alpha, n, g: reflectance_of(alpha, "diffuse", 1.0, g),
     "searchlight": lambda alpha, n, g: reflectance_of(alpha, "searchlight", 1.0, g),
     "beam diffusion": _beam_diffusion,
-    "entered": _entered,
+    "entered": lambda alpha, n, g: (
+        reflectance_of(alpha, "searchlight", n, g) / reflectance_of(1.0, "searchlight", n, g)
+    ),
     "albedo": lambda alpha, n, g: unreduced(alpha, g),
 }
 # Lengths that are typed, over l [-]. The extinction of Cycles' legacy walk is 4 pi / (radius (1 - g)), that of its skin

@@ -32,8 +32,7 @@ class Optical:
 
     def __post_init__(self) -> None:
         Setting(g=self.g)  # refuses a mean cosine that is none
-        alpha, mfp = checked("alpha", self.alpha, 0.0, 1.0), _checked_length("mfp", self.mfp)
-        alpha, mfp = _broadcast({"alpha": alpha, "mfp": mfp})
+        alpha, mfp = _checked({"alpha": self.alpha, "mfp": self.mfp})
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "mfp", mfp)
 
@@ -42,8 +41,7 @@ class Optical:
         """Return the medium of this reduced albedo whose length `name`, one of `BY_NAME`, has this value [length]."""
         Setting(g=g)
         length = _named(name)
-        albedo, lengths = checked("alpha", alpha, 0.0, 1.0), _checked_length(name, value)
-        albedo, lengths = _broadcast({"alpha": albedo, name: lengths})
+        albedo, lengths = _checked({"alpha": alpha, name: value})
         factor = length.factor(albedo, g)
         if not np.all(np.isfinite(factor)):
             raise InputError(f"{name} must be another length at alpha = 1: it is infinite where nothing is absorbed")
@@ -52,8 +50,7 @@ class Optical:
     @classmethod
     def from_coefficients(cls, mu_a: ArrayLike, mu_s: ArrayLike, g: float = 0.0) -> Optical:
         """Return the medium of these absorption and reduced scattering coefficients [1/length], >= 0 and not both 0."""
-        absorption, scattering = checked("mu_a", mu_a, 0.0, LARGEST), checked("mu_s", mu_s, 0.0, LARGEST)
-        absorption, scattering = _broadcast({"mu_a": absorption, "mu_s": scattering})
+        absorption, scattering = _checked({"mu_a": mu_a, "mu_s": mu_s})
         both = absorption + scattering
         if not np.all(both > 0):
             raise InputError("mu_a + mu_s must be > 0: there is no medium, got 0")
@@ -89,16 +86,14 @@ def _named(name: str) -> Length:
     return BY_NAME[name]
 
 
-def _checked_length(name: str, values: ArrayLike) -> Floats:
-    numbers = checked(name, values, 0.0, LARGEST)
-    if np.any(numbers == 0.0):
-        raise InputError(f"{name} must be > 0 and finite, got 0")
-    return numbers
-
-
-def _broadcast(named: dict[str, Floats]) -> list[Floats]:
+def _checked(named: dict[str, ArrayLike]) -> list[Floats]:
+    """Return arrays of one shape, by name: alpha is at most 1, and a length is not 0."""
+    numbers = [checked(name, values, 0.0, 1.0 if name == "alpha" else LARGEST) for name, values in named.items()]
+    for name, values in zip(named, numbers, strict=True):
+        if name in BY_NAME and np.any(values == 0.0):
+            raise InputError(f"{name} must be > 0 and finite, got 0")
     try:
-        return [np.array(values) for values in np.broadcast_arrays(*named.values())]
+        return [np.array(values) for values in np.broadcast_arrays(*numbers)]
     except ValueError:
-        shapes = " and ".join(str(values.size) for values in named.values())
+        shapes = " and ".join(str(values.size) for values in numbers)
         raise InputError(f"{' and '.join(named)} must have one value or equally many, got {shapes}") from None

@@ -212,9 +212,11 @@ class MediumFit:
         rows, both = gaussianised(times * rows, self.data.freedom, self.data.pooled), np.outer(times, times)
         size = np.outer(self.light, self.light)
         shapes = [both * own.in_errors(size * waves(self.data.r, length), count) for length in lengths]
-        slopes = slopes[:, list(self.spec.free)]
+        free = list(self.spec.free)
+        slopes = slopes[:, free]
         if values:
-            slopes = np.column_stack([slopes, slopes_by_ranges(problem, values, self.point)])
+            at = np.array([values[name] for name in self.spec.ranges])
+            slopes = np.column_stack([slopes, slopes_by_ranges(problem, self.point[free], at)])
         law = both * own.in_errors(self.problem.noise.model, count)
         return rows, times[:, None] * slopes, law, np.array(shapes)
 

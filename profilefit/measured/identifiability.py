@@ -90,13 +90,17 @@ class Identifiability:
 
 def identifiability(fit: MediumFit) -> Identifiability:
     """Judge identifiability by profile likelihood: chi-square as one coordinate is moved and the others are fitted."""
-    intervals = tuple(_interval(fit, at) for at in fit.spec.free)
+    intervals = []
+    for at in fit.spec.free:
+        ends = [_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0))]  # alpha falls as u rises
+        low, high = (float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends)
+        intervals.append(Interval(NAMES[at], low, high, *(is_open for _, is_open in ends)))
     relative = relative_errors(fit, fit.total_covariance)
     if fit.at_edge:  # mu_a is anything down to, or up to, where alpha ends
         relative["mu_a"] = np.inf
     loose = {name: value for name, value in relative.items() if not value < LOOSE}
     pair, correlation = _pair(fit)
-    return Identifiability(intervals, loose, pair, correlation)
+    return Identifiability(tuple(intervals), loose, pair, correlation)
 
 
 def relative_errors(fit: MediumFit, covariance: Floats) -> dict[str, float]:
@@ -115,14 +119,6 @@ def _pair(fit: MediumFit) -> tuple[tuple[str, str] | None, float]:
     upper = np.triu(joint / np.outer(spread, spread), 1)
     i, j = np.unravel_index(np.argmax(np.abs(upper)), upper.shape)
     return (NAMES[free[i]], NAMES[free[j]]), float(upper[i, j])
-
-
-def _interval(fit: MediumFit, at: int) -> Interval:
-    """Return both ends of the profile likelihood in coordinate `at`."""
-    ends = (_end(fit, at, side) for side in ((1.0, -1.0) if at == U else (-1.0, 1.0)))  # alpha falls as u rises
-    (low, low_is_open), (high, high_is_open) = ends
-    low, high = (float(alpha_of(x)) if at == U else float(np.exp(x)) for x in (low, high))
-    return Interval(NAMES[at], low, high, low_is_open, high_is_open)
 
 
 def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
@@ -264,10 +260,16 @@ def beam_width(fit: MediumFit) -> BeamWidth | None:
     plain = fit.plain or fit
     fits = _under_widths(plain.problem, plain.minimum)
     best = _best(fits)
-    if fit.plain is not None and best > 0 and (lack := _lack(fit.plain, best, fits[best])) is not None:
-        problem = replace(plain.problem, noise=replace(plain.problem.noise, lack=lack))
-        fits = _under_widths(problem, descended(problem, plain.point, plain.spec.free))
-        best = _best(fits)
+    if fit.plain is not None and best > 0:
+        known = {} if plain.range_marginal is None else plain.range_marginal.mean
+        spec = replace(plain.spec, ranges={**plain.spec.ranges, "beam": (0.0, 0.5 * float(plain.data.r[-1]))})
+        wide = replace(plain.problem, spec=spec).under({"beam": best})
+        # Where the best width leaves a lack of fit, too, the widths are judged by errors that allow for it.
+        lack = replace(plain, problem=wide, minimum=fits[best]).lack_of_fit({**known, "beam": best})
+        if lack is not None:
+            problem = replace(plain.problem, noise=replace(plain.problem.noise, lack=lack))
+            fits = _under_widths(problem, descended(problem, plain.point, plain.spec.free))
+            best = _best(fits)
     fall = max(finite_cost(fits[0.0]) - finite_cost(fits[best]), 0.0)
     chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
     if fit.plain is not None:
@@ -297,14 +299,6 @@ def _under_widths(problem: Problem, pencil: Solution) -> dict[float, Solution]:
 
 def _best(fits: dict[float, Solution]) -> float:
     return min(fits, key=lambda w: finite_cost(fits[w]))
-
-
-def _lack(plain: MediumFit, w: float, there: Solution) -> Floats | None:
-    """Return the covariance of the lack of fit that the best width leaves; None if it leaves none."""
-    known = {} if plain.range_marginal is None else plain.range_marginal.mean
-    spec = replace(plain.spec, ranges={**plain.spec.ranges, "beam": (0.0, 0.5 * float(plain.data.r[-1]))})
-    problem = replace(plain.problem, spec=spec).under({"beam": w})
-    return replace(plain, problem=problem, minimum=there).lack_of_fit({**known, "beam": w})
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,10 @@ class Gaussian:
 
     def nodes(self, d: Floats) -> Nodes:
         reach = REACH * self.w
-        rho, weight = _panels(np.maximum(d - reach, 0.0), d + reach)
+        low, high = np.maximum(d - reach, 0.0), d + reach
+        edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
+        near, far = _graded(low, edges[..., 1]), between(edges[..., 1:])
+        rho, weight = (np.concatenate(each, axis=-1) for each in zip(near, far, strict=True))
         b = 2.0 / (np.pi * self.w**2) * np.exp(-2.0 * ((d[..., None] - rho) / self.w) ** 2)
         return rho, weight * b * i0e(4.0 * d[..., None] * rho / self.w**2)
 
@@ -164,7 +167,10 @@ def _read(path: Path) -> Profiled:
     lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
     rows: list[list[float]] = []
     for number, (at, line) in enumerate((at, line) for at, line in lines if line):
-        numbers = [_number(cell) for cell in CELLS.split(line)]
+        try:
+            numbers = [float(cell) for cell in CELLS.split(line)]
+        except ValueError:
+            numbers = [math.nan]
         if number == 0 and any(math.isnan(one) for one in numbers):
             continue
         if len(numbers) != 2 or not all(math.isfinite(one) and one >= 0 for one in numbers):
@@ -181,21 +187,6 @@ def _read(path: Path) -> Profiled:
     if r[0] > 0:  # a profile that begins off the axis is flat up to there
         r, value = np.append(0.0, r), np.append(value[0], value)
     return Profiled(r, value)
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
-
-
-def _panels(low: Floats, high: Floats) -> Nodes:
-    """Return nodes of PANELS equal panels, the first of them graded towards its lower end."""
-    edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
-    first, d_first = _graded(low, edges[..., 1])
-    rest, d_rest = between(edges[..., 1:])
-    return np.concatenate([first, rest], axis=-1), np.concatenate([d_first, d_rest], axis=-1)
 
 
 def between(edges: Floats, panel: Nodes = PANEL) -> Nodes:

@@ -102,11 +102,11 @@ def fit_layers(
     known = scale if isinstance(scale, Known) else None
     held = float(scale) if isinstance(scale, float | int) else 1.0
     names = tuple(free) + (() if isinstance(scale, float | int) else ("scale",))
-    _require_free(medium, free)
+    places = _places(medium, free)
     if data.value.size <= len(names):
         raise InputError(f"{data.source}: expected more than {len(names)} rows, one more than is free")
     wider = widening(data.freedom, len(names))
-    problem = _LayersProblem(data, medium, tuple(free), premises, noise(data, widening=wider), held, known)
+    problem = _LayersProblem(data, medium, places, premises, noise(data, widening=wider), held, known)
     start = np.zeros(len(names))
     light = problem.rows(start[: len(free)])  # what cannot be solved fails here
     problem = replace(problem, premises=replace(premises, setting=_setting(data, medium, premises)))
@@ -141,11 +141,14 @@ def _setting(data: Measured, medium: Medium, premises: Premises) -> Setting:
 
 @dataclass(frozen=True)
 class _LayersProblem:
-    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free."""
+    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free.
+
+    free  layer, from 0, and field of each quantity
+    """
 
     data: Measured
     medium: Medium
-    free: tuple[str, ...]
+    free: tuple[tuple[int, str], ...]
     premises: Premises
     weights: Noise
     held: float
@@ -153,10 +156,8 @@ class _LayersProblem:
 
     def at(self, x: Floats) -> Medium:
         layers = list(self.medium.layers)
-        for name, log in zip(self.free, x, strict=False):
-            kind, number = _parts(name)
-            layer, field = layers[number - 1], FIELDS[kind]
-            layers[number - 1] = replace(layer, **{field: getattr(layer, field) * math.exp(log)})
+        for (at, field), log in zip(self.free, x, strict=False):
+            layers[at] = replace(layers[at], **{field: getattr(layers[at], field) * math.exp(log)})
         return replace(self.medium, layers=tuple(layers))
 
     def rows(self, x: Floats) -> Floats:
@@ -194,7 +195,7 @@ def _judged(problem: _LayersProblem, names: tuple[str, ...], done: solver.Soluti
         result = f"{names[int(np.argmax(done.at_bound))]} runs away: these data do not constrain it"
     products = tuple((way / way[np.argmax(np.abs(way))], float(size)) for way, size in zip(ways, sizes, strict=True))
     medium = problem.at(done.parameters)
-    values = [getattr(medium.layers[number - 1], FIELDS[kind]) for kind, number in map(_parts, problem.free)]
+    values = [getattr(medium.layers[at], field) for at, field in problem.free]
     values += [math.exp(done.parameters[-1])] if len(names) > len(problem.free) else []
     return LayersFit(
         data, problem.premises, problem.medium, medium, names, np.array(values), errors,
@@ -202,21 +203,21 @@ def _judged(problem: _LayersProblem, names: tuple[str, ...], done: solver.Soluti
     )  # fmt: skip
 
 
-def _parts(name: str) -> tuple[str, int]:
-    match = NAME.fullmatch(name)
-    if match is None:
-        raise InputError(f"free must name quantities such as d1, mu_a2 or mu_s2, got {name!r}")
-    return match[1], int(match[2])
-
-
-def _require_free(medium: Medium, free: Sequence[str]) -> None:
+def _places(medium: Medium, free: Sequence[str]) -> tuple[tuple[int, str], ...]:
+    """Return layer, from 0, and field of each free quantity; InputError of one that the medium has not."""
     if not free:
         raise InputError("free must name quantities such as d1, mu_a2 or mu_s2, got none")
+    places = []
     for name in free:
-        kind, number = _parts(name)
-        if number > len(medium.layers):
+        match = NAME.fullmatch(name)
+        if match is None:
+            raise InputError(f"free must name quantities such as d1, mu_a2 or mu_s2, got {name!r}")
+        at, field = int(match[2]) - 1, FIELDS[match[1]]
+        if at >= len(medium.layers):
             raise InputError(f"free must name one of {len(medium.layers)} layers, got {name!r}")
-        value = getattr(medium.layers[number - 1], FIELDS[kind])
+        places.append((at, field))
+        value = getattr(medium.layers[at], field)
         if not 0 < value < math.inf or free.count(name) > 1:
             got = "it twice" if free.count(name) > 1 else f"{name} = {value:g}"
             raise InputError(f"free must name quantities > 0 that are finite, each once, got {got}")
+    return tuple(places)

@@ -344,13 +344,8 @@ def marginalise(problem: Problem, start: Solution, known: Mapping[str, float] | 
     return RangeMarginal(means, errors, there, drawn - there.parameters)
 
 
-def slopes_by_ranges(problem: Problem, values: Mapping[str, float], point: Floats) -> Floats:
-    """Return derivatives (m, k) of the residuals at a point (3,) by the spec's k ranges, where these have `values`."""
-    at = np.array([values[name] for name in problem.spec.ranges])
-    return _by_ranges(problem, point[list(problem.spec.free)], at)
-
-
-def _by_ranges(problem: Problem, theta: Floats, values: Floats) -> Floats:
+def slopes_by_ranges(problem: Problem, theta: Floats, values: Floats) -> Floats:
+    """Return derivatives (m, k) of the residuals by the spec's k ranges: free coordinates (p,), the ranges' values."""
     low, high = np.array(list(problem.spec.ranges.values())).T
     return differences(lambda moved: _residuals(problem, theta, moved)[0], STEP * (high - low), high)(values)[1]
 
@@ -386,7 +381,7 @@ def _box(problem: Problem, start: Solution, values: dict[str, float]) -> tuple[S
 
     def at(x: Floats) -> tuple[Floats, Floats]:
         theta, values = np.split(x, [len(free)])
-        by_range = _by_ranges(problem, theta, values)
+        by_range = slopes_by_ranges(problem, theta, values)
         rows, slopes = _residuals(problem, theta, values)
         return rows, np.column_stack([slopes, by_range])
 
@@ -424,17 +419,17 @@ def _log_volumes(problem: Problem, fits: Sequence[Solution]) -> Floats:
         slopes = one.jacobian[:, free]
         sign, log = np.linalg.slogdet(slopes.T @ slopes)
         if sign > 0 and (one.converged or one.result == AT_WHITE):
-            volumes[at] = -0.5 * log + (_log_inside(one, free) if U in free else 0.0)
+            volumes[at] = -0.5 * log
+            if U not in free:
+                continue
+            # The prior's density at the fit, times the share of its errors with alpha < 1.
+            others = one.jacobian[:, [other for other in free if other != U]]
+            along = one.jacobian[:, U] - others @ np.linalg.lstsq(others, one.jacobian[:, U])[0]
+            size = float(np.linalg.norm(along))  # s over its error
+            pull = float(along @ one.residuals) / size  # 0 at a minimum, positive at an end
+            inside = float(log_prior(one.parameters[U])) + 0.5 * pull**2 + float(special.log_ndtr(size - pull))
+            volumes[at] += inside
     return volumes
-
-
-def _log_inside(one: Solution, free: Sequence[int]) -> float:
-    """Return ln of the prior's density at a fit, times the share of its errors with alpha < 1."""
-    others = one.jacobian[:, [at for at in free if at != U]]
-    along = one.jacobian[:, U] - others @ np.linalg.lstsq(others, one.jacobian[:, U])[0]
-    size = float(np.linalg.norm(along))  # s over its error
-    pull = float(along @ one.residuals) / size  # 0 at a minimum, positive at an end
-    return float(log_prior(one.parameters[U])) + 0.5 * pull**2 + float(special.log_ndtr(size - pull))
 
 
 def _scaled(t: Floats, ends: tuple[float, float]) -> Floats:

@@ -145,7 +145,8 @@ def _read_table(path: Path, content: bytes, unit: str | None, scaled: bool) -> M
     named = stated.pop("unit", None)
     notes = _notes(others, named, unit)
     unit = named.text if named is not None and unit is None else unit
-    numbers = _numbers(table)
+    cells = [[_number(table, line, *each) for each in zip(table.names, row, strict=True)] for line, row in table.rows]
+    numbers = dict(zip(table.names, np.array(cells).T, strict=True))
     inner, outer = _radii(table, numbers)
     length = _length_unit(table, unit)
     means, errors = _values(table, numbers)
@@ -193,12 +194,12 @@ def _bad(path: Path, line: int, expected: str, got: object) -> InputError:
 
 def _text(path: Path, content: bytes) -> str:
     try:
-        text = content.decode("utf-8-sig")
+        text, wrong = content.decode("utf-8-sig"), content.find(b"\x00")
     except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise _bad(path, line, "expected text in UTF-8", f"the byte {content[error.start]:#04x}") from None
-    if "\x00" in text:
-        raise _bad(path, text[: text.index("\x00")].count("\n") + 1, "expected text in UTF-8", "the byte 0x00")
+        text, wrong = "", error.start
+    if wrong >= 0:
+        line = content[:wrong].count(b"\n") + 1
+        raise _bad(path, line, "expected text in UTF-8", f"the byte {content[wrong]:#04x}")
     return text
 
 
@@ -292,37 +293,25 @@ def _header(path: Path, at: int, cells: tuple[str, ...]) -> tuple[tuple[str, ...
         if name not in NAMES and not REPLICATE.fullmatch(name):
             hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
             raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {_shown(word)}{hint}")
-    if missing := next(_missing(names), None):
+    if missing := _missing(names):
         raise _bad(path, at, f"expected a header of {ACCEPTED}", missing)
-    return names, tuple(_unit(match) for match in matches)
+    units = [next(filter(None, match.groups()[1:]), "").strip() if match else "" for match in matches]
+    # value / (1/mm^2)
+    return names, tuple(unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit for unit in units)
 
 
-def _unit(match: re.Match[str] | None) -> str:
-    unit = next(filter(None, match.groups()[1:]), "").strip() if match else ""
-    return unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit  # value / (1/mm^2)
-
-
-def _missing(names: tuple[str, ...]) -> Iterator[str]:
-    """Yield what a header lacks, or has too much of."""
+def _missing(names: tuple[str, ...]) -> str:
+    """Return what a header lacks, or has too much of; "" if nothing."""
     replicates = sum(1 for name in names if REPLICATE.fullmatch(name))
-    if ("r_in" in names) != ("r_out" in names):
-        yield "one of r_in and r_out without the other"
-    if ("r" in names) == ("r_in" in names):
-        yield "both r and r_in" if "r" in names else "no column r"
-    if replicates and ("value" in names or "sigma" in names):
-        yield "replicates beside value or sigma"
-    if replicates and replicates < FEWEST:
-        yield f"{replicates} replicates: fewer than {FEWEST} give no useful standard error"
-    if not replicates and "value" not in names:
-        yield "no column value"
-    if not replicates and "sigma" not in names:
-        yield "no column sigma: a fit needs the standard errors of its data"
-
-
-def _numbers(table: _Table) -> dict[str, Floats]:
-    """Return every column as numbers (n,), all of them finite."""
-    cells = [[_number(table, line, *each) for each in zip(table.names, row, strict=True)] for line, row in table.rows]
-    return dict(zip(table.names, np.array(cells).T, strict=True))
+    faults = (
+        (("r_in" in names) != ("r_out" in names), "one of r_in and r_out without the other"),
+        (("r" in names) == ("r_in" in names), "both r and r_in" if "r" in names else "no column r"),
+        (replicates > 0 and ("value" in names or "sigma" in names), "replicates beside value or sigma"),
+        (0 < replicates < FEWEST, f"{replicates} replicates: fewer than {FEWEST} give no useful standard error"),
+        (not replicates and "value" not in names, "no column value"),
+        (not replicates and "sigma" not in names, "no column sigma: a fit needs the standard errors of its data"),
+    )
+    return next((words for is_fault, words in faults if is_fault), "")
 
 
 def _number(table: _Table, line: int, name: str, cell: str) -> float:
@@ -367,23 +356,21 @@ def _radii(table: _Table, numbers: dict[str, Floats]) -> tuple[Floats, Floats]:
 
 def _values(table: _Table, numbers: dict[str, Floats]) -> tuple[ModeratedVariance, str]:
     """Return values with their standard errors, and the kind of the errors in words."""
-    if table.replicates:
-        samples = np.stack([numbers[name] for name in table.replicates], axis=1)
-        value, named = samples.mean(axis=1), table.replicates[0]
-    else:
-        samples, value, named = None, numbers["value"], "sigma"
+    replicates = table.replicates
+    samples = np.stack([numbers[name] for name in replicates or ("value",)], axis=1)
+    value = samples.mean(axis=1)
     if not np.any(value > 0):
         raise InputError(f"{table.path}: expected a value above 0, got none")
-    if samples is None:
-        means, errors = ModeratedVariance(value, numbers["sigma"], np.full(value.size, np.inf), np.inf), "as given"
+    if replicates:
+        means, errors = moderated_variances(samples), _moderated(f"{len(replicates)} replicates")
     else:
-        means, errors = moderated_variances(samples), _moderated(f"{samples.shape[1]} replicates")
+        means, errors = ModeratedVariance(value, numbers["sigma"], np.full(value.size, np.inf), np.inf), "as given"
     for (line, _), one in zip(table.rows, means.sigma, strict=True):
-        if not 0 < one < np.inf and samples is not None:
+        if replicates and not 0 < one < np.inf:
             expected = f"replicates that differ, here or in {FEWEST} other rows, to know their standard error"
-            raise table.bad(line, named, expected, "the same value in all")
+            raise table.bad(line, replicates[0], expected, "the same value in all")
         if not one > 0:
-            raise table.bad(line, named, "a standard error > 0", f"{one:g}")
+            raise table.bad(line, "sigma", "a standard error > 0", f"{one:g}")
     return means, errors
 
 

@@ -37,11 +37,13 @@ SHORTEST = 1e-3  # seconds, of the spot: its light is as bright as that
 STEP = 4.0  # from one exposure to the next
 FULL = 0.5  # of the sensor's range, that the shortest one reaches
 CFA = {"red": 0, "green": 1, "blue": 2}
+WHITE = 0.9  # reflectance of the white card
 GREY_ERROR, BEAM_ERROR = 0.03, 0.1  # relative, of what is told
 SCATTER = 0.003  # of a ring, by speckle and noise
 
 
 Side = Annotated[int, Field(ge=1, le=MOST_SIDE)]
+Sides = Annotated[tuple[Side, Side], LISTED, words(f"two whole numbers of pixels in 1 ... {MOST_SIDE}")]
 Scattering = Annotated[float, Field(ge=1e-3, le=MOST)]
 Absorption = Annotated[float, Field(ge=1e-4, le=MOST)]
 
@@ -60,7 +62,6 @@ class MediumTable(Declared):
 
     @property
     def setting(self) -> Setting:
-        """Illumination and surface."""
         return Setting(n=self.n, g=self.g)
 
     @model_validator(mode="after")
@@ -92,10 +93,7 @@ class SensorTable(Declared):
     late  relative error of stated times
     """
 
-    sides: Annotated[tuple[Side, Side], LISTED, words(f"two whole numbers of pixels in 1 ... {MOST_SIDE}")] = (
-        1200,
-        900,
-    )
+    sides: Sides = (1200, 900)
     pitch: Annotated[float, Field(gt=0.0, le=10.0)] = SENSOR.pitch
     gain: Annotated[float, Field(gt=0.0, le=1e4)] = SENSOR.gain
     read: Annotated[float, Field(gt=0.0, le=1e4)] = SENSOR.read
@@ -113,7 +111,6 @@ class SensorTable(Declared):
 
     @property
     def camera(self) -> SpotCamera:
-        """Camera of these numbers."""
         return SpotCamera(**self.model_dump(exclude={"exposures", "late", "seed"}))
 
     @model_validator(mode="after")
@@ -131,6 +128,11 @@ class CardsTable(Declared):
     white: bool = False
     grey: Tolerance | None = None
 
+    @property
+    def shown(self) -> dict[str, float]:
+        """Reflectance of each card that there is, by the name of its photographs."""
+        return ({"card": WHITE} if self.white else {}) | ({} if self.grey is None else {"grey": self.grey})
+
 
 class Setup(Declared):
     """Medium, beam, lens and camera of a simulation."""
@@ -142,12 +144,10 @@ class Setup(Declared):
 
     @property
     def optics(self) -> SpotOptics:
-        """Beam and lens."""
         return SpotOptics(**self.optics_table.model_dump())
 
     @property
     def camera(self) -> SpotCamera:
-        """Sensor."""
         return self.camera_table.camera
 
     @model_validator(mode="after")
@@ -181,11 +181,8 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
             simulated.light(*medium, setup.medium.photons, len(CHANNELS) * setup.camera_table.seed + at),
         )
     card = simulated.card(setup.optics, radii)
-    scenes = {"spot": spot}
-    if setup.cards.white:
-        scenes["card"] = dict.fromkeys(CHANNELS, (radii, 0.9 * card))
-    if setup.cards.grey is not None:
-        scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.cards.grey * card))
+    shown = {name: dict.fromkeys(CHANNELS, (radii, share * card)) for name, share in setup.cards.shown.items()}
+    scenes = {"spot": spot} | shown
     rng = np.random.default_rng(setup.camera_table.seed)
     exposures = {}
     enough = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black)
@@ -205,11 +202,9 @@ def written(setup: Setup, out: Path) -> list[Path]:
     InputError where another camera's lie under these names, or where any lie that are not of this setup, which SPOT-*
     would name too.
     """
-    taken = {"spot": True, "card": setup.cards.white, "grey": setup.cards.grey is not None}
-    own = {
-        out / f"{name}-{at}.dng" for name in taken if taken[name] for at in range(1, setup.camera_table.exposures + 1)
-    }
-    for file in sorted(one for name in taken for one in out.glob(f"{name}-*.dng")):
+    numbers = range(1, setup.camera_table.exposures + 1)
+    own = {out / f"{name}-{at}.dng" for name in ("spot", *setup.cards.shown) for at in numbers}
+    for file in sorted(one for name in ("spot", "card", "grey") for one in out.glob(f"{name}-*.dng")):
         if file not in own:
             raise InputError(f"{file}: expected none but photographs of this setup in its folder, got another")
         if OURS not in read_whole(file, HEAD):
@@ -224,14 +219,14 @@ def written(setup: Setup, out: Path) -> list[Path]:
 
 def room(setup: Setup) -> float:
     """Return bytes that the photographs take on a disk, and as many as a command's other files may take."""
-    scenes = 1 + setup.cards.white + (setup.cards.grey is not None)
-    return ROOM + scenes * setup.camera_table.exposures * 2 * math.prod(setup.camera.sides)
+    return ROOM + (1 + len(setup.cards.shown)) * setup.camera_table.exposures * 2 * math.prod(setup.camera.sides)
 
 
 def as_dng(exposure: SimulatedExposure) -> bytes:
     """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
     codes = tuple(CFA[colour] for row in exposure.pattern for colour in row)
+    below = 10 ** int(np.clip(9 - np.ceil(np.log10(max(exposure.seconds, 1e-9))), 0, 9))  # of the ratio of seconds
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
     tags: list[tuple[int, str, int, Any, bool]] = [
         (50706, "B", 4, (1, 4, 0, 0), True), (50707, "B", 4, (1, 1, 0, 0), True),  # versions
@@ -240,7 +235,7 @@ def as_dng(exposure: SimulatedExposure) -> bytes:
         (50713, "H", 2, (2, 2), True), (50714, "H", 4, (exposure.black,) * 4, True),
         (50717, "I", 1, exposure.white, True),
         (50721, "2i", 9, identity, True), (50778, "H", 1, 21, True), (50728, "2I", 3, (1, 1, 1, 1, 1, 1), True),
-        (33434, "2I", 1, _ratio(exposure.seconds), True),
+        (33434, "2I", 1, (round(exposure.seconds * below), below), True),
     ]  # fmt: skip
     file = io.BytesIO()
     tifffile.imwrite(
@@ -248,11 +243,6 @@ def as_dng(exposure: SimulatedExposure) -> bytes:
         rowsperstrip=exposure.counts.shape[0],
     )  # fmt: skip
     return file.getvalue()
-
-
-def _ratio(seconds: float) -> tuple[int, int]:
-    below = 10 ** int(np.clip(9 - np.ceil(np.log10(max(seconds, 1e-9))), 0, 9))
-    return round(seconds * below), below
 
 
 def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:

@@ -118,8 +118,12 @@ def light(
 ) -> Floats:
     """Return I(r) [1/mm^2] of a medium of reduced albedo and l* [mm], per light on it; exact, or by traced photons."""
     k, weight = _waves(optics, float(r.max()))
-    if photons:
-        medium = _traced(alpha, length, setting, k, photons, seed)
+    if photons:  # the transform of traced rings, taken as constant within a ring
+        layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
+        edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
+        tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
+        disc = 2.0 * np.pi * edges * j1(np.multiply.outer(np.maximum(k, 1e-12), edges)) / np.maximum(k, 1e-12)[:, None]
+        medium = np.asarray(np.diff(disc, axis=1) @ tally.reflectance_r.value, float)
     else:
         medium = _transform(alpha, length, setting, k.tobytes())
     return _inverse((medium + optics.surface) * optics.transform(k), k, weight, r)
@@ -129,15 +133,6 @@ def card(optics: SpotOptics, r: Floats) -> Floats:
     """Return I(r) [1/mm^2] of a white card that light does not enter."""
     k, weight = _waves(optics, float(r.max()))
     return _inverse(optics.transform(k), k, weight, r)
-
-
-def _traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
-    """Return the Hankel transform of traced rings, taken as constant within a ring."""
-    layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
-    edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
-    tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
-    disc = 2.0 * np.pi * edges * j1(np.multiply.outer(np.maximum(k, 1e-12), edges)) / np.maximum(k, 1e-12)[:, None]
-    return np.asarray(np.diff(disc, axis=1) @ tally.reflectance_r.value, float)
 
 
 @lru_cache(maxsize=8)
@@ -202,7 +197,10 @@ def exposures_of(
     r = camera.pitch * np.hypot(across, down / np.float32(np.cos(np.radians(camera.tilt))))
     corner = ((x - middle[0]) ** 2 + (y - middle[1]) ** 2) / (middle[0] ** 2 + middle[1] ** 2)
     sees = (1.0 - camera.corner * corner) * (1.0 + camera.uneven * rng.standard_normal(r.shape, dtype=np.float32))
-    sees *= _speckle(camera, rng)
+    if camera.speckle != 0:  # speckle of mean 1, in grains
+        noise = gaussian_filter(rng.standard_normal(camera.sides[::-1], dtype=np.float32), camera.grain, mode="wrap")
+        noise *= camera.speckle / noise.std()
+        sees *= np.exp(noise - 0.5 * camera.speckle**2)
     expected = np.empty(r.shape, np.float32)
     for row, column in np.ndindex(2, 2):
         at = (slice(row, None, 2), slice(column, None, 2))
@@ -218,15 +216,6 @@ def exposures_of(
 def radii(farthest: float, optics: SpotOptics) -> Floats:
     """Return radii at which a picture's light is computed, from the axis out to `farthest` [mm]."""
     return np.append(0.0, np.geomspace(0.02 * optics.sigma, farthest, RADII))
-
-
-def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Draw speckle of mean 1, of the camera's contrast, in grains."""
-    if camera.speckle == 0:
-        return np.ones((1, 1), np.float32)
-    noise = gaussian_filter(rng.standard_normal(camera.sides[::-1], dtype=np.float32), camera.grain, mode="wrap")
-    noise *= camera.speckle / noise.std()
-    return np.exp(noise - 0.5 * camera.speckle**2)
 
 
 def _recorded(expected: NDArray[np.float32], camera: SpotCamera, rng: np.random.Generator) -> Counts:

@@ -1,22 +1,25 @@
-"""Fits of one's own data, whole: what they find, what is not identifiable, what they advise. One file, since its
-tests share one compiled law; those over hundreds of replicates are in test_coverage.
+"""Fits of one's own data: what they find, what is not identifiable, what they advise; the whitening of rings; and the
+model against the law itself. One file, since its tests share one compiled law; those over hundreds of replicates are
+in test_coverage.
 """
 
 from dataclasses import replace
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
+from profilefit.measured import model
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import MediumFit, fitted
 from profilefit.measured.identifiability import identifiability, rank_designs, relative_errors
-from profilefit.measured.model import Model, u_of
-from profilefit.measured.noise import BEYOND, RMS, WAVE, origin, relative_error
-from profilefit.measured.problem import FARTHEST_LN, LONGEST, FitSpec, Known
+from profilefit.measured.model import BLOCK, Model, alpha_of, exact_light, u_of
+from profilefit.measured.noise import BEYOND, RMS, WAVE, noise, origin, relative_error
+from profilefit.measured.problem import FARTHEST_LN, LONGEST, FitSpec, Known, held_albedo
 from profilefit.measured.reading import read
 from profilefit.measured.result import MediumPosterior, judged, posterior
 from profilefit.recipes import catalogue
@@ -35,6 +38,10 @@ def light(inner, outer, scale=1.0) -> np.ndarray:
     return Model(LAW).predicted(point[None], inner, outer)[0, :-1]
 
 
+def measured(inner, outer, value, sigma) -> Measured:
+    return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
+
+
 def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
     """Averages over rings, of this relative error, with noise if there is a seed."""
     inner, outer = EDGES[:-1][EDGES[1:] <= most], EDGES[1:][EDGES[1:] <= most]
@@ -42,7 +49,7 @@ def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
     sigma = error * value
     if seed is not None:
         value = value + sigma * np.random.default_rng(seed).standard_normal(value.size)
-    return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
+    return measured(inner, outer, value, sigma)
 
 
 def fit(data, total=None, scale_error=None, **held) -> MediumFit:
@@ -190,7 +197,7 @@ def small(generator) -> MediumFit:
     r = np.geomspace(first, first * generator.choice([1.5, 4.0, 20.0]), int(generator.integers(4, 8)))
     value = np.asarray(LAW.profile(r, 1.0 - generator.choice([0.0, 1e-3, 0.05, 0.3]), MFP))
     drawn = value * (1.0 + noise * generator.standard_normal(r.size))
-    data = Measured("made up", "", r, r, drawn, noise * value, np.full(r.size, np.inf), "as given", "mm")
+    data = measured(r, r, drawn, noise * value)
     return fit(data, **({} if generator.random() < 0.2 else {"scale": 1.0}))
 
 
@@ -272,8 +279,163 @@ def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
     r = np.array([0.002, 0.05, 0.2, 0.28, 1.2, 70.0, 990.0])
     value = np.array([-2.4e-11, -2.5e-3, 9.3e18, -8.1e15, 5e-5, 1.2e7, 2.7e-18])
     sigma = np.array([1.6e-15, 1.6e-7, 6.1e14, 5.3e11, 3.3e-9, 770.0, 1.8e-22])
-    data = Measured("made up", "", r, r, value, sigma, np.full(r.size, np.inf), "as given", "mm")
-    result = judged(fit(data))
+    result = judged(fit(measured(r, r, value, sigma)))
     assert result.fit.minimum.result != "converged"
     assert (result.identifiability, result.identified, result.draws) == (None, (), {})
     assert {result.value(name) for name in result.moving} == {None}
+
+
+PHOTON_EDGES = np.append(0.0, np.geomspace(0.05, 40.0, 32))
+INNER, OUTER = PHOTON_EDGES[:-1], PHOTON_EDGES[1:]
+AREAS = np.pi * (OUTER**2 - INNER**2)
+PHOTONS = 10**6
+
+
+def energies(alpha, mfp=1.0) -> np.ndarray:
+    """Shares of the photons that leave through each ring (32,), by the law itself."""
+    return Model(LAW).predicted(np.array([[u_of(alpha), np.log(mfp), 0.0]]), INNER, OUTER)[0, :-1] * AREAS
+
+
+def counted(share, photons=PHOTONS) -> Measured:
+    """Whole photons, of which these shares came out through the rings."""
+    sigma = np.sqrt(share * (1 - share) / (photons - 1)) / AREAS
+    many = np.full(share.size, np.inf)
+    return Measured("run", "", INNER, OUTER, share / AREAS, sigma, many, "counts", "mm", True, photons=float(photons))
+
+
+def covariance(share) -> np.ndarray:
+    """The slow, obvious twin: a multinomial's, per area."""
+    return (np.diag(share) - np.outer(share, share)) / (PHOTONS - 1) / np.outer(AREAS, AREAS)
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.99])
+def test_whitened_rows_are_independent(alpha):
+    share = energies(alpha)
+    found = noise(counted(share))
+    full = covariance(share)
+    np.testing.assert_allclose(found.whitened(found.whitened(full).T), np.eye(share.size), atol=1e-9)
+    np.testing.assert_allclose(found.sigma, np.sqrt(np.diag(full)), rtol=1e-12)
+    np.testing.assert_allclose(found.whitened(full)[:, 3], found.whitened(full[:, 3]))
+    rows = np.arange(share.size, dtype=float)
+    assert np.sum(found.whitened(rows) ** 2) == pytest.approx(rows @ np.linalg.solve(full, rows), rel=1e-9)
+
+
+def test_rows_that_share_nothing_are_divided_by_their_errors():
+    data = counted(energies(0.9), np.inf)
+    rows = np.ones((data.value.size, 2))
+    np.testing.assert_array_equal(noise(counted(energies(0.9))).whitened(rows).shape, rows.shape)
+    alone = measured(INNER, OUTER, data.value, np.full(data.value.size, 0.5))
+    np.testing.assert_array_equal(noise(alone, widening=4.0).whitened(rows), rows)
+
+
+@pytest.mark.parametrize(("alpha", "too_wide"), [(0.9, 1.2), (0.99, 1.8), (0.999, 2.0)])
+def test_errors_of_a_fit_are_those_of_the_full_covariance(alpha, too_wide):
+    """Generalised least squares by hand; negative control: rings without their covariance."""
+    data = counted(energies(alpha))
+    spec = FitSpec(LAW, {"scale": 1.0}, source=SOURCE)
+    found = fitted(data, spec)
+    assert found.minimum.converged
+    slopes = found.predicted[1][:-1, :2]
+    photons, law = covariance(energies(alpha)), found.problem.noise.model
+    gain = np.linalg.solve(slopes.T @ np.linalg.solve(photons + law, slopes), slopes.T) @ np.linalg.inv(photons + law)
+    np.testing.assert_allclose(found.statistical[:2, :2], gain @ photons @ gain.T, rtol=1e-4)
+    exact = np.linalg.inv(slopes.T @ np.linalg.solve(photons, slopes))
+    weights = 1 / (data.sigma**2 + data.value**2 / PHOTONS)
+    apart = np.linalg.inv(slopes.T @ (weights[:, None] * slopes))
+    assert np.sqrt(apart[0, 0] / exact[0, 0]) > too_wide
+    assert found.misfit.chi2 < 1e-4
+
+
+@pytest.mark.slow
+def test_fits_to_drawn_photons_scatter_as_stated():
+    """Sixty multinomial draws at alpha .99: squares of both coordinates over their covariance are chi-square."""
+    share, spec = energies(0.99), FitSpec(LAW, {"scale": 1.0}, source=SOURCE)
+    truth = np.array([u_of(0.99), 0.0])
+    whole = np.append(share, 1 - share.sum())
+    draws = np.random.default_rng(4).multinomial(PHOTONS, whole, 60)[:, :-1] / PHOTONS
+    squares, alphas = [], []
+    for one in draws:
+        found = fitted(counted(one), spec)
+        off = found.point[:2] - truth
+        squares.append(off @ np.linalg.solve(found.statistical[:2, :2], off))
+        alphas.append(off[0] ** 2)
+    # Chi-square of 120 degrees of freedom, 99.9 % of it.
+    assert 78 < np.sum(squares) < 172
+    apart = fitted(counted(share), spec).statistical[0, 0] * 1.8**2
+    assert np.sum(alphas) / apart < 33, "negative control: with the errors of rings apart 60, at least 33, is expected"
+
+
+POINT = np.array([u_of(0.9), np.log(1.3), np.log(0.7)])
+R = np.geomspace(0.05, 9.0, BLOCK + 3)  # more than one block
+
+
+def test_points_are_the_laws_own():
+    light, _ = Model(LAW).linearised(POINT, R, R)
+    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
+    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
+
+
+def test_derivatives_and_flocks_agree_with_single_evaluations():
+    model, step = Model(LAW), 1e-5
+    light, slopes = model.linearised(POINT, R, R)
+    ways = np.concatenate([POINT + step * np.eye(3), POINT - step * np.eye(3)])
+    moved = model.predicted(ways, R, R)
+    # Central differences: their own error is step^2 times a third derivative, and rounding over the step.
+    np.testing.assert_allclose((moved[:3] - moved[3:]).T / (2 * step), slopes, rtol=1e-7, atol=1e-9 * light.max())
+    many = np.repeat(POINT[None], 70, axis=0)
+    np.testing.assert_allclose(model.predicted(many, R, R), np.repeat(light[None], 70, axis=0), rtol=1e-12)
+
+
+def test_rings_are_averages():
+    inner, outer = np.array([0.0, 0.5, 3.0]), np.array([0.3, 0.6, 5.0])
+    found = Model(LAW).predicted(POINT[None], inner, outer)[0, :-1]
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    r = 0.5 * (outer + inner)[:, None] + 0.5 * (outer - inner)[:, None] * nodes
+    integral = np.sum(2 * np.pi * r * 0.7 * LAW.profile(r, 0.9, 1.3) * weights, axis=1) * 0.5 * (outer - inner)
+    np.testing.assert_allclose(found, integral / (np.pi * (outer**2 - inner**2)), rtol=1e-5)  # r ln r at the source
+
+
+@pytest.mark.parametrize("alpha", [1e-6, 0.3, 0.9, 1 - 1e-9])
+def test_alpha_keeps_its_digits(alpha):
+    assert alpha_of(u_of(alpha)) == pytest.approx(alpha, rel=1e-12)
+    s = 1.0 / (1.0 + np.exp(-u_of(alpha)))
+    assert s == pytest.approx(np.sqrt(1 - alpha), rel=1e-9)
+
+
+def test_quantities_and_their_slopes():
+    found = model.quantities(POINT[None], np.array([0.4]))
+    assert {name: float(value[0]) for name, value in found.items()} == pytest.approx(
+        {"A": 0.4, "alpha": 0.9, "l": 1.3, "mu_s'": 0.9 / 1.3, "mu_a": 0.1 / 1.3, "scale": 0.7}
+    )
+    step, slopes = 1e-6, model.slopes(POINT, np.zeros(3))
+    for at in range(3):
+        ends = np.stack([POINT + step * np.eye(3)[at], POINT - step * np.eye(3)[at]])
+        two = model.quantities(ends, np.zeros(2))
+        for name in ("alpha", "l", "mu_s'", "mu_a", "scale"):
+            assert (two[name][0] - two[name][1]) / (2 * step) == pytest.approx(slopes[name][at], abs=1e-8)
+    names = ("alpha", "mu_a")
+    np.testing.assert_allclose(model.correlation(slopes, np.diag([1.0, 0, 0]), names), [[1, -1], [-1, 1]])
+    assert model.unit_of("mu_a", "mm") == "1/mm"
+    assert model.unit_of("l", "") == "unit of r"
+
+
+def test_a_held_reflectance_is_an_albedo():
+    assert held_albedo(LAW, "A", LAW.albedo.reflectance(0.8)) == pytest.approx(0.8, abs=1e-10)
+    refracting = catalogue.load("hazard", setting=Setting(n=1.4))
+    with pytest.raises(InputError, match=r"^held A must be a total reflectance in \[.*, 0.97\d+\] of this light"):
+        held_albedo(refracting, "A", 0.99)
+    with pytest.raises(InputError, match=r"^held alpha must be a single-scattering albedo in \(0, 1\), got 1"):
+        held_albedo(LAW, "alpha", 1.0)
+
+
+def test_exact_light_is_kept_for_the_next_process(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    exact_light.cache_clear()
+    first = exact_light(Setting())
+    (path,) = tmp_path.rglob("light-searchlight-n1.0-*.npz")
+    written = path.stat().st_mtime_ns
+    exact_light.cache_clear()
+    again = exact_light(Setting())
+    assert path.stat().st_mtime_ns == written
+    assert all(np.array_equal(*pair) for pair in zip(*map(jax.tree.leaves, (first, again)), strict=True))
+    exact_light.cache_clear()

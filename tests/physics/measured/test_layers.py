@@ -17,6 +17,7 @@ from profilefit.measured.premises import Premises, premises
 from profilefit.measured.problem import Known
 
 DATA = Path(__file__).parents[3] / "examples"
+STACK = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0)))
 GUESS = Medium((Layer(1.0, 10.0, 10.0, 0.0, 0.05), Layer(1.0, 0.1, 10.0, 0.0)))  # of two_layers.mco, in cm
 
 
@@ -58,10 +59,9 @@ def test_rings_near_the_beam_say_nothing_of_what_is_below():
 
 @pytest.mark.slow
 def test_a_scale_known_far_from_one_is_where_the_search_begins():
-    medium = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0)))
-    data = rings(medium, np.geomspace(0.1, 5.0, 9), 0.02, 3)
+    data = rings(STACK, np.geomspace(0.1, 5.0, 9), 0.02, 3)
     scaled = replace(data, value=1000.0 * data.value, sigma=1000.0 * data.sigma)
-    found = fit_layers(scaled, medium, ["mu_a1"], Premises(Setting(n=1.4)), Known(1000.0, 20.0))
+    found = fit_layers(scaled, STACK, ["mu_a1"], Premises(Setting(n=1.4)), Known(1000.0, 20.0))
     assert found.result == "converged"
     assert abs(found.values[1] - 1000.0) < 3 * 20.0
     assert found.premises.setting == Setting(n=1.4)
@@ -70,10 +70,9 @@ def test_a_scale_known_far_from_one_is_where_the_search_begins():
 @pytest.mark.slow
 def test_errors_of_few_replicates_are_estimates():
     """The same rows, their errors known or estimated from three replicates each: a few rows agree by accident."""
-    medium = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0)))
-    known = rings(medium, np.geomspace(0.1, 5.0, 9), 0.02, 3)
+    known = rings(STACK, np.geomspace(0.1, 5.0, 9), 0.02, 3)
     estimated = replace(known, freedom=np.full(known.value.size, 4.0), pooled=8.0)
-    sure, unsure = (fit_layers(data, medium, ["mu_a1"], Premises(Setting(n=1.4))) for data in (known, estimated))
+    sure, unsure = (fit_layers(data, STACK, ["mu_a1"], Premises(Setting(n=1.4))) for data in (known, estimated))
     assert unsure.errors[0] == pytest.approx(sure.errors[0] * np.sqrt(widening(estimated.freedom, 1)), rel=0.05)
     wider, narrower = (np.ptp(np.log(one.intervals[0])) / one.errors[0] for one in (unsure, sure))
     assert (wider, narrower) == pytest.approx((2 * stats.t.ppf(0.975, 8.0), 2 * stats.norm.ppf(0.975)))
@@ -100,9 +99,9 @@ def test_what_a_table_states_is_what_the_layers_are(tmp_path, statement, message
 
 @pytest.mark.slow
 def test_its_light_is_that_of_finer_nodes():
-    medium, r = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0))), np.geomspace(0.1, 10, 6)
-    wanted = exact.solve(medium).profile(r)
-    np.testing.assert_allclose(solved_rows(medium, "searchlight", PENCIL, r.tobytes(), r.tobytes()), wanted, rtol=1e-4)
+    r = np.geomspace(0.1, 10, 6)
+    wanted = exact.solve(STACK).profile(r)
+    np.testing.assert_allclose(solved_rows(STACK, "searchlight", PENCIL, r.tobytes(), r.tobytes()), wanted, rtol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,30 @@ def light():
     return radii, simulated.light(ALPHA, LENGTH, SETTING, OPTICS, radii)
 
 
+def taken(light, times, seed, camera=CAMERA, electrons=1.0):
+    return simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), camera, electrons, times, seed)
+
+
+def late(brightest, phase=0.0, camera=CAMERA):
+    """Times of five exposures, by those that the camera states; the first fills half of its range."""
+    first = 0.5 * camera.gain * (camera.white - camera.black) / brightest
+    return {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step + phase)) for step in range(5)}
+
+
 @pytest.fixture(scope="module")
 def shots(light):
-    first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
-    times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step)) for step in range(5)}
-    taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, times, 3)
-    return [bench.as_read(one, str(at)) for at, one in enumerate(taken)], np.array(list(times.values()))
+    times = late(light[1][0])
+    return [bench.as_read(one, str(at)) for at, one in enumerate(taken(light, times, 3))], np.array([*times.values()])
+
+
+def pictured(light):
+    """Light of a plane of 300 x 400 pixels about its middle."""
+    row, column = np.indices((300, 400))
+    return np.interp(2.0 * PITCH * np.hypot(row - 150.0, column - 200.0), *light).astype(np.float32)
+
+
+def found_in(picture):
+    return rings.spot([Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
 
 
 def test_a_halos_mean_over_a_circle_is_that_of_points():
@@ -98,22 +116,24 @@ def test_light_by_rings_is_that_by_hankels_integrals(mu_s, mu_a, beam):
     assert np.abs(without / found - 1.0).max() > 0.01, "a negative control: no glare"
 
 
-def test_a_brackets_times_gain_and_light_are_those_of_the_camera(shots, light):
+def test_a_brackets_times_gain_light_and_centre_are_those_of_the_camera(shots, light):
     exposures, real = shots
     times, _ = bracket.times(exposures)
     np.testing.assert_allclose(times / times[-1], real / real[-1], rtol=5e-3)
     own = bracket.sensor(exposures, times)
     assert own.gain == pytest.approx(CAMERA.gain, rel=0.1)
     assert own.read == pytest.approx(CAMERA.read / CAMERA.gain, rel=0.25)
-    merged = bracket.merged(exposures, times, own)[0]
-    exact = replace(CAMERA, speckle=0.0, uneven=0.0)
+    planes = bracket.merged(exposures, times, own)
+    merged = planes[0]
     row, column = np.indices(merged.light.shape) * 2.0
     r = PITCH * np.hypot(column - 399.5 - CAMERA.centre[0], row - 299.5 - CAMERA.centre[1])
-    expected = np.interp(r, *light) * real[-1] / exact.gain
+    expected = np.interp(r, *light) * real[-1] / CAMERA.gain
     far = (r > 6.0) & np.isfinite(merged.light)
     off = (merged.light - expected)[far] / np.sqrt(merged.variance[far] + ((CAMERA.speckle * expected[far]) ** 2))
     assert abs(off.mean()) < 0.05
     assert off.std() == pytest.approx(1.0, abs=0.08)
+    found = rings.spot(planes[1:3], exposures[0].sides, SQUARE, "shot")
+    assert found.centre == pytest.approx((399.5 + 13.3, 299.5 - 7.7), abs=0.5)
 
 
 @pytest.mark.slow
@@ -125,24 +145,14 @@ def test_what_spills_out_of_full_pixels_does_not_change_times():
         radii = simulated.radii(bench.FARTHEST, optics)
         light = simulated.card(optics, radii)
         camera = replace(CAMERA, well=2.0e4)
-        first = 0.5 * camera.gain * (camera.white - camera.black) / light[0]
-        times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step + seed)) for step in range(5)}
-        taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, (radii, light)), camera, 1.0, times, seed)
-        found = bracket.times([bench.as_read(one, "card") for one in taken])
+        times = late(light[0], seed, camera)
+        found = bracket.times([bench.as_read(one, "card") for one in taken((radii, light), times, seed, camera)])
         real = np.array(list(times.values()))
         errors = np.sqrt(np.diag(found.covariance))[:-1]
         assert np.all(errors < 0.03)
         off.append((np.log(found.value[:-1] / found.value[-1]) - np.log(real[:-1] / real[-1])) / errors)
     assert np.sqrt(np.mean(np.square(off))) < 1.6
     assert abs(np.mean(off)) < 1.2
-
-
-def test_a_spots_centre_is_found(shots):
-    exposures, _ = shots
-    times, _ = bracket.times(exposures)
-    greens = bracket.merged(exposures, times, bracket.sensor(exposures, times))[1:3]
-    found = rings.spot(greens, exposures[0].sides, SQUARE, "shot")
-    assert found.centre == pytest.approx((399.5 + 13.3, 299.5 - 7.7), abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -157,45 +167,35 @@ def test_a_spots_centre_is_found(shots):
     ids=["dark", "two", "border", "clipped", "all clipped"],
 )
 def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, said):
-    row, column = np.indices((300, 400))
-    r = 2.0 * PITCH * np.hypot(row - 150.0, column - 200.0)
-    picture = change(np.interp(r, *light).astype(np.float32))
     with pytest.raises(InputError, match=said) as caught:
-        rings.spot([bracket.Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
+        found_in(change(pictured(light)))
     assert "\n" not in str(caught.value)
 
 
 def test_a_stuck_pixel_elsewhere_is_left_out(light):
-    row, column = np.indices((300, 400))
-    picture = np.interp(2.0 * PITCH * np.hypot(row - 150.0, column - 200.0), *light).astype(np.float32)
+    (row, column), picture = np.indices((300, 400)), pictured(light)
     picture[np.hypot(row - 40.0, column - 90.0) <= 2.0] = np.nan
-    found = rings.spot([Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
-    assert found.centre == pytest.approx((400.0, 300.0), abs=0.1)
+    assert found_in(picture).centre == pytest.approx((400.0, 300.0), abs=0.1)
 
 
 def test_exposures_of_one_time_are_a_bracket(light):
     """Chance makes one of them the brighter."""
-    first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
+    first = min(late(light[1][0]))
     for seed in range(4):
-        taken = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed)
-        again = simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed + 50)
-        found = bracket.times([bench.as_read(one, str(at)) for at, one in enumerate((*taken, *again))])
+        two = (*taken(light, {first: first}, seed), *taken(light, {first: first}, seed + 50))
+        found = bracket.times([bench.as_read(one, str(at)) for at, one in enumerate(two)])
         np.testing.assert_allclose(found.value, 1.0, rtol=0.02)
 
 
-def test_the_order_of_exposures_of_one_stated_time_does_not_matter(shots):
+def test_stated_times_of_one_value_have_any_order_and_those_that_pictures_contradict_are_named(shots):
     """A grey filter before the lens, say."""
     alike = [replace(one, seconds=0.1) for one in shots[0]]
     forth, back = bracket.times(alike), bracket.times(alike[::-1])
     np.testing.assert_array_equal(forth.value, back.value[::-1])
     assert forth.value[0] < 0.01
-
-
-def test_times_that_the_pictures_contradict_are_named(shots):
-    short, long = shots[0][0], shots[0][1]
-    with pytest.raises(
-        InputError, match=r"^1: expected less light than 0 has, which states a longer time, got 3\.94 times"
-    ):
+    (short, long, *_), _ = shots
+    said = r"^1: expected less light than 0 has, which states a longer time, got 3\.94 times"
+    with pytest.raises(InputError, match=said):
         bracket.times([replace(short, seconds=2.0), replace(long, seconds=1.0)])
 
 
@@ -211,9 +211,7 @@ def test_rings_err_as_they_say(light):
     edges, camera = rings.edges_of(15.0, 2 * PITCH), replace(CAMERA, grain=2.5)
     found = []
     for seed in range(12):
-        (one,) = simulated.exposures_of(
-            dict.fromkeys(simulated.CHANNELS, light), camera, 1.0, {1.0: 2000.0 / light[1][0]}, seed
-        )
+        (one,) = taken(light, {1.0: 2000.0 / light[1][0]}, seed, camera)
         exposure = bench.as_read(one, "one")
         greens = bracket.merged([exposure], np.ones(1), bracket.Sensor(camera.gain, 0.75))[1:3]
         found.append(rings.rings(greens, (399.5 + 13.3, 299.5 - 7.7), edges, SQUARE))
@@ -242,39 +240,46 @@ BEAM = Known(0.5, 0.05)
 GREY = Known(0.18, 0.005)
 
 
-def test_derivatives_are_differences():
-    shot, x = made((None, GREY), beam=BEAM)
+@pytest.fixture(scope="module")
+def carded():
+    """A shot with both cards, and its coordinates."""
+    return made((None, GREY), beam=BEAM)
+
+
+@pytest.fixture(scope="module")
+def fit(carded):
+    return medium.fitted(carded[0])
+
+
+def lines_of(fit):
+    """What is said of a fit of red light."""
+    shot = SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",))
+    return photo_lines(SimpleNamespace(shot=shot, plate=SQUARE, notes=(), cards=(1,), fits={"red": fit}))
+
+
+def test_derivatives_are_differences(carded):
+    shot, x = carded
     slopes = shot.residuals(x)[1]
-    moved = np.stack(
-        [(shot.residuals(x + 1e-5 * way)[0] - shot.residuals(x - 1e-5 * way)[0]) / 2e-5 for way in np.eye(x.size)]
-    )
-    np.testing.assert_allclose(moved.T, slopes, rtol=1e-3, atol=1e-4 * np.abs(slopes).max())
+    up, down = (np.stack([shot.residuals(x + step * way)[0] for way in np.eye(x.size)]) for step in (1e-5, -1e-5))
+    np.testing.assert_allclose((up - down).T / 2e-5, slopes, rtol=1e-3, atol=1e-4 * np.abs(slopes).max())
 
 
-def test_light_without_noise_gives_its_medium():
-    shot, x = made((None, GREY), beam=BEAM)
-    fit = medium.fitted(shot)
+def test_light_without_noise_gives_its_medium(carded, fit):
     assert fit.converged
     assert fit.values["mu_s'"] == pytest.approx(1.0, rel=1e-4)
     assert fit.values["mu_a"] == pytest.approx(0.05, rel=1e-4)
     assert fit.chi2 < 1e-3
-    np.testing.assert_allclose(fit.x, x, atol=1e-3)
+    np.testing.assert_allclose(fit.x, carded[1], atol=1e-3)
 
 
-def test_a_search_that_does_not_end_is_said(monkeypatch):
+def test_a_search_that_does_not_end_is_said(monkeypatch, carded):
     monkeypatch.setattr(medium, "MAX_STEPS", 2)
-    fit = medium.fitted(made((None, GREY), beam=BEAM)[0])
-    seen = SimpleNamespace(
-        shot=SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",)), plate=SQUARE, notes=(),
-        cards=(1,), fits={"red": fit},
-    )  # fmt: skip
-    assert f"red: NO ANSWER: {medium.UNENDED}" in photo_lines(seen)
+    assert f"red: NO ANSWER: {medium.UNENDED}" in lines_of(medium.fitted(carded[0]))
 
 
-def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
+def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch, carded, fit):
     """Another minimum beyond the intervals, its chi-square a little higher."""
-    shot, x = made((None, GREY), beam=BEAM)
-    fit = medium.fitted(shot)
+    shot, x = carded
     assert (fit.rivals, fit.result) == ((), CONVERGED)
     rows, slopes = shot.residuals(x)
     ends = [Solution(x + at * np.eye(x.size)[0], rows + 0.1 * at, slopes, 1, CONVERGED) for at in (1, 0)]
@@ -285,11 +290,7 @@ def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
     assert fit.rivals[0].chi2 - fit.chi2 < medium.RIVAL
     ends[0] = Solution(ends[0].parameters, np.append(rows, np.sqrt(medium.RIVAL)), slopes, 1, CONVERGED)
     assert medium.fitted(replace(shot)).rivals == (), "negative control: a chance of 1 in 1000"
-    seen = SimpleNamespace(
-        shot=SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",)), plate=SQUARE, notes=(),
-        cards=(1,), fits={"red": fit},
-    )  # fmt: skip
-    assert any(line.startswith("red: ANOTHER MEDIUM FITS, TOO: mu_s' 0.855 1/mm") for line in photo_lines(seen))
+    assert any(line.startswith("red: ANOTHER MEDIUM FITS, TOO: mu_s' 0.855 1/mm") for line in lines_of(fit))
 
 
 def test_the_lowest_chi_square_is_kept_though_its_descent_did_not_end():
@@ -319,11 +320,11 @@ def test_a_beam_of_two_pixels_gives_its_medium():
         assert abs(np.log(fit.values[name] / truth)) < 3.0 * fit.errors[name] / fit.values[name]
 
 
-def test_cards_are_worth_what_is_said_and_glare_costs_it():
-    bounds = {len(cards): medium.fisher(*made(cards, beam=BEAM)) for cards in ((), (None, GREY))}
-    assert bounds[2]["mu_s'"] < 0.7 * bounds[0]["mu_s'"]
-    assert bounds[2]["mu_a"] < 0.6 * bounds[0]["mu_a"]
-    shot, _ = made((), beam=BEAM)
+def test_cards_are_worth_what_is_said_and_glare_costs_it(carded):
+    shot, x = made((), beam=BEAM)
+    alone, both = medium.fisher(shot, x), medium.fisher(*carded)
+    assert both["mu_s'"] < 0.7 * alone["mu_s'"]
+    assert both["mu_a"] < 0.6 * alone["mu_a"]
     blind = replace(shot, beliefs=replace(shot.beliefs, glare=Known(1e-6, 1e-6)))
     off = medium.fitted(blind).values["mu_a"] / 0.05 - 1.0
     assert off < -0.25, "glare that is not thought of reads as less absorption"
@@ -345,8 +346,7 @@ def test_few_photons_are_a_picture_too():
     radii = simulated.radii(bench.FARTHEST, optics)
     light = simulated.light(ALPHA, LENGTH, SETTING, optics, radii, photons=1000)
     assert CubicSpline(radii, light)(np.linspace(0.0, radii[-1], 100_000)).min() < 0.0, "a control"
-    radial = dict.fromkeys(simulated.CHANNELS, (radii, light))
-    (one,) = simulated.exposures_of(radial, CAMERA, 1e4 / light[0], {1.0: 1.0}, 3)
+    (one,) = taken((radii, light), {1.0: 1.0}, 3, electrons=1e4 / light[0])
     assert np.median(one.counts) == CAMERA.black < CAMERA.black + 2000 < one.counts.max()
 
 

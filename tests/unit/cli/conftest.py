@@ -1,8 +1,12 @@
-"""A command as a user gives it, what it refuses in one line, and the OpenGL that some need."""
+"""A command as a user gives it, what it refuses in one line, Ctrl-C, and the OpenGL that some need."""
 
 import os
+import signal
+import subprocess
 import sys
+import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -45,11 +49,11 @@ def command(program):
 
 @pytest.fixture
 def done(command):
-    """Run WORDS, which must end with status 0 and nothing on stderr; what is printed."""
+    """Run WORDS, which must end with status 0 and `said` on stderr (None: anything); what is printed."""
 
-    def run(*words: object) -> str:
+    def run(*words: object, said: str | None = "") -> str:
         status, out, err = command(*words)
-        assert (status, err) == (0, "")
+        assert (status, err if said is None else said) == (0, err), err
         return out
 
     return run
@@ -70,3 +74,24 @@ def refused(command):
         return err
 
     return run
+
+
+def started(package: str, *words: object, cwd: Path, **streams) -> subprocess.Popen:
+    """The command in a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
+    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += f"runpy.run_module({package!r}, run_name='__main__', alter_sys=True)"
+    return subprocess.Popen([sys.executable, "-c", code, *map(str, words)], cwd=cwd, text=True, **streams)
+
+
+def interrupted(package: str, *words: object, cwd: Path, once: str) -> tuple[int, str, str]:
+    """Press Ctrl-C once there is a file of this pattern; the exit status and what was printed on stdout and stderr."""
+    with started(package, *words, cwd=cwd, stdout=-1, stderr=-1) as run:
+        end = time.monotonic() + 120
+        while not list(cwd.glob(once)) and run.poll() is None and time.monotonic() < end:
+            time.sleep(0.1)
+        run.send_signal(signal.SIGINT)
+        try:
+            out, err = run.communicate(timeout=120)
+        finally:
+            run.kill()
+    return run.returncode, out, err

@@ -2,10 +2,8 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +13,7 @@ from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.recipes import catalogue
 from profilefit.recipes.folder import fits_folder
+from tests.unit.cli.conftest import interrupted
 
 RECIPE = """
 title = "A small one"
@@ -79,17 +78,11 @@ def test_regenerate_writes_a_record_that_loads(done, recipe):
 def test_a_surface_that_refracts_gets_its_own_record(command, tmp_path):
     """A recipe's table [setting] says which; the record is found by the name that goes with it."""
     path = tmp_path / "albedo-rational-n1.45.toml"
-    text = (
-        RECIPE.replace('pipeline = "albedo"\n', 'pipeline = "albedo"\nrandom_starts = 3\n') + "\n[setting]\nn = 1.45\n"
-    )
-    for old, new in (
-        ('"liang"', '"rational"'),
-        ("count = 9", "count = 5"),
-        ('tive = "albedo"', 'tive = "reflectance"'),
-    ):
+    text = RECIPE.replace('pipeline = "albedo"\n', 'pipeline = "albedo"\nrandom_starts = 3\n')
+    for old, new in ('"liang"', '"rational"'), ("= 9", "= 5"), ('tive = "albedo"', 'tive = "reflectance"'):
         text = text.replace(old, new)
-    path.write_text(text)
-    status, _, err = command("regenerate", str(path), "--out", "out", "--photons", "20000")
+    path.write_text(f"{text}\n[setting]\nn = 1.45\n")
+    status, _, err = command(*small(path))
     assert status == 0, err
     assert "2e+04 photons: searchlight, n = 1.45, g = 0" in err
     assert err.count("photons:") == 1
@@ -135,21 +128,9 @@ def test_more_photons_resume_the_ones_that_are_there(command, recipe):
 
 @pytest.mark.slow
 def test_control_c_is_one_line_and_keeps_the_batches(recipe, tmp_path):
-    """In a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
-    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "runpy.run_module('profilefit', run_name='__main__', alter_sys=True)"
-    words = ("regenerate", str(recipe), "--out", "out", "--photons", str(2**30))
-    with subprocess.Popen([sys.executable, "-c", code, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as run:
-        end = time.monotonic() + 120
-        while not list(tmp_path.glob("out/.photons/*/run.json")) and run.poll() is None and time.monotonic() < end:
-            time.sleep(0.1)
-        run.send_signal(signal.SIGINT)
-        try:
-            _, err = run.communicate(timeout=120)
-        finally:
-            run.kill()
-    assert run.returncode == 130, err
-    assert err == "profilefit: stopped; the finished batches are kept, the same command resumes\n"
+    words = ("profilefit", "regenerate", recipe, "--out", "out", "--photons", 2**30)
+    status, _, err = interrupted(*words, cwd=tmp_path, once="out/.photons/*/run.json")
+    assert (status, err) == (130, "profilefit: stopped; the finished batches are kept, the same command resumes\n")
 
 
 @pytest.mark.parametrize(
@@ -232,10 +213,8 @@ def test_report_shows_shipped_records_and_draws_figures(done):
     assert list(Path("figures").glob("*.png"))
 
 
-def test_version_is_a_number(command):
-    status, out, _ = command("--version")
-    assert status == 0
-    assert out.startswith("profilefit 0.")
+def test_version_is_a_number(done):
+    assert done("--version", said=None).startswith("profilefit 0.")
 
 
 def test_shipped_records_are_written_over_only_where_they_are_named(refused, monkeypatch):

@@ -15,20 +15,13 @@ def command(command):
 
 
 @pytest.fixture
-def table(command):
+def table(done):
     """What --json says."""
-
-    def run(*words: str) -> dict:
-        status, out, err = command(*words, "--json")
-        assert status == 0, err
-        return json.loads(out)
-
-    return run
+    return lambda *words: json.loads(done(*words, "--json", said=None))
 
 
 def test_tables_of_the_medium_and_of_what_to_type(done):
-    words = ("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
-    out = done(*words)
+    out = done("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
     lines = out.splitlines()
     assert max(map(len, lines)) <= 120
     assert "…" not in out

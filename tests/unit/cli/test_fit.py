@@ -11,26 +11,18 @@ from tests.fixtures import EXAMPLES
 PHANTOM, LAYERS = EXAMPLES["phantom.csv"], EXAMPLES["two_layers.mco"]
 
 
-@pytest.fixture
-def phantom(command, tmp_path):
-    return command("fit", PHANTOM, "--out", str(tmp_path / "out"))
-
-
 @pytest.mark.slow
-def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_path):
-    status, out, err = phantom
-    assert (status, err) == (0, f"wrote fit.json and 4 figures into {tmp_path / 'out'}\n")
+def test_a_phantom_is_told_in_100_columns_with_figures_and_json(done):
+    out = done("fit", PHANTOM, "--out", "out", said="wrote fit.json and 4 figures into out\n")
     lines = out.splitlines()
     assert max(map(len, lines)) <= 100
     assert lines[0] == "phantom.csv: 20 points, exact light, searchlight, n = 1, g = 0"
     (row,) = [line.split() for line in lines if line.startswith("mu_s'  ") and line.endswith("1/mm")]
     assert abs(float(row[1]) - 0.95 / 1.1) < 3 * float(row[2])
     assert any(line.startswith("no misfit is detected") for line in lines)
-    folder = tmp_path / "out"
-    assert {one.name for one in folder.iterdir()} == {
-        "fit.json", "fit-residuals.png", "fit-residuals.svg", "fit-corner.png", "fit-corner.svg",
-    }  # fmt: skip
-    found = json.loads((folder / "fit.json").read_text())
+    figures = {f"fit-{name}.{kind}" for name in ("residuals", "corner") for kind in ("png", "svg")}
+    assert {one.name for one in Path("out").iterdir()} == {"fit.json", *figures}
+    found = json.loads(Path("out/fit.json").read_text())
     assert found["result"] == found["posterior"]["result"] == "converged"
     assert (found["law"]["record"], found["law"]["rel"]) == (None, 0)
     assert len(found["data"]["sha256"]) == 64
@@ -61,17 +53,16 @@ def half(ends):
 
 
 @pytest.mark.slow
-def test_errors_from_three_replicates_are_said_to_be_estimates(command, done, tmp_path):
+def test_errors_from_three_replicates_are_said_to_be_estimates(command, done):
     """Table, JSON and chain have one and the same width: Student's of the trend's freedom, and Meier's factor."""
     rows = [line.split(",") for line in Path(PHANTOM).read_text().splitlines()[2:]]
     text = "r [mm],value1,value2,value3\n"
     for at, (r, value, _) in enumerate(rows):
-        text += (
-            f"{r}," + ",".join(f"{float(value) * (1 + 0.03 * math.sin(7 * at + 2 * k)):.6g}" for k in range(3)) + "\n"
-        )
-    (tmp_path / "three.csv").write_text(text)
-    out = done("fit", str(tmp_path / "three.csv"))
-    found = json.loads(command("fit", str(tmp_path / "three.csv"), "--json")[1])
+        noisy = (f"{float(value) * (1 + 0.03 * math.sin(7 * at + 2 * k)):.6g}" for k in range(3))
+        text += ",".join((r, *noisy)) + "\n"
+    Path("three.csv").write_text(text)
+    out = done("fit", "three.csv")
+    found = json.loads(command("fit", "three.csv", "--json")[1])
     assert found["data"]["pooled_freedom"] == pytest.approx(0.61 * 2 * 18, rel=0.01)
     assert max(found["data"]["freedom"]) <= found["data"]["pooled_freedom"] + 2
     assert found["widening"] > 1.1
@@ -92,13 +83,11 @@ def test_what_is_not_identifiable_is_reported_with_a_remedy(done):
 
 
 @pytest.mark.slow
-def test_two_layers_are_a_misfit(command):
+def test_two_layers_are_a_misfit(command, done):
     """A second law to compile, that of rings."""
     refracting = json.loads(command("fit", LAYERS, "--n", "1.4", "--json")[1])
     assert "the file's n is 1, fitted as n = 1.4" in refracting["data"]["notes"]
-    status, out, _ = command("fit", LAYERS, "--json")
-    found = json.loads(out)
-    assert status == 0
+    found = json.loads(done("fit", LAYERS, "--json", said=None))
     assert json.loads(command("fit", LAYERS, "--json")[1]) == found, "to the last digit"
     assert found["misfit"]["detected"] is True
     assert found["data"]["errors_are_bounds"] is True
@@ -108,18 +97,17 @@ def test_two_layers_are_a_misfit(command):
 
 
 @pytest.mark.slow
-def test_three_rows_have_limits_where_alpha_may_be_one(command, tmp_path):
+def test_three_rows_have_limits_where_alpha_may_be_one(done):
     """One-sided, without a value, marked in the row; the same in JSON."""
     rows = Path(PHANTOM).read_text().splitlines()[1:5]
-    (tmp_path / "three.csv").write_text("\n".join(rows) + "\n")
-    status, out, err = command("fit", str(tmp_path / "three.csv"), "--out", str(tmp_path / "out"))
-    assert (status, err) == (0, f"wrote fit.json and 4 figures into {tmp_path / 'out'}\n")
+    Path("three.csv").write_text("\n".join(rows) + "\n")
+    out = done("fit", "three.csv", "--out", "out", said="wrote fit.json and 4 figures into out\n")
     rows = [line.split() for line in out.splitlines()[:8]]
     table = {row[0]: row[1:] for row in rows if len(row) > 3}
     assert [table[name][:4] for name in ("A", "alpha", "mu_a")] == [
         ["–", "edge", sign, table[name][3]] for name, sign in (("A", ">"), ("alpha", ">"), ("mu_a", "<"))
     ]
-    quantities = json.loads((tmp_path / "out" / "fit.json").read_text())["quantities"]
+    quantities = json.loads(Path("out/fit.json").read_text())["quantities"]
     for name, (low, high) in {"A": (0.4, 1.0), "alpha": (0.9, 1.0), "mu_a": (0.0, 0.09)}.items():
         one = quantities[name]
         assert (one["value"], one["at_edge"], one["statistical_error"]) == (None, True, None)
@@ -145,10 +133,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
     [
         ("nothing.csv", "nothing.csv: expected a file that can be read, got: No such file"),
         ("phantom.csv --law hazzard", "law must be one of exact, liang, burley"),
-        (
-            "phantom.csv --law hazard --n 1.7",
-            "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these",
-        ),
+        ("phantom.csv --law hazard --n 1.7",
+         "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these"),
         ("phantom.csv --n 0.9", "exact light needs n >= 1 where g = 0, and n from 1.33 to 1.45 where"),
         ("phantom.csv --g 0.9", "got searchlight, n = 1, g = 0.9: simulate it instead"),
         ("phantom.csv --n 1.4 --g 0.95:0.7", "--g must be a mean cosine in (-1, 1), or a range such as"),
@@ -158,10 +144,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("two_layers.mco --layers two_layers.toml", "--free must name quantities such as d1, mu_a2 or mu_s2, got ''"),
         ("two_layers.mco --layers two_layers.toml --free d3", "--free must name one of 2 layers, got 'd3'"),
         ("two_layers.mco --layers two_layers.toml --free d1 --g 0.9", "--g must be left out where --layers say what"),
-        (
-            "two_layers.mco --layers two_layers.toml --free d1 --beam 1mm:2mm",
-            "--beam must be one width where layers are",
-        ),
+        ("two_layers.mco --layers two_layers.toml --free d1 --beam 1mm:2mm",
+         "--beam must be one width where layers are"),
         ("two_layers.mco --layers none.toml --free d1", "none.toml: expected a file that can be read"),
         ("two_layers.mco --layers skin.toml --free d1", "g = 0"),
         ("phantom.csv --beam 0.7mm:0.3mm", "--beam must have a range that rises, such as 0.3mm:0.7mm"),
@@ -177,10 +161,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("phantom.csv --beam none.csv", "none.csv"),
         ("phantom.csv --beam phantom.csv", "phantom.csv:3: expected a radius >= 0 and an irradiance >= 0, got"),
         ("phantom.csv --fibre 0", "--fibre must be a length > 0 such as 1.2mm"),
-        (
-            "phantom.csv --constants published",
-            "--constants must be left out where light is solved exactly, got 'published'",
-        ),
+        ("phantom.csv --constants published",
+         "--constants must be left out where light is solved exactly, got 'published'"),
         ("half_space.mco --fibre 2mm", "--fibre must be left out where rows are averages"),
         ("phantom.csv --n -1", "--n must be a refractive index > 0"),
         ("phantom.csv --light sun", "--light must be one of searchlight, diffuse, got 'sun'"),
@@ -205,6 +187,6 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(done):
         ("phantom.csv --seed -1", "--seed must be a whole number >= 0, got -1"),
         ("phantom.csv --out /proc/nowhere", "cannot write into /proc/nowhere"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_one_line_and_status_2(refused, words, said):
     refused(f"fit {words}", said)

@@ -74,22 +74,21 @@ def several(folder, name):
     return [str(path) for path in sorted(folder.glob(f"{name}-*.dng"))]
 
 
-def test_a_setup_becomes_photographs_and_what_they_could_tell(command, tmp_path):
+def test_a_setup_becomes_photographs_and_what_they_could_tell(done, tmp_path):
     (tmp_path / "SETUP.toml").write_text(SETUP)
-    status, out, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
-    assert (status, err) == (0, "wrote 12 photographs into shots\n")
+    out = done("photo", "--simulate", "SETUP.toml", "--out", "shots", said="wrote 12 photographs into shots\n")
     assert len(list((tmp_path / "shots").glob("*.dng"))) == 12
     best = {line.split("  ")[0]: line for line in out.splitlines() if "green" in line}
     alone, both = (float(best[name].split()[-2]) for name in ("no cards", "both"))
     assert both < 0.7 * alone
 
 
-def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
+def test_a_bracket_and_its_cards_give_the_medium(done, folder, tmp_path):
     """Every option that takes files takes all that follow it, as a shell writes them out."""
     cards = ["--card", *several(folder, "card"), "--grey", *several(folder, "grey")]
     words = ["--scale", "0.1mm/px", "--beam", "0.5mm+-0.05mm", "--out", "skin"]
-    status, out, err = command("photo", *several(folder, "spot"), *cards, *words)
-    assert (status, err) == (0, "wrote photo.html, photo.json, medium.glsl and 4 figures into skin\n")
+    said = "wrote photo.html, photo.json, medium.glsl and 4 figures into skin\n"
+    out = done("photo", *several(folder, "spot"), *cards, *words, said=said)
     assert max(map(len, out.splitlines())) <= 100
     found = json.loads((tmp_path / "skin" / "photo.json").read_text())
     for one in found["colours"].values():
@@ -246,14 +245,10 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("cut.dng --scale 0.1mm/px", "cut.dng: cannot be read as a raw file"),
         ("empty.dng --scale 0.1mm/px", "expected a photograph of 1 byte"),
         ("eight.tif --scale 0.1mm/px", "of an unknown curve"),
-        (
-            "four.tif --scale 0.1mm/px",
-            "four.tif: expected one or three values a pixel, got an array of shape (30, 40, 4)",
-        ),
+        ("four.tif --scale 0.1mm/px",
+         "four.tif: expected one or three values a pixel, got an array of shape (30, 40, 4)"),
         ("huge.tif --scale 0.1mm/px", "huge.tif: expected finite numbers, got others"),
-        ("six.tif --scale 0.1mm/px", "six.tif: cannot be read as a TIFF"),
-        ("ten.tif --scale 0.1mm/px", "ten.tif: cannot be read as a TIFF"),
-        ("torn.tif --scale 0.1mm/px", "torn.tif: cannot be read as a TIFF"),
+        *((f"{name}.tif --scale 0.1mm/px", f"{name}.tif: cannot be read as a TIFF") for name in ("six", "ten", "torn")),
         ("big.tif --scale 0.1mm/px", "big.tif: expected at most 120000000 pixels, got 25000 x 20000"),
         ("big.jpg --scale 0.1mm/px", "big.jpg: expected at most 120000000 pixels, got"),
         ("bigger.jpg --scale 0.1mm/px", "bigger.jpg: expected at most 120000000 pixels, got"),
@@ -268,10 +263,8 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("SPOT --scale 0.1mm/px --glare 2+-2", "--glare must be a value between 0 and 1 with an error"),
         ("SPOT --scale 0.1mm/px --reflectance 0.2+-0.01", "--reflectance must be left out"),
         ("SPOT --scale 0.1mm/px --grey SPOT --reflectance 97.1", "got '97.1' (a share: 0.971 for 97.1 %)"),
-        (
-            f"SPOT --scale 0.1mm/px --surface {'9' * 5000}",
-            f"--surface must be a value with its error, such as 0.02+-0.02, got '{'9' * 59}...",
-        ),
+        (f"SPOT --scale 0.1mm/px --surface {'9' * 5000}",
+         f"--surface must be a value with its error, such as 0.02+-0.02, got '{'9' * 59}..."),
         ("SPOT --scale 0.1mm/px --beam fwhm:wide", "such as 0.5mm+-0.05mm or fwhm:0.6mm+-0.06mm, got 'fwhm:wide'"),
         ("SPOT --scale 0.1mm/px --n 3", "n = 3"),
         ("SPOT --scale 0.1mm/px --n 1.7 --g 0 --out out", "without --out the medium alone is measured"),
@@ -280,7 +273,7 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("SPOT --simulate SETUP.toml --out out", "SHOT must be left out"),
     ],
     ids=str,
-)
+)  # fmt: skip
 def test_bad_input_is_one_line_and_writes_nothing(refused, folder, tmp_path, words, said):
     files = {path.name: str(path) for path in folder.iterdir()} | {"SPOT": several(folder, "spot")[0]}
     out = "" if "--out" in words or "--simulate" in words else " --out out"

@@ -1,4 +1,6 @@
-"""profilefit scene: from a file to pictures and numbers, and one line for every mistake."""
+"""profilefit scene: from a file to pictures and numbers, and one line for every mistake. A sixth scene is its folder,
+tests/unit/scenes/toy, and one line: the command reads, draws and judges it.
+"""
 
 import io
 import json
@@ -100,37 +102,24 @@ def test_a_scene_is_drawn_beside_its_truth(done, small, opengl):
 SKIN_MISTAKES = [
     ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
     ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
-    (
-        "samples",
-        "sample",
-        "[technique] keys must be of samples, chart, kind, law, constants, illumination, tolerance,",
-    ),
+    ("samples", "sample",
+     "[technique] keys must be of samples, chart, kind, law, constants, illumination, tolerance,"),
     ("samples = 4", "samples = 300", "[technique] samples must be a whole number in 1 ... 256, got 300"),
     ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
-    (
-        "samples = 4",
-        'law = "beam_diffusion"\nillumination = "searchlight"',
-        "[technique] law must have a closed form to become a shader",
-    ),
+    ("samples = 4", 'law = "beam_diffusion"\nillumination = "searchlight"',
+     "[technique] law must have a closed form to become a shader"),
     ("samples = 4", 'kind = "none"\nlaw = "liang"', "[technique] law must be left out where kind is none, got"),
-    (
-        "samples = 4",
-        'law = "burley"\nconstants = "published:diffuse"',
-        "[technique] the published:diffuse constants of burley belong to diffuse, n = 1, g = 0, got a request for "
-        "diffuse, n = 1.4, g = 0: write n = 1 at the top of the file, or name another law",
-    ),
-    (
-        "",
-        "[material.red]\nmfp = 1\n",
-        "[material.red] reflectance must be a number > 0, or two",
-    ),
+    ("samples = 4", 'law = "burley"\nconstants = "published:diffuse"',
+     "[technique] the published:diffuse constants of burley belong to diffuse, n = 1, g = 0, got a request for "
+     "diffuse, n = 1.4, g = 0: write n = 1 at the top of the file, or name another law"),
+    ("", "[material.red]\nmfp = 1\n", "[material.red] reflectance must be a number > 0, or two"),
     ("[64]", "[0]", "[technique] chart must be at most 8 numbers of samples in 1 ... 256, got [0]"),
     ("[32, 24]", "[1000, 1000]", "[camera] resolution must be 65536 pixels at most, which the truth sums over"),
     ("[32, 24]", "[32, 0]", "[camera] resolution must be two whole numbers of pixels in 1 ... 1024, got [32, 0]"),
     ("[32, 24]", "[9, 9]\ndistance = 10", "[camera] distance must be a number in 300 ... 10000, got 10"),
     ("[32, 24]", "[9, 9]\ntarget = [nan, 0, 0]", "[camera] target must be three numbers in -150 ... 150, got"),
     ("", "[light]\ndirection = [0, 0, 0]\n", "[light] direction must be a direction, not 0, got"),
-]
+]  # fmt: skip
 SEA = """\
 scene = "sea"
 [water]
@@ -141,19 +130,13 @@ phase = [[0.9, 0.95], [0.1, 0.3]]
 """
 SEA_MISTAKES = [
     ("[0.3, 0.1, 0.08]", "[-0.3, 0.1, 0.08]", "[water] a must be three numbers in 0 ... 100 [1/m], got [-0.3,"),
-    (
-        "[0.3, 0.1, 0.08]",
-        "[0.3, nan, 0.08]",
-        "[water] a must be three numbers in 0 ... 100 [1/m], got [0.3, nan, 0.08]",
-    ),
+    ("[0.3, 0.1, 0.08]", "[0.3, nan, 0.08]",
+     "[water] a must be three numbers in 0 ... 100 [1/m], got [0.3, nan, 0.08]"),
     ('source = "assumed"\n', "", "[water] source must be a text that says where a and b are from, got nothing"),
     ("[0.1, 0.3]]", "[0.2, 0.3]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
     ("[0.1, 0.3]]", "[0.1, 1.0]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
-    (
-        "[[0.9, 0.95], [0.1, 0.3]]",
-        '"fog"',
-        "[water] the record of a phase function must be one of petzold, or a .json, got 'fog'",
-    ),
+    ("[[0.9, 0.95], [0.1, 0.3]]", '"fog"',
+     "[water] the record of a phase function must be one of petzold, or a .json, got 'fog'"),
     ("", "[floor]\ndepth = 0.1\n", "floor must be below the sea's lowest trough, "),
     ("", "[sea]\nwind = [0, 0]\n", "[sea] wind must be two speeds in -100 ... 100 [m/s], not both 0"),
     ("", "[sea]\nseed = 0.5\n", "[sea] seed must be a whole number in 0 ... 2147483648, got 0.5"),
@@ -162,17 +145,11 @@ SEA_MISTAKES = [
     ("", "[camera]\ntarget = [6, 2.5, 0]\n", "[camera] target must be a point that is not straight"),
     ("", "[light]\ndirection = [1, 0, 1]\n", "[light] direction must be toward the sun, [x <= 0,"),
     ("", "[technique]\nslices = 33\n", "[technique] slices must be a whole number in 2 ... 32, got 33"),
-    (
-        "",
-        "[technique]\nslices = 32\ntexels = 1024\n",
-        "[technique] slices must be so many that texels times slices is 16384 at most, got 32",
-    ),
-    (
-        "",
-        "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n",
-        "[light] irradiance and ambient must not both be 0: nothing would be seen",
-    ),
-]
+    ("", "[technique]\nslices = 32\ntexels = 1024\n",
+     "[technique] slices must be so many that texels times slices is 16384 at most, got 32"),
+    ("", "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n",
+     "[light] irradiance and ambient must not both be 0: nothing would be seen"),
+]  # fmt: skip
 FUR = """\
 scene = "fur"
 [fur]
@@ -197,12 +174,9 @@ FUR_MISTAKES = [
     ('"swept"', '"shells"\nexponent = 0', "[technique] exponent must be a number > 0 and <= 100, or"),
     ("samples = 8", "strands = 3", "[technique] strands must be a whole number in 1 ... 2, got 3"),
     ("", "[shading]\nexponents = [1]\n", "[shading] exponents must be two numbers in 0 ..."),
-    (
-        "8.0",
-        "150.0\n[camera]\ntarget = [0, 0, 150]\ndistance = 300\ndirection = [0, 0, -1]",
-        "[camera] distance must be so long that the eye is ",
-    ),
-]
+    ("8.0", "150.0\n[camera]\ntarget = [0, 0, 150]\ndistance = 300\ndirection = [0, 0, -1]",
+     "[camera] distance must be so long that the eye is "),
+]  # fmt: skip
 MISTAKES = {SMALL: SKIN_MISTAKES, SEA: SEA_MISTAKES, FUR: FUR_MISTAKES}
 
 
@@ -254,3 +228,34 @@ def test_a_list_of_scenes_is_enough_to_refuse(small):
     for home, _ in SCENES.values():
         with pytest.raises(InputError, match=r"here: keys must be of .* got 'other'"):
             import_module(home).read("here", {"scene": "skin", "other": 1})
+
+
+FILE = 'scene = "toy"\n[technique]\nsamples = 4\nchart = [1, 16]\n[camera]\nresolution = [24, 8]\n'
+
+
+@pytest.fixture
+def toy(monkeypatch, tmp_path):
+    monkeypatch.setitem(SCENES, "toy", ("tests.unit.scenes.toy.scene", "toy.toml"))  # the line
+    path = tmp_path / "toy.toml"
+    path.write_text(FILE, encoding="utf-8")
+    return str(path)
+
+
+def test_it_is_drawn_by_the_command(done, opengl, toy):
+    told = json.loads(done("scene", toy, "--out", "drawn", "--json", "--quiet"))
+    assert sorted(path.name for path in Path("drawn").iterdir()) == [
+        *(f"toy{end}" for end in ("-chart.png", "-error.png", "-truth.png", ".json", ".png"))
+    ]
+    assert [one["samples"] for one in told["chart"]] == [1, 4, 16]
+    one, four, sixteen = (one["rmse"] for one in told["chart"])
+    assert told["rmse"] == four
+    np.testing.assert_allclose((four / one, sixteen / four), 0.25, rtol=0.02)  # samples at left ends: 1 / n
+    picture, truth = (image.imread(f"drawn/toy{end}.png")[..., :3] for end in ("", "-truth"))
+    assert picture.shape == truth.shape == (8, 24, 3)
+    np.testing.assert_allclose(picture, truth, atol=2 / 255)
+    assert np.all(np.diff(truth[0, :, 0]) < 0)
+
+
+def test_its_mistakes_are_one_line(command, toy):
+    Path(toy).write_text(FILE.replace("[technique]", "k = -1\n[technique]"), encoding="utf-8")
+    assert command("scene", toy, "--out", "drawn") == (2, "", f"profilefit: {toy}: k must be a number > 0, got -1\n")

@@ -16,20 +16,10 @@ from tests.unit.recipes.stack.test_record import STACK, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
 
 GREY = """\
-[[layers]]
-name = "veil"
-n = 1.0
-mu_a = 0.2
-mu_s = 2.2
-g = 0.0
-thickness = 0.3
-
-[[layers]]
-name = "wall"
-n = 1.0
-mu_a = 0.8
-mu_s = 1.2
-g = 0.0
+layers = [
+    {name = "veil", n = 1.0, mu_a = 0.2, mu_s = 2.2, g = 0.0, thickness = 0.3},
+    {name = "wall", n = 1.0, mu_a = 0.8, mu_s = 1.2, g = 0.0},
+]
 """
 
 
@@ -61,8 +51,7 @@ def test_a_stack_becomes_a_record_and_that_a_text(command, done, heart):
     assert list(told) == ["stacks/heart", "gaussians/heart"]
     assert told["gaussians/heart"]["constants"]["diffuse.6.red.w1"]["jackknife_error"] == 1e-3
     law = stacks.load(Path("mine/stacks/heart.json")).laws[1]
-    status, text, err = command("export", "heart", "--lang", "python", "--fits", "mine")
-    assert (status, err) == (0, "profilefit: records of 'mine'\n")
+    text = done("export", "heart", "--lang", "python", "--fits", "mine", said="profilefit: records of 'mine'\n")
     assert command("export", "mine/stacks/heart.json", "--lang", "python") == (0, text, "")
     names, r = twin(text), np.geomspace(0.01, 10.0, 30)
     np.testing.assert_allclose(names["heart_profile"](r, 1.0, 0.2), law.profile(r, 0.2), rtol=1e-10)
@@ -164,8 +153,7 @@ def test_tables_of_stacks_in_markdown(command, mine):
 def test_a_stack_beside_other_records(command, done, heart):
     """In ./fits, and shipped: where it is from is said if that is not where the records are from."""
     command("regenerate", heart, "--quiet")
-    status, out, err = command("report", "heart", "hazard")
-    assert (status, err) == (0, "profilefit: stack 'heart' is of 'fits'\n")
+    out = done("report", "heart", "hazard", said="profilefit: stack 'heart' is of 'fits'\n")
     assert "Muscle under its skin" in out
     done("report", "skin")
     Path("fits/hazard.json").write_bytes((fits_folder() / "hazard.json").read_bytes())
@@ -203,8 +191,7 @@ def test_a_damaged_stack_is_no_report(refused, mine, words):
 def test_a_grey_stack_is_fitted(command, done):
     """Truly: a minute or two."""
     Path("veil.toml").write_text(GREY, encoding="utf-8")
-    status, out, err = command("regenerate", "veil.toml", "--out", "mine", "--quiet")
-    assert (status, out, err) == (0, "", "")
+    assert command("regenerate", "veil.toml", "--out", "mine", "--quiet") == (0, "", "")
     path = Path("mine/stacks/veil.json")
     content = record.read(path)
     kinds = ["discretisation_error", "jackknife_error", "misfit_error", "model_error", "statistical_error"]
@@ -220,8 +207,7 @@ def test_a_grey_stack_is_fitted(command, done):
     # Between the thicknesses that were fitted the law is not the light itself, nor are all constants known exactly.
     assert max(worst["rel"]) > 1e-4
     for lang in ("glsl", "hlsl", "python", "json"):
-        text = done("export", str(path), "--lang", lang)
-        assert "veil" in text
+        assert "veil" in done("export", str(path), "--lang", lang)
     sums = gaussians.load(Path("mine/gaussians/veil.json"))
     assert sums.content["fit"]["result"] == "converged"
     red, green, blue = sums.laws("diffuse", 8)

@@ -1,16 +1,33 @@
-"""Tables of measured light and records of a TLS850: every form that is read, and every fault by row and column."""
+"""Tables of measured light, records of a TLS850 and simulated profiles: every form that is read, every fault by row and
+column, what is left out, what is merged, and which errors rings get. Data that no fit can work with are one line.
+"""
 
+import json
 import os
+import re
 import threading
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.data import UNITS
-from profilefit.measured.reading import read
+from profilefit.measured.data import (
+    MOST_ROWS,
+    UNITS,
+    Measured,
+    area_unit,
+    checked_unit,
+    factor,
+    length,
+    require_workable,
+)
+from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
 
+HEAD = "r,value1,value2,value3\n"
 GOOD = "r,value,sigma\n1,0.5,0.01\n2,0.2,0.01\n3,0.1,0.01\n"
 PIXELS, RECORDS = 512, 9  # of a TLS850
 
@@ -56,16 +73,16 @@ def test_rings(table):
     np.testing.assert_array_equal(found.inner, [0, 1, 4])
     np.testing.assert_array_equal(found.outer, [1, 2, 5])
     assert found.unit == "um"
+    two_ways = table("r_in [µm],r_out (um),value,sigma\n0,1,.5,.01\n1,2,.2,.01\n4,5,.1,.01\n")
+    assert UNITS[two_ways.unit] == UNITS["um"]
 
 
-def test_values_per_another_area_are_converted(table):
+def test_values_per_another_area_are_converted_or_of_a_free_scale(table):
     for scaled in (False, True):  # a free scale of light per area is near 1 as well
         found = table("r [mm],value [1/cm^2],sigma\n1,50,1\n2,20,1\n3,10,1\n", scaled=scaled)
         np.testing.assert_allclose(found.value, [0.5, 0.2, 0.1])
         np.testing.assert_allclose(found.sigma, 0.01)
-
-
-def test_any_measure_will_do_if_the_scale_is_free(table):
+    # Any measure will do if the scale is free.
     text = "r [mm],value [a.u.],sigma\n1,50,1\n2,20,1\n3,10,1\n"
     np.testing.assert_array_equal(table(text, scaled=True).value, [50, 20, 10])
     with pytest.raises(InputError, match=r":1: column value: expected light per area .*, got \[a.u.\]"):
@@ -73,7 +90,7 @@ def test_any_measure_will_do_if_the_scale_is_free(table):
 
 
 def test_replicates(table):
-    found = table("r,value1,value2,value3\n1,.4,.5,.6\n2,.2,.3,.25\n3,.1,.12,.11\n4,.05,.06,.04\n")
+    found = table(f"{HEAD}1,.4,.5,.6\n2,.2,.3,.25\n3,.1,.12,.11\n4,.05,.06,.04\n")
     np.testing.assert_allclose(found.value, [0.5, 0.25, 0.11, 0.05])
     assert np.all(found.sigma > 0)
     assert np.all(found.freedom >= 2)
@@ -102,17 +119,10 @@ def test_headers_as_people_write_them(table, text):
     np.testing.assert_allclose(found.sigma / scale**2, 0.01)
 
 
-def test_rings_may_spell_one_unit_in_two_ways(table):
-    found = table("r_in [µm],r_out (um),value,sigma\n0,1,.5,.01\n1,2,.2,.01\n4,5,.1,.01\n")
-    assert UNITS[found.unit] == UNITS["um"]
-
-
 def test_replicates_that_agree_by_accident(table):
     """Coarse numbers far out: their errors are those of the trend. And rows that all have one mean have no trend."""
-    rows = "1,.4,.5,.6\n2,.2,.3,.25\n3,.1,.12,.11\n4,.05,.05,.05\n"
-    assert 0 < table("r,value1,value2,value3\n" + rows).sigma[3] < 0.01
-    flat = "".join(f"{r},.4,.5,.6\n" for r in range(1, 9))
-    assert np.all(table("r,value1,value2,value3\n" + flat).sigma > 0)
+    assert 0 < table(f"{HEAD}1,.4,.5,.6\n2,.2,.3,.25\n3,.1,.12,.11\n4,.05,.05,.05\n").sigma[3] < 0.01
+    assert np.all(table(HEAD + "".join(f"{r},.4,.5,.6\n" for r in range(1, 9))).sigma > 0)
 
 
 LONG = {
@@ -166,7 +176,6 @@ BAD = {
     "r [1/mm^2],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of nm, .*, got '1/mm\^2'",
     "r [mm],value [1/mm],sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column value: expected light per area .*, got \[1/mm\]",
     f"r,{'v' * 1000},sigma\n": r":1: .*, got the column 'v{37}\.\.\.'$",
-    GOOD.replace("0.2", "1e400"): r":3: column value: expected a finite number, got '1e400'",
     GOOD.replace(
         "0.2", "1e300"
     ): r":3: column value: expected a number between 1e-100 and 1e\+100 in size, or 0, got '1e300'",
@@ -188,11 +197,10 @@ BAD = {
     "angle [deg],value\n1,2\n": r"got the column 'angle'; a phase function is fitted with `--kind phase`",
     "r,value,sigma\n1,2,.1\n2,1,.1\n": r": expected at least 3 rows under the header, got 2",
     GOOD + "4,0.05\n": r":5: expected 3 cells between commas, as the header has, got 2",
-    GOOD.replace("0.2", "zero"): r":3: column value: expected a finite number, got 'zero'",
-    GOOD.replace("0.2", "nan"): r":3: column value: expected a finite number, got 'nan'",
-    GOOD.replace("0.2", ""): r":3: column value: expected a finite number, got ''",
-    GOOD.replace("0.2", "inf"): r":3: column value: expected a finite number, got 'inf'",
-    GOOD.replace("0.2", "1_0"): r":3: column value: expected a finite number, got '1_0'",
+    **{
+        GOOD.replace("0.2", cell): f":3: column value: expected a finite number, got '{cell}'"
+        for cell in ("1e400", "zero", "nan", "", "inf", "1_0")
+    },
     GOOD.replace("0.2", "x" * 90): r":3: column value: expected a finite number, got 'x+\.\.\.'$",
     GOOD.replace("0.2,0.01", "0.2,-0.01"): r":3: column sigma: expected a standard error > 0, got -0.01",
     GOOD.replace("0.2,0.01", "0.2,0"): r":3: column sigma: expected a standard error > 0, got 0",
@@ -291,13 +299,175 @@ def test_records_of_a_colour_are_replicates(tls):
         ({"change": lambda rows: [*rows[:5], "1, 5"]}, "red", True, ":6: expected a record, a pixel and a value"),
     ],
 )
-def test_what_is_wrong_is_named(tls, given, colour, scaled, message):
+def test_what_is_wrong_in_records_is_named(tls, given, colour, scaled, message):
     with pytest.raises(InputError, match=rf"skin\.txt.*{message}"):
         read(tls(**given), None, scaled, colour)
 
 
-def test_another_table_has_no_colour(tmp_path):
-    path = tmp_path / "own.csv"
-    path.write_text("r,value,sigma\n1,1,.1\n2,.5,.1\n3,.2,.1\n")
+def test_another_table_has_no_colour(table):
     with pytest.raises(InputError, match="colour must be left out but for records of a TLS850, got 'red'"):
-        read(path, "mm", colour="red")
+        table(GOOD, unit="mm", colour="red")
+
+
+DATA = Path(__file__).parents[3] / "examples"
+
+
+def test_rings_are_merged_until_each_holds_enough_photons():
+    edges, photons = np.arange(9.0), np.array([500, 400, 60, 60, 0, 99, 2, 0])
+    np.testing.assert_array_equal(merged(edges, photons), [0, 1, 2, 4])
+    np.testing.assert_array_equal(merged(edges, np.zeros(8)), [])
+    fine = np.linspace(0, 1, 1001)
+    starts = merged(fine, np.full(1000, 1e6))
+    outer = np.append(fine[starts[1:]], 1.0)
+    assert np.all(outer - fine[starts] > 0.999 * NARROWEST * outer)
+    assert starts.size < 200
+
+
+def test_an_mco_has_bounds_for_errors_and_no_last_ring():
+    found, raw = read(DATA / "half_space.mco"), read_mco(DATA / "half_space.mco")
+    assert (found.unit, found.counted, found.bounded, found.rings) == ("cm", True, True, True)
+    assert found.outer[-1] == pytest.approx(raw.run.grid.r_edges[-2])
+    areas = np.pi * (found.outer**2 - found.inner**2)
+    energy = (raw.reflectance_r * raw.run.grid.r_areas)[:-1].sum()
+    assert np.sum(found.value * areas) == pytest.approx(energy), "no light is lost where rings are merged"
+    counts = found.value * areas * raw.run.photons
+    assert counts.min() > FEWEST_PHOTONS
+    photons = raw.run.photons
+    assert found.photons == photons
+    np.testing.assert_allclose((found.sigma / found.value) ** 2, 1 / counts - 1 / (photons - 1))
+    assert found.notes[0] == "the last of 120 annuli, which holds all light beyond it, is left out"
+    assert "119 annuli merged into" in found.notes[1]
+
+
+def test_an_npz_has_its_own_errors_and_keeps_every_ring():
+    """The same run as the .mco."""
+    exact, bound = read(DATA / "half_space.npz"), read(DATA / "half_space.mco")
+    assert (exact.counted, exact.bounded) == (True, False)
+    assert exact.outer[-1] == pytest.approx(1.2)
+    assert exact.medium is not None
+    assert exact.medium.layers[0].mu_s == 9.0
+    assert exact.photons == bound.photons
+    same = slice(0, 30)  # not merged yet
+    np.testing.assert_allclose(exact.value[same], bound.value[same], rtol=1e-4)
+    assert np.all(exact.sigma[same] < bound.sigma[same]), "a bound is one"
+    assert exact.inner.size < 120, "the empty tail belongs to the last ring"
+    with pytest.raises(InputError, match=r"^unit must be cm or left out for .npz, whose lengths are in cm, got 'mm'"):
+        read(DATA / "half_space.npz", unit="mm")
+
+
+TOO_MUCH = "expected annuli of reflectance >= 0 that add up to at most 1"
+
+
+def test_light_that_no_run_gives_is_one_line(tmp_path):
+    text = (DATA / "half_space.mco").read_text()
+    head, mark, rest = text.partition("\nRd_r #")
+    for name, changed_text, message in (
+        ("few", text.replace("2097152 \t", "50 \t"), r"expected at least 3 annuli .*, got \d\d in"),
+        ("bright", head + mark + rest.replace(rest.split("\n")[1], "1E+20", 1), TOO_MUCH),
+        (
+            "mirror",
+            re.sub(r"0\s*\t#Specular", "1 \t#Specular", text),
+            "expected a specular reflectance below 1, got 1$",
+        ),
+    ):
+        (tmp_path / f"{name}.mco").write_text(changed_text)
+        with pytest.raises(InputError, match=f"{name}.mco: {message}"):
+            read(tmp_path / f"{name}.mco")
+    (tmp_path / "bad.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"bad.npz: expected results of mcml_sim, got: not a whole .npz file"):
+        read(tmp_path / "bad.npz")
+    with np.load(DATA / "half_space.npz") as whole:
+        arrays = dict(whole)
+
+    def changed(name, times):
+        np.savez(tmp_path / "bad.npz", **{**arrays, name: arrays[name] * times})
+        return tmp_path / "bad.npz"
+
+    for name, times, message in (
+        ("reflectance_r", 1e300, TOO_MUCH),
+        ("reflectance_r", -1, "expected annuli of reflectance >= 0"),
+        ("reflectance_r_standard_error", 1e300, "expected standard errors of no more than all of the light"),
+        ("reflectance_r_standard_error", 0, r"expected a standard error > 0 of the light from r = [\d.]+ to [\d.]+$"),
+    ):
+        with pytest.raises(InputError, match=f"bad.npz: {message}"):
+            read(changed(name, times))
+    header = json.loads(str(arrays["header"])) | {"photons": 1}
+    np.savez(tmp_path / "bad.npz", **{**arrays, "header": np.array(json.dumps(header))})
+    with pytest.raises(InputError, match=r"bad.npz: expected two photons or more, .*, got 1"):
+        read(tmp_path / "bad.npz")
+    assert read(changed("reflectance_r", 1)).photons > 2
+
+
+def test_rows_can_be_chosen():
+    data = read(DATA / "phantom.csv")
+    near = data.within(None, 1.0)
+    assert near.r.max() <= 1.0
+    assert near.notes == ("12 of 20 rows left out, by `r_min` and `r_max`",)
+    assert data.within(0.1, 100.0) is data
+    with pytest.raises(InputError, match=r"no row is left between `r_min` and `r_max`: r goes from 0.2 to 12"):
+        data.within(20.0, None)
+    assert replace(data, unit="m").relative_error == pytest.approx(0.02, rel=0.1)
+
+
+def points(rows):
+    """Light that falls as 1 / r^2, known to 2 %."""
+    r = np.geomspace(0.1, 10.0, rows)
+    return Measured("made up", "", r, r, r**-2, 0.02 * r**-2, np.full(rows, np.inf), "as given", "mm")
+
+
+def test_what_can_be_worked_with_passes_and_too_many_rows_name_the_way_out():
+    require_workable(points(MOST_ROWS))
+    dark = points(20)
+    require_workable(replace(dark, value=np.where(dark.r > 5, 0.0, dark.value)))
+    with pytest.raises(InputError, match=r"at most 500 rows, got 501: average neighbours over annuli .* or .* `r_min`"):
+        require_workable(points(MOST_ROWS + 1))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"value": 1e300}, "made up: expected value between 1e-40 and 1e\\+40 in size, got 1e\\+302 in the row of r"),
+        ({"value": 1e-200}, "expected value between"),
+        ({"inner": 1e-200, "outer": 1e-200}, "expected r between"),
+        ({"sigma": 1e300}, "expected sigma between"),
+        ({"sigma": 1e-20}, "expected sigma of at least 1e-12 of the value, got 2e-20 for 100 in the row of r = 0.1"),
+        ({"sigma": np.nan}, "expected sigma between"),
+    ],
+)
+def test_numbers_whose_squares_are_no_floats(change, message):
+    data = points(20)
+    with pytest.raises(InputError, match=message):
+        require_workable(replace(data, **{name: getattr(data, name) * times for name, times in change.items()}))
+
+
+def test_lengths_come_in_the_unit_of_the_data():
+    assert length("l", "1.2mm", "mm") == 1.2
+    assert length("l", "1.2 mm", "cm") == pytest.approx(0.12)
+    assert length("l", "30um", "mm") == pytest.approx(0.03)
+    assert length("l", "1e-3", "m") == 1e-3
+    assert length("l", "2", "") == 2.0
+    assert length("l", "500nm", "mm") == pytest.approx(5e-4)
+    assert length("l", "1 inch", "cm") == pytest.approx(2.54)
+    assert factor("in", "mm") == pytest.approx(25.4)
+
+
+@pytest.mark.parametrize("text", ["", "mm", "-1mm", "0", "1.2.3", "1 ft", "nan", "1mm2"])
+def test_what_is_no_length_is_named(text):
+    with pytest.raises(InputError, match=r"^held l must be a length > 0 such as 1.2mm \(units: nm, .*\), got"):
+        length("held l", text, "mm")
+
+
+def test_a_unit_needs_a_unit():
+    with pytest.raises(InputError, match="l must be without a unit where the data has none"):
+        length("l", "1mm", "")
+    with pytest.raises(InputError, match=r"^unit must be a unit of length \(nm, .*\), got 'mile'"):
+        checked_unit("unit", "mile")
+
+
+OF_AREA = ("1/mm^2", "1/mm2", "1 / mm ^2", "mm^-2", "mm-2", "1/mm²", "/mm²", "1/(mm^2)", "mm⁻²", "mm^(-2)", "1/mm**2")
+NOT_OF_AREA = ("a.u.", "1/mm", "mm^2", "1/mile^2", "")
+
+
+@pytest.mark.parametrize(("text", "unit"), [*((one, "mm") for one in OF_AREA), *((one, None) for one in NOT_OF_AREA)])
+def test_units_of_area(text, unit):
+    assert area_unit(text) == unit

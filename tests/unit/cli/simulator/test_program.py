@@ -1,5 +1,9 @@
-"""What is around any subcommand: exit statuses, one line for what can be mended, Ctrl-C, and what a shell can do."""
+"""What is around any subcommand: exit statuses, one line for what can be mended, Ctrl-C, and what a shell can do; and
+names that are imported when they are asked for, which are the ones that are promised.
+"""
 
+import ast
+import importlib
 import io
 import logging
 import signal
@@ -10,8 +14,12 @@ from pathlib import Path
 
 import pytest
 
+import mcml_sim
+import profilefit
+from mcml_sim.cli.lazy import attributes
 from mcml_sim.cli.program import ENCODED, STANDS_FOR, STOPPING, mend_streams, two_interrupts, without_logs
 from mcml_sim.results.tally import read_results
+from tests.unit.cli.conftest import interrupted, started
 
 MCI = "1.0\n1\nfirst.mco A\n2000\n0.01 0.02\n4 5 3\n1\n1.0\n1.4 10 90 0.5 0.05\n1.0\n"
 STOPPED = "mcml-sim: stopped; the finished batches are kept, the same command resumes\n"
@@ -25,33 +33,17 @@ def mci(tmp_path) -> Path:
     return path
 
 
-def start(*words: object, cwd: Path, **streams) -> subprocess.Popen:
-    """The command in a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
-    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "runpy.run_module('mcml_sim', run_name='__main__', alter_sys=True)"
-    return subprocess.Popen([sys.executable, "-c", code, *map(str, words)], cwd=cwd, text=True, **streams)
-
-
 @pytest.mark.slow
 def test_control_c_says_what_it_waits_for_and_what_is_kept(mci, tmp_path):
-    with start("run", mci, "--photons", 10**12, cwd=tmp_path, stdout=-1, stderr=-1) as run:
-        end = time.monotonic() + 120
-        while not list(tmp_path.glob("first.photons/batch*")) and run.poll() is None and time.monotonic() < end:
-            time.sleep(0.1)
-        run.send_signal(signal.SIGINT)
-        try:
-            out, err = run.communicate(timeout=120)
-        finally:
-            run.kill()
-    assert run.returncode == 130, err
-    assert err == STOPPING + STOPPED
-    assert out == "run 1 of 1: first.mco\n"
+    words = ("mcml_sim", "run", mci, "--photons", 10**12)
+    ended = interrupted(*words, cwd=tmp_path, once="first.photons/batch*")
+    assert ended == (130, "run 1 of 1: first.mco\n", STOPPING + STOPPED)
 
 
 @pytest.mark.slow  # of a clock: a busy machine breaks its second
 def test_a_second_control_c_ends_it_at_once(mci, tmp_path):
     """While it is compiled, which takes seconds and cannot be interrupted."""
-    with start("run", mci, cwd=tmp_path, stdout=-1, stderr=-1) as run:
+    with started("mcml_sim", "run", mci, cwd=tmp_path, stdout=-1, stderr=-1) as run:
         end = time.monotonic() + 120
         while not (tmp_path / "first.photons/run.json").exists() and time.monotonic() < end:
             time.sleep(0.02)
@@ -69,7 +61,7 @@ def test_a_second_control_c_ends_it_at_once(mci, tmp_path):
 
 
 def test_a_full_disk_under_what_is_printed_is_one_line(tmp_path):
-    with open("/dev/full", "w") as full, start("--version", cwd=tmp_path, stdout=full, stderr=-1) as run:
+    with open("/dev/full", "w") as full, started("mcml_sim", "--version", cwd=tmp_path, stdout=full, stderr=-1) as run:
         _, err = run.communicate(timeout=120)
     assert (run.returncode, err) == (2, "mcml-sim: cannot print: No space left on device\n")
 
@@ -99,11 +91,8 @@ def test_a_poor_encoding_prints_another_letter_for_each(monkeypatch, encoding, p
     assert len(printed) == len(LINE)
 
 
-def test_every_letter_has_one_in_ascii():
+def test_every_letter_has_one_in_ascii_and_what_cannot_be_read_is_not_spelled():
     assert all(len(text) == 1 and text.isascii() for text in STANDS_FOR.values())
-
-
-def test_what_cannot_be_read_is_not_spelled():
     with pytest.raises(UnicodeDecodeError, match="can't decode byte"):
         b"\xff".decode("utf-8", ENCODED)
 
@@ -249,3 +238,75 @@ def test_a_full_disk_is_one_line(small):
     with open("/dev/full", "w") as disk, small("short", stdout=disk) as run:
         said = run.stderr.read()
     assert (run.returncode, said) == (2, b"small: cannot print: No space left on device\n")
+
+
+ROOMS = ("fitting", "measured", "report", "scenes", "scenes.layers", "shader", "studies")
+FACES = (mcml_sim, profilefit, *(importlib.import_module(f"profilefit.{room}") for room in ROOMS))
+
+
+@pytest.mark.parametrize("package", FACES, ids=lambda package: package.__name__)
+def test_every_name_is_there_and_is_the_one_that_is_typed(package):
+    """What type checkers are told is what `__getattr__` gives. No module has the name of what is exported beside it: it
+    would stand in the place of the function as soon as anybody imports it.
+    """
+    (branch,) = [one for one in ast.parse(Path(package.__file__).read_text()).body if isinstance(one, ast.If)]
+    homes = {alias.name: one.module for one in branch.body for alias in one.names}
+    assert set(homes) <= set(package.__all__)
+    for name in package.__all__:
+        assert getattr(package, name) is not None
+    for name, home in homes.items():
+        assert getattr(package, name) is getattr(importlib.import_module(home), name)
+    beside = {path.stem for path in Path(package.__file__).parent.iterdir()}
+    modules = {"exact", "fur", "heart", "layers", "scenes", "sea"}  # which are modules themselves
+    assert beside & set(package.__all__) <= modules
+
+
+@pytest.mark.parametrize("package", [mcml_sim, profilefit])
+def test_an_interactive_shell_completes_names_that_nobody_has_asked_for(package):
+    assert set(package.__all__) <= set(dir(package))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match=r"module 'profilefit' has no attribute 'nothing'"):
+        profilefit.nothing  # noqa: B018
+    with pytest.raises(AttributeError, match=r"module 'a' has no attribute 'b'"):
+        attributes("a", {})("b")
+
+
+INTERRUPTED = """
+import runpy, signal, sys
+
+_, imported, package, *words = sys.argv
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == imported:
+            sys.meta_path.remove(self)
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Interrupting())
+sys.argv[1:] = words
+runpy.run_module(package, run_name="__main__")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("imported", "package", "words"),
+    [
+        ("typer", "profilefit", ("--help",)),
+        ("typer", "mcml_sim", ("--help",)),
+        ("numpy", "profilefit", ("convert", "--alpha", ".5", "--mfp", "1")),
+        ("profilefit.convert", "profilefit", ("convert", "--alpha", ".5", "--mfp", "1")),
+        ("profilefit.shader.emit", "profilefit", ("export", "hazard")),
+        ("mcml_sim.tracing", "mcml_sim", ("run", "none.mci")),
+    ],
+)
+def test_ctrl_c_among_the_imports_of_a_command_is_one_line(imported, package, words, tmp_path):
+    """The first of a command's imports, and one of what a subcommand does."""
+    run = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, imported, package, *words],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert (run.returncode, run.stdout, run.stderr) == (130, "", f"{package.replace('_', '-')}: stopped\n")
