@@ -238,9 +238,9 @@ class ProfileLaw(Constants):
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         """Share of the reflected energy within x = r/l [-]."""
 
-    @abc.abstractmethod
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
         """Energy reflected within x = r/l [-], before any scaling to the exact reflectance: what a fit compares."""
+        return self.reflected(alpha) * self.scaled_cdf(x, alpha)
 
     @abc.abstractmethod
     def source_strength(self, alpha: Array) -> Array:
@@ -249,6 +249,10 @@ class ProfileLaw(Constants):
     def total(self, alpha) -> Array:
         """Return the total reflectance A [-] that the profile integrates to at an albedo of the scaled functions."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
+
+    def reflected(self, alpha: Array) -> Array:
+        """Return `total`, or, of a law that spans indices, A at those that it was put under [-]."""
+        return self.total(alpha)
 
     def text_shape(self) -> dict[str, float] | None:
         """Return members of the shape in the shader source by dotted names, for a law of one albedo; else None."""

@@ -104,9 +104,6 @@ class NormalizedDiffusion(ProfileLaw):
         t = self.falloff_rate(alpha) * x
         return -0.25 * jnp.expm1(-t) - 0.75 * jnp.expm1(-t / 3.0)
 
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.albedo.reflectance(alpha) * self.scaled_cdf(x, alpha)
-
     def source_strength(self, alpha: Array) -> Array:
         return 0.5 * self.albedo.reflectance(alpha) * self.falloff_rate(alpha)
 

@@ -84,9 +84,9 @@ class DiffusionLaw(ProfileLaw):
         if self.setting.illumination != "searchlight" or self.setting.g != 0.0:
             raise SettingError(f"setting must be a searchlight with g = 0 (use reduced lengths), got {self.setting}")
 
-    @abc.abstractmethod
     def prefactor(self, alpha: Array) -> Array:
         """c(alpha) [-], which vanishes where alpha does."""
+        return alpha
 
     @abc.abstractmethod
     def shape_profile(self, x: Array, alpha: Array) -> Array:
@@ -255,9 +255,6 @@ class Dipole(DiffusionLaw):
         reflected = diffuse_fresnel(self.setting.n)
         return 1.0 + 4.0 / 3.0 * (1.0 + reflected) / (1.0 - reflected)
 
-    def prefactor(self, alpha: Array) -> Array:
-        return alpha
-
     def shape_profile(self, x: Array, alpha: Array) -> Array:
         sigma = transport_rate(alpha)
         return flux(x, 1.0, sigma) + flux(x, self.image, sigma)
@@ -353,9 +350,6 @@ class BeamDiffusion(DiffusionLaw):
         "of 20 by 48 nodes; better_dipole is its near relative",
     )
 
-    def prefactor(self, alpha: Array) -> Array:
-        return alpha
-
     def shape_profile(self, x: Array, alpha: Array) -> Array:
         safe = jnp.where(x > 0, x, 1.0)
         once = once_scattered(safe, self.setting.n, self.halves) / (2.0 * jnp.pi * safe)
@@ -363,7 +357,11 @@ class BeamDiffusion(DiffusionLaw):
         return jnp.where(x > 0, once + many, jnp.inf)
 
     def shape_energy(self, x: Array, alpha: Array) -> Array:
-        return once_scattered_within(x, self.setting.n, self.halves) + alpha * self._beam_within(x, alpha)
+        # The beam's energy in closed form at each depth, less what kappa takes away.
+        depth, weight = depths(x, self.halves)
+        energy = exitance_within(x[..., None], depth, alpha[..., None], self.setting.n)
+        many = jnp.sum(weight * energy, axis=-1) - self._taken(x, alpha)
+        return once_scattered_within(x, self.setting.n, self.halves) + alpha * many
 
     def source_strength(self, alpha: Array) -> Array:
         return self.entered * alpha * once_scattered(jnp.zeros_like(alpha), self.setting.n, self.halves)
@@ -374,12 +372,6 @@ class BeamDiffusion(DiffusionLaw):
         x, alpha = x[..., None], alpha[..., None]
         light = exitance(x, depth, alpha, self.setting.n)
         return jnp.sum(weight * kappa(depth, jnp.sqrt(x**2 + depth**2)) * light, axis=-1)
-
-    def _beam_within(self, x: Array, alpha: Array) -> Array:
-        """Return the beam's energy within x [-]: in closed form at each depth, less what kappa takes away."""
-        depth, weight = depths(x, self.halves)
-        energy = exitance_within(x[..., None], depth, alpha[..., None], self.setting.n)
-        return jnp.sum(weight * energy, axis=-1) - self._taken(x, alpha)
 
     def _taken(self, x: Array, alpha: Array) -> Array:
         """Energy within x that kappa takes away [-]."""

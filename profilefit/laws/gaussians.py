@@ -105,9 +105,6 @@ class GaussianSum(ProfileLaw):
         share = -jnp.expm1(-0.5 * jnp.asarray(x)[..., None] ** 2 / self.variances(alpha))
         return jnp.sum(jnp.exp(self.log_weights(alpha)) * share, axis=-1)
 
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.total(alpha) * self.scaled_cdf(x, alpha)
-
     def source_strength(self, alpha: Array) -> Array:
         """0: no Gaussian rises as 1/x, so a limit at the source cannot be fitted."""
         return jnp.zeros_like(alpha)

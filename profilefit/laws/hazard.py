@@ -95,17 +95,13 @@ def radius_at(t: Array, growth: Array, shape: Shape, steps: int) -> Array:
     stretch = (1.0 - white) + p * t + white * growth
     x = t * stretch / (shape.kappa * stretch + rise)
     for _ in range(steps):
-        x = _closer(x, t, shape)
+        near = jnp.clip(x, NEAREST, FARTHEST)
+        here = local(near, shape)
+        flight = 1.0 / here.hazard
+        step = (t - here.exponent + jnp.log(here.ratio)) * flight
+        y = -here.bend * flight * step
+        x = jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
     return x
-
-
-def _closer(x: Array, t: Array, shape: Shape) -> Array:
-    near = jnp.clip(x, NEAREST, FARTHEST)
-    here = local(near, shape)
-    flight = 1.0 / here.hazard
-    step = (t - here.exponent + jnp.log(here.ratio)) * flight
-    y = -here.bend * flight * step
-    return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
 
 
 def local(x: Array, shape: Shape) -> Local:
