@@ -115,7 +115,12 @@ def relative(law, rings: Rings) -> Tables:
     of squares is the mean square of (law/data - 1), the `rel` of `quality`. Then come the errors of the cdf at all
     edges, then what resists a law that falls with alpha next to white, ring by ring: absorption must not add light.
     """
-    added = _added_light(law, rings)
+    # d ln E / d sqrt(1 - alpha) of each ring next to white plus `LEAST_FALL` (j, n), at each index; 0 if negative.
+    near = jnp.array([1.0 - NEXT_TO_WHITE, 1.0])[:, None, None]
+    darker, white = jnp.diff(law.under(rings.surfaces).unscaled_energy(rings.r_edges, near), axis=-1)
+    lit = (darker > DARK) & (white > DARK)
+    slope = jnp.log(jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)) / np.sqrt(NEXT_TO_WHITE)
+    added = jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
     alpha, law = rings.alpha[:, None], law.under(rings.surface)
     inside = law.unscaled_energy(rings.r_edges, alpha)
     widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
@@ -129,15 +134,6 @@ def relative(law, rings: Rings) -> Tables:
     of_each = rings.alpha.size // len(added)
     added = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(added, of_each, axis=0)
     return misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, added
-
-
-def _added_light(law, rings: Rings) -> Array:
-    """(j, n) d ln E / d sqrt(1 - alpha) of each ring next to white plus `LEAST_FALL`, at each index; 0 if negative."""
-    alpha = jnp.array([1.0 - NEXT_TO_WHITE, 1.0])[:, None, None]
-    darker, white = jnp.diff(law.under(rings.surfaces).unscaled_energy(rings.r_edges, alpha), axis=-1)
-    lit = (darker > DARK) & (white > DARK)
-    slope = jnp.log(jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)) / np.sqrt(NEXT_TO_WHITE)
-    return jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
 
 
 def radial(law, rings: Rings) -> Tables:
