@@ -126,7 +126,7 @@ class Constants(eqx.Module):
     entry  what is known of it by name; one that is in no table of `profilefit.laws` needs none
     """
 
-    setting: eqx.AbstractVar[Setting]
+    setting: Setting = eqx.field(static=True)
     entry: ClassVar[Entry] = Entry()
 
     @classmethod

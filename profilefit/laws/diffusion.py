@@ -18,7 +18,6 @@ from jax import Array, lax
 from mcml_sim.exact import single_scattering
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.evaluate import evaluated
@@ -75,7 +74,6 @@ class DiffusionLaw(ProfileLaw):
     simulator's. `cdf` is a share of the law's own reflectance; `albedo` is not used.
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: Normalisation | None = eqx.field(static=True, default=None)
     own_reflectance = True
     sampler_class = DiffusionSampler

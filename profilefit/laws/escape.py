@@ -37,7 +37,7 @@ def decay_rate(alpha) -> Array:
 class EscapeLaw(ProfileLaw):
     """A law whose cdf tends to 1 by itself, scaled to A by `albedo`: R_d = A `scaled_density` / (2 pi x)."""
 
-    albedo: eqx.AbstractVar[Normalisation]
+    albedo: Normalisation = eqx.field(static=True)
 
     @abc.abstractmethod
     def scaled_density(self, x: Array, alpha: Array) -> Array:

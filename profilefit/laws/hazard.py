@@ -15,10 +15,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLAMPS, Entry, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
-from profilefit.laws.rational import Normalisation
 
 NEAREST = 1e-25  # x [mfp] that stands for 0: every quotient stays finite, x ln x is 0
 FARTHEST = 1e8  # x [mfp]: no light is left, and x^4 is finite in float32
@@ -214,8 +212,6 @@ class Hazard(EscapeLaw):
     and one logarithm a profile.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
     h0: float
     h1: float
     h2: float

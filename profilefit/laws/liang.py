@@ -14,7 +14,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
@@ -113,7 +112,6 @@ class Liang(ProfileLaw):
     eps     the eps of (19) [-], 0.01
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: Normalisation = eqx.field(static=True)
     a1: float
     a2: float

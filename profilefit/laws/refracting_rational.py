@@ -12,7 +12,6 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLOSED, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
@@ -55,7 +54,6 @@ class FoldedRational(Normalisation):
     and alpha(A > t) = 1.
     """
 
-    setting: Setting = eqx.field(static=True)
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
 
     @classmethod

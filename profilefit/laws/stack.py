@@ -8,7 +8,6 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import CLOSED, Constants, ProfileLaw
 from profilefit.laws.escape import decay_rate
@@ -23,7 +22,6 @@ NEWTON_STEPS = 4  # of an image's radius: to rounding
 class LayerLaw(Constants):
     """The half space of one layer, in its unit of length: a law R_d(r / l; alpha) at that layer's alpha [-] and l."""
 
-    setting: Setting = eqx.field(static=True)
     law: ProfileLaw = eqx.field(metadata=CLOSED)
     alpha: float = eqx.field(metadata=CLOSED)
     mfp: float = eqx.field(metadata=CLOSED)
@@ -108,7 +106,6 @@ class StackLaw(Constants):
     Where layers scatter forward, l, alpha and kappa are those of similar isotropic ones.
     """
 
-    setting: Setting = eqx.field(static=True)
     top: LayerLaw = eqx.field(metadata=CLOSED)
     below: LayerLaw | StackLaw = eqx.field(metadata=CLOSED)
     thickness: float = eqx.field(metadata=CLOSED)

@@ -14,7 +14,6 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLAMPS, CLOSED, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
@@ -142,8 +141,7 @@ class TwoPartHazard(EscapeLaw):
     they are made of is each law's own. Two exponentials and two logarithms a profile.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: eqx.AbstractVar[FoldedRational]
+    albedo: FoldedRational = eqx.field(static=True)
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
     sampler_class = TwoPartSampler
 
@@ -405,7 +403,6 @@ class ForwardHalfSpace(ProfileLaw):
     arguments alpha are not looked at.
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: float  # a
     total_reflectance: float  # A
     once_h: float

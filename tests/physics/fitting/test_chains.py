@@ -5,7 +5,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import equinox as eqx
 import numpy as np
 import pytest
 
@@ -26,7 +25,6 @@ INDEPENDENT = 500
 class Line(AlbedoLaw):
     """A = u + v alpha: its misfit is a quadratic form, and its posteriors are normal."""
 
-    setting: Setting = eqx.field(static=True)
     u: float = 0.3
     v: float = 0.5
 

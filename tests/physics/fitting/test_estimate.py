@@ -22,7 +22,6 @@ REPLICATES = 200
 class Line(AlbedoLaw):
     """A = u + v alpha: linear in its constants, so that every error has a closed form."""
 
-    setting: Setting = eqx.field(static=True)
     u: float = 0.3
     v: float = 0.5
 

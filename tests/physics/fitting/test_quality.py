@@ -1,6 +1,5 @@
 """The measures: zero for the truth itself, by hand where a hand can, and sensitive to what they are named after."""
 
-import equinox as eqx
 import numpy as np
 import pytest
 
@@ -28,8 +27,6 @@ class Truth:
 
 class ExactMap(AlbedoLaw):
     """The exact A(alpha), its inverse by interpolation on a fine table."""
-
-    setting: Setting = eqx.field(static=True)
 
     def reflectance(self, alpha):
         return exact.reflectance(alpha, self.setting)
