@@ -14,7 +14,7 @@ from mcml_sim import Grid, Setting, simulate_orders
 from mcml_sim.results.estimate import covariance_factor
 from profilefit.errors import ShaderError
 from profilefit.fitting.profiles import Covariance, Profiles
-from profilefit.laws.base import Constants
+from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.published import SETS
@@ -155,6 +155,19 @@ class Tallies:
         return Profiles(
             self.alpha, self.edges, value, error, effective, rest, "orders", Setting(), self.photons, covariance
         )
+
+
+class Line(AlbedoLaw):
+    """A = u + v alpha, linear in its constants: errors have closed forms, and posteriors are normal."""
+
+    u: float = 0.3
+    v: float = 0.5
+
+    def alpha(self, reflectance):
+        return (reflectance - self.u) / self.v
+
+    def reflectance(self, alpha):
+        return self.u + self.v * alpha
 
 
 @pytest.fixture(scope="session")

@@ -14,25 +14,12 @@ from profilefit.errors import InputError
 from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Covariance, Profiles
-from profilefit.laws.base import AlbedoLaw
+from tests.fixtures import Line
 
 pytestmark = pytest.mark.slow
 
 # A chain of 50 autocorrelation times and 32 walkers holds 1600 independent points, thinned to 1000; 500 to be safe.
 INDEPENDENT = 500
-
-
-class Line(AlbedoLaw):
-    """A = u + v alpha: its misfit is a quadratic form, and its posteriors are normal."""
-
-    u: float = 0.3
-    v: float = 0.5
-
-    def alpha(self, reflectance):
-        return (reflectance - self.u) / self.v
-
-    def reflectance(self, alpha):
-        return self.u + self.v * alpha
 
 
 def fitted_line(seed, law, free=None):
@@ -92,6 +79,10 @@ def test_intervals_and_deviations_are_those_of_a_normal(line_fit):
     assert np.all(outer[:, 0] < inner[:, 0])
     assert np.all(inner[:, 1] < outer[:, 1])
     assert np.all((inner[:, 0] < line_fit.solution.parameters) & (line_fit.solution.parameters < inner[:, 1]))
+    assert found.walkers == 32
+    assert found.samples.shape[1] == 2
+    assert len(found.samples) <= 1000
+    assert 0.1 < found.acceptance < 0.9
 
 
 def test_curvature_adjustment_is_the_identity_it_claims():
@@ -135,14 +126,6 @@ def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
     assert maps < 1000
 
 
-def test_chain_facts(line_fit):
-    found = posterior(line_fit, "statistical", max_steps=1000)
-    assert found.walkers == 32
-    assert found.samples.shape[1] == 2
-    assert len(found.samples) <= 1000
-    assert 0.1 < found.acceptance < 0.9
-
-
 def test_draws_go_to_arviz_and_back(line_fit):
     """A walker a chain, the log density beside it, and the fit's name on it."""
     pytest.importorskip("arviz_base")
@@ -161,16 +144,16 @@ def test_draws_go_to_arviz_and_back(line_fit):
     np.testing.assert_allclose(found.log_density, expected, rtol=1e-6, atol=1e-8)
 
 
-def test_kind_must_be_known(line_fit):
+def test_misuse_is_named(line_fit, tallies, liang):
     with pytest.raises(InputError, match="'misfit', got 'discrepancy', which is called 'misfit' now"):
         posterior(line_fit, "discrepancy")
     with pytest.raises(InputError, match="kind must be 'statistical' or 'misfit', got 'both'"):
         posterior(line_fit, "both")
-
-
-def test_without_photon_noise_only_the_misfit_is_left(line_fit):
     with pytest.raises(InputError, match=r"no photon noise: only kind='misfit' applies, got 'statistical'"):
         posterior(replace(line_fit, statistical=None))
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
+    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
+        posterior(one)
 
 
 def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
@@ -187,9 +170,3 @@ def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
     full, _ = one.second_derivatives
     width = np.sqrt(np.diag(np.linalg.inv(short.T @ full @ short / variance)))
     assert np.max(np.abs(width / expected - 1.0)) > 0.02
-
-
-def test_no_posterior_of_a_fit_that_failed(tallies, liang):
-    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
-    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
-        posterior(one)

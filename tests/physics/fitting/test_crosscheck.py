@@ -36,10 +36,7 @@ def test_chi2_by_hand():
     turned = np.array([[2.0, 1.0], [1.0, 2.0]])
     difference = np.array([1.0, -2.0])
     assert mahalanobis(difference, turned)[0] == pytest.approx(difference @ np.linalg.inv(turned) @ difference)
-
-
-def test_chi2_does_not_see_what_the_covariance_does_not_know():
-    """Two constants that photons move together, in any units, are one direction."""
+    # Two constants that photons move together, in any units, are one direction.
     lengths = np.array([1e-3, 1.0, 1e3])
     covariance = np.outer(lengths, lengths) * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]])
     distance, rank = mahalanobis(lengths * np.array([1.0, 1.0, 2.0]), covariance)
@@ -108,7 +105,7 @@ def map_pair(normalisation):
     return fit(profiles, normalisation, "reflectance", free=("b", "c")), profiles
 
 
-def test_exact_light_and_a_million_photons_agree(map_pair, white_run):
+def test_exact_light_and_a_million_photons_agree_and_not_a_wrong_count(map_pair, white_run):
     check = crosscheck(*map_pair, white_run)
     assert check["result"] == AGREE
     assert check["rank"] == 2
@@ -116,9 +113,6 @@ def test_exact_light_and_a_million_photons_agree(map_pair, white_run):
     assert check["photons"] == white_run.photons
     # At .99999 light is lost after 8192 scatterings.
     assert (check["albedos_left_out"], check["rings_left_out"]) == (1, 0)
-
-
-def test_a_tally_that_counts_one_photon_in_fifty_twice_is_caught(map_pair, white_run):
     wrong = replace(white_run, photons=int(white_run.photons / 1.02))
     assert crosscheck(*map_pair, wrong)["result"] == DIFFER
 
@@ -162,19 +156,15 @@ def fits(liang):
     return {objective: fit(truth, liang, objective, TWO, jackknife=False) for objective in ("radial", "energy")}
 
 
-def test_middles_are_wrong_by_the_square_of_the_width_and_it_is_known(fits, liang):
+def test_middles_are_wrong_by_the_square_of_the_width_and_integrals_by_next_to_nothing(fits, liang):
     one = fits["radial"]
-    true = liang.vector(TWO)
+    true, moved = liang.vector(TWO), by_width(one)
     off = one.solution.parameters - true
-    moved = by_width(one)
     by_square = [(moved[k] - moved[1]) / (k**2 - 1) for k in (2, 3)]
     np.testing.assert_allclose(by_square[0], by_square[1], rtol=0.2)
     # What it says is what it is, to a fourth: terms beyond the square, of the rings next to the source.
     np.testing.assert_allclose(discretisation_error(one), np.abs(off), rtol=0.25)
     assert np.all(np.abs(off / true) > 1e-6)
-
-
-def test_integrals_have_next_to_none(fits, liang):
     one = fits["energy"]
     np.testing.assert_allclose(one.solution.parameters, liang.vector(TWO), rtol=1e-6)
     assert np.all(discretisation_error(one) < 1e-3 * discretisation_error(fits["radial"]))
@@ -193,13 +183,10 @@ def test_wide_rings_are_the_sums_of_narrow_ones(fits):
     np.testing.assert_array_equal(wide.r_edges[place + 1], rings.r_edges[[5, 10, 15, 20, 25, 30, 35, 36]])
     assert np.all(np.diff(wide.r_edges) > 0)
     np.testing.assert_array_equal(widened(rings, 1).energy, rings.energy)
-
-
-def test_a_wide_ring_counts_only_with_all_its_parts(fits):
-    one = fits["radial"]
+    # A wide ring counts only with all its parts.
     used = np.ones((FEW.size, 36))
     used[2, 7] = 0.0
-    rings = rings_of(profiles_of(one.law, np.asarray(one.rings.r_edges)), used > 0)
+    rings = rings_of(profiles_of(fits["radial"].law, np.asarray(rings.r_edges)), used > 0)
     wide = widened(rings, 3)
     kept = wide.used[:, wide.energy[0] > 0]
     assert kept.sum() == 12 * 7 - 1

@@ -33,12 +33,17 @@ def known(truth, burley):
     return LawWithErrors(one.law, one.free, "energy", noise, discrepancy(one, truth))
 
 
-def test_radius_is_the_law_s_own(known):
+def test_radius_is_the_law_s_own_and_misuse_is_named(known):
     for alpha in (0.3, 0.9):
         for share in (0.3, 0.995):
             found = derived.radius(known, alpha, share)
             # Straight lines between edges 2.3 % apart, of a share that levels off.
             assert found.value[0] == pytest.approx(float(known.law.sampler.sample(share, alpha)), rel=1e-3)
+    with pytest.raises(InputError, match=r"share must be in \(0, 1\), of a profile law, got 1.5 of Burley"):
+        derived.radius(known, 0.5, 1.5)
+    with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
+        derived.reflectance(known, 0.5)
+    assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
 
 
 def test_statistical_errors_are_those_of_moved_constants(known):
@@ -122,14 +127,6 @@ def test_a_summary_knows_how_far_radii_are_off(known, truth):
     off = [float(known.law.sampler.sample(0.995, a)) / float(exact.quantile(0.995, a)) - 1 for a in ALPHA]
     # The data's own radius is read off straight lines between edges a third apart.
     assert derived.tail_error(known, truth) == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=0.3)
-
-
-def test_misuse_is_named(known):
-    with pytest.raises(InputError, match=r"share must be in \(0, 1\), of a profile law, got 1.5 of Burley"):
-        derived.radius(known, 0.5, 1.5)
-    with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
-        derived.reflectance(known, 0.5)
-    assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
 
 
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])

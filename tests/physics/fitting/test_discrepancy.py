@@ -165,11 +165,7 @@ def test_a_record_gives_it_back(drawn):
     assert discrepancy.read(content, {}) is None
     failed = {"discrepancy": {**one.content(), "amplitude": None}}
     assert discrepancy.read(failed, one.arrays()) is None
-
-
-@pytest.mark.slow
-def test_maps_have_no_radius(drawn):
-    """A process that knows no radius answers for any."""
-    flat = replace(drawn[0], length_r=np.nan, u=np.zeros(1), influence=drawn[0].influence[:, :, :1])
+    # A process that knows no radius, that of a map, answers for any.
+    flat = replace(one, length_r=np.nan, u=np.zeros(1), influence=one.influence[:, :, :1])
     near, far = (flat.law_covariance(np.array([u]), np.array([0.4]), np.zeros((1, 2)))[0, 0] for u in (-3.0, 9.0))
     assert near == far == pytest.approx(flat.amplitude**2)

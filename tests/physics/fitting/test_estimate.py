@@ -13,23 +13,10 @@ from profilefit.fitting import estimate, solver
 from profilefit.fitting.estimate import ResidualFunction, fit, followed, residual_structure
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
-from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.printed_maps import LiangAlbedo
+from tests.fixtures import Line
 
 REPLICATES = 200
-
-
-class Line(AlbedoLaw):
-    """A = u + v alpha: linear in its constants, so that every error has a closed form."""
-
-    u: float = 0.3
-    v: float = 0.5
-
-    def alpha(self, reflectance):
-        return (reflectance - self.u) / self.v
-
-    def reflectance(self, alpha):
-        return self.u + self.v * alpha
 
 
 def refits(tallies, law, free, seed=5):
@@ -108,35 +95,20 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
         slope = (ends[1] - ends[0]) / (2e-3 * profiles.energy[a, i])
         # Second order in the step: 1e-6; LM's tolerance of 1e-10 over the step of 1e-3: 1e-7 of the constants.
         np.testing.assert_allclose(found[:, a, i], slope, rtol=1e-3, atol=1e-4 * np.abs(found).max())
-
-
-@pytest.mark.slow
-def test_sensitivity_without_the_residuals_curvature_would_be_wrong(tallies, burley):
-    """Negative control for the one above: Gauss and Newton's (J^T J)^-1 in place of the full Hessian."""
-    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))
-    problem = ResidualFunction("energy", one.free)
-    full = followed(*one.second_derivatives)
-    hessian = _hessian(problem, one, burley)
-    short = np.einsum("pq,qai->pai", np.linalg.inv(one.solution.jacobian.T @ one.solution.jacobian) @ hessian, full)
-    assert np.max(np.abs(short - full)) > 1e-2 * np.max(np.abs(full))
-
-
-def _hessian(problem, one, law):
-    def cost(theta):
-        return 0.5 * problem.cost(theta, (law, one.rings))
-
+    # Negative control: Gauss and Newton's (J^T J)^-1 in place of the full Hessian.
     with jax.enable_x64(True):
-        return np.asarray(jax.hessian(cost)(jax.numpy.asarray(one.solution.parameters)))
+        cost = lambda theta: 0.5 * problem.cost(theta, (burley, one.rings))  # noqa: E731
+        hessian = np.asarray(jax.hessian(cost)(jax.numpy.asarray(one.solution.parameters)))
+    short = np.einsum("pq,qai->pai", np.linalg.inv(one.solution.jacobian.T @ one.solution.jacobian) @ hessian, found)
+    assert np.max(np.abs(short - found)) > 1e-2 * np.max(np.abs(found))
 
 
 def line_profiles(reflectance, alpha, factor=None, photons=1000):
     """One ring that holds all."""
     energy = np.asarray(reflectance, float)[:, None]
     covariance = None if factor is None else Covariance(factor, energy, photons, 0.0)
-    plenty = np.full_like(energy, np.inf)
-    edges = np.array([0.0, 1.0])
-    rest = np.zeros(alpha.size)
-    return Profiles(alpha, edges, energy, 0 * energy, plenty, rest, "test", Setting(), photons, covariance)
+    noise, rest = (0 * energy, np.full_like(energy, np.inf)), np.zeros(alpha.size)
+    return Profiles(alpha, np.array([0.0, 1.0]), energy, *noise, rest, "test", Setting(), photons, covariance)
 
 
 @pytest.fixture
@@ -179,22 +151,22 @@ def test_the_jackknife_by_hand(line, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_jackknife_sees_misfit_that_repeats_itself():
-    """Points on a parabola: their neighbours agree, so independent noise promises too much."""
-    alpha = np.linspace(0.1, 0.9, 60)
-    one = fit(line_profiles(0.2 + 0.5 * alpha**2, alpha), Line(Setting()), "reflectance")
-    assert np.all(one.jackknife > 2 * np.sqrt(np.diag(one.misfit)))
-    assert one.structure.along_alpha > 0.8
-
-
-@pytest.mark.slow
-def test_a_constant_that_is_held_stays(line):
+def test_a_held_constant_stays_and_the_jackknife_sees_misfit_that_repeats_itself(line):
     alpha, reflectance, _ = line
     one = fit(line_profiles(reflectance, alpha), Line(Setting(), u=0.25), "reflectance", free=("v",))
     assert one.free == ("v",)
     assert one.law.u == 0.25
     assert one.law.v == pytest.approx(alpha @ (reflectance - 0.25) / (alpha @ alpha), rel=1e-8)
     assert one.statistical is None
+    # Points on a parabola: their neighbours agree, so independent noise promises too much.
+    many = np.linspace(0.1, 0.9, 60)
+    one = fit(line_profiles(0.2 + 0.5 * many**2, many), Line(Setting()), "reflectance")
+    assert np.all(one.jackknife > 2 * np.sqrt(np.diag(one.misfit)))
+    assert one.structure.along_alpha > 0.8
+    # Without enough albedos it is no number.
+    few = fit(line_profiles(reflectance[:5], alpha[:5]), Line(Setting()), "reflectance")
+    assert few.result == "converged"
+    assert np.all(np.isnan(few.jackknife))
 
 
 def test_only_albedos_that_are_counted_count(line):
@@ -243,7 +215,7 @@ def test_settings_do_not_mix(tallies, toy):
 # What is left
 
 
-def test_structure_of_a_hand_made_table():
+def test_structure_of_tables_noise_and_waves():
     """Two albedos, four rings, one of them unused: rms over seven, lag-1 sums by hand."""
     table = np.array([[1.0, 1.0, -1.0, -1.0], [2.0, 2.0, 2.0, 0.0]])
     found = residual_structure(table)
@@ -255,9 +227,6 @@ def test_structure_of_a_hand_made_table():
     assert found.along_alpha == pytest.approx(2 / np.sqrt(12 * 4))
     # Stretches of one sign along r: 2 and 1, along alpha: 1, 1, 2, 1.
     assert found.half_waves == pytest.approx(1.5 * 1.25)
-
-
-def test_noise_has_no_structure_and_a_wave_has():
     rng = np.random.default_rng(6)
     noise = residual_structure(rng.standard_normal((20, 100)))
     # Lag-1 of white noise: 1 / sqrt(2000) = .022; 4 of them. Signs change at every other step.
@@ -268,9 +237,6 @@ def test_noise_has_no_structure_and_a_wave_has():
     assert wave.along_r > 0.98
     assert wave.along_alpha == pytest.approx(1.0)
     assert wave.half_waves == 3.0
-
-
-def test_a_perfect_fit_leaves_nothing():
     found = residual_structure(np.zeros((3, 4)))
     assert (found.rms, found.largest, found.along_r, found.along_alpha, found.half_waves) == (0, 0, 0, 0, 0)
 
@@ -298,29 +264,17 @@ def test_a_constant_that_moves_nothing_is_a_failed_fit(tallies, liang):
     assert np.all(np.isnan(one.jackknife))
 
 
-@pytest.mark.slow
-def test_a_jackknife_without_enough_albedos_is_no_number(line):
-    alpha, reflectance, _ = line
-    few = fit(line_profiles(reflectance[:5], alpha[:5]), Line(Setting()), "reflectance")
-    assert few.result == "converged"
-    assert np.all(np.isnan(few.jackknife))
-
-
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("law", "words", "said"),
     [
-        ({"objective": "depth"}, "objective must be one of energy, relative, radial,"),
-        ({"objective": "radial"}, "objective 'radial' does not apply to Burley"),
-        ({"free": ()}, "free must name at least one constant, each once, got \\(none\\)"),
-        ({"free": ("s0", "s0")}, "free must name at least one constant, each once, got s0, s0"),
-        ({"free": ("s9",)}, "free must name constants of the law \\(s0, s1, s2, s3\\), got 's9'"),
+        ("burley", {"objective": "depth"}, "objective must be one of energy, relative, radial,"),
+        ("burley", {"objective": "radial"}, "objective 'radial' does not apply to Burley"),
+        ("burley", {"free": ()}, "free must name at least one constant, each once, got \\(none\\)"),
+        ("burley", {"free": ("s0", "s0")}, "free must name at least one constant, each once, got s0, s0"),
+        ("burley", {"free": ("s9",)}, "free must name constants of the law \\(s0, s1, s2, s3\\), got 's9'"),
+        ("liang", {"objective": "share"}, "objective 'share' needs shares xi of the energy, got none"),
     ],
 )
-def test_misuse_is_named(tallies, burley, words, said):
+def test_misuse_is_named(tallies, request, law, words, said):
     with pytest.raises(InputError, match=said):
-        fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, **words)
-
-
-def test_quantiles_need_shares(tallies, liang):
-    with pytest.raises(InputError, match="objective 'share' needs shares xi of the energy, got none"):
-        fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "share")
+        fit(tallies.profiles(tallies.draw(0, 1)[0]), request.getfixturevalue(law), **words)

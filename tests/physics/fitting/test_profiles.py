@@ -43,9 +43,6 @@ def test_exact_rings_are_differences_of_the_cdf(truth):
     assert truth.photons is None
     assert np.all(truth.standard_error == 0)
     assert np.all(truth.trusted)
-
-
-def test_the_setting_comes_along():
     found = Profiles.from_exact([0.5], [0.0, 1.0], Setting("diffuse"))
     assert found.setting == Setting("diffuse")
     assert found.reflectance[0] == pytest.approx(exact.reflectance(0.5, Setting("diffuse")))
@@ -53,26 +50,28 @@ def test_the_setting_comes_along():
         Profiles.from_exact([0.5], [0.0, 1.0], Setting(n=0.9))
 
 
-def test_energy_is_value_times_area(photons, white_run):
+def test_energy_light_beyond_trust_and_covariance_of_photons(photons, white_run):
     np.testing.assert_allclose(photons.value * photons.r_areas, photons.energy, rtol=1e-14)
     np.testing.assert_allclose(photons.value, white_run.profile(ALPHAS).value, rtol=1e-12)
     np.testing.assert_allclose(photons.r_areas, white_run.grid.r_areas, rtol=1e-12)
     np.testing.assert_allclose(photons.r, 0.5 * (photons.r_edges[1:] + photons.r_edges[:-1]))
-
-
-def test_light_beyond_the_last_ring_is_kept(photons, white_run):
     np.testing.assert_allclose(photons.reflectance, white_run.reflectance(ALPHAS).value, rtol=1e-12)
     assert np.all(photons.cdf[:, 0] == 0)
     np.testing.assert_allclose(1 - photons.cdf[:, -1], photons.beyond / photons.reflectance, atol=1e-14)
-
-
-def test_rings_with_few_photons_are_not_trusted(photons):
     np.testing.assert_array_equal(photons.trusted, photons.effective_samples >= 50)
     assert FEWEST_EFFECTIVE_SAMPLES == 50
     assert not photons.trusted[0, -1]  # alpha = .3 beyond 20 mfp
+    variance = np.sum(photons.covariance.factor**2, axis=2).T
+    # Rank 4 holds it all, and both divide by N (N - 1); what is left of a photon with weight .3^40 is rounding.
+    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-9, atol=1e-18)
+    assert photons.covariance.rank == len(ALPHAS)
+    many = Profiles.from_orders(white_run, np.linspace(0.1, 0.99, 20)).covariance
+    assert many.rank == COVARIANCE_RANK == 8
+    assert 0 < many.dropped < 1e-3
+    assert Profiles.from_orders(white_run, ALPHAS, correlated=False).covariance is None
 
 
-def test_merged_rings_hold_the_same_energy(white_run, photons):
+def test_merged_rings_hold_the_same_energy_and_covariance(white_run, photons):
     edges = white_run.grid.r_edges[[0, 3, 4, 12, 25]]
     merged = Profiles.from_orders(white_run.merged(edges), ALPHAS)
     sums = np.add.reduceat(photons.energy, [0, 3, 4, 12], axis=1)
@@ -83,12 +82,8 @@ def test_merged_rings_hold_the_same_energy(white_run, photons):
     np.testing.assert_allclose(inner.reflectance, photons.reflectance, rtol=1e-12)
     with pytest.raises(InputError, match="r_edges must be edges of the run's own grid"):
         white_run.merged([0.0, 0.0123, 1.0])
-
-
-def test_merged_covariance_is_the_merge_of_the_covariance(white_run, photons):
-    """Two routes to the error of a sum of rings: tally the sum, or add the parts with their negative covariance."""
+    # Two routes to the error of a sum of rings: tally the sum, or add the parts with their negative covariance.
     groups = [(0, 3), (3, 4), (4, 12), (12, 25)]
-    merged = Profiles.from_orders(white_run.merged(white_run.grid.r_edges[[0, 3, 4, 12, 25]]), ALPHAS)
     parts = np.zeros((len(ALPHAS) * 4, len(ALPHAS), 25))
     whole = np.zeros((len(ALPHAS) * 4, len(ALPHAS), 4))
     for row, (a, g) in enumerate(np.ndindex(len(ALPHAS), 4)):
@@ -97,23 +92,6 @@ def test_merged_covariance_is_the_merge_of_the_covariance(white_run, photons):
     np.testing.assert_allclose(
         photons.covariance.sandwich(parts), merged.covariance.sandwich(whole), rtol=1e-9, atol=1e-20
     )
-
-
-def test_covariance_without_a_request_is_not_made(white_run):
-    assert Profiles.from_orders(white_run, ALPHAS, correlated=False).covariance is None
-
-
-def test_rank_is_that_of_the_albedos_or_eight(white_run, photons):
-    assert photons.covariance.rank == len(ALPHAS)
-    many = Profiles.from_orders(white_run, np.linspace(0.1, 0.99, 20)).covariance
-    assert many.rank == COVARIANCE_RANK == 8
-    assert 0 < many.dropped < 1e-3
-
-
-def test_the_diagonal_is_the_standard_error(photons):
-    variance = np.sum(photons.covariance.factor**2, axis=2).T
-    # Rank 4 holds it all, and both divide by N (N - 1); what is left of a photon with weight .3^40 is rounding.
-    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-9, atol=1e-18)
 
 
 def test_sandwich_is_the_dense_closed_form():
@@ -207,11 +185,6 @@ def test_sandwich_is_the_scatter_of_synthetic_tallies(tallies, sidak):
     assert np.abs((scatter - alone) / error).max() > 2 * sidak(6)
 
 
-def test_one_albedo_may_be_a_number(white_run):
-    assert Profiles.from_orders(white_run, 0.5).energy.shape == (1, 25)
-    assert Profiles.from_exact(0.5, [0.0, 1.0]).energy.shape == (1, 1)
-
-
 @pytest.mark.parametrize("alpha", [0.0, -0.1, 1.1, [0.5, np.nan], [[0.5]]])
 def test_albedos_must_be_a_list_above_zero(alpha, white_run):
     for make in (lambda: Profiles.from_orders(white_run, alpha), lambda: Profiles.from_exact(alpha, [0.0, 1.0])):
@@ -219,13 +192,12 @@ def test_albedos_must_be_a_list_above_zero(alpha, white_run):
             make()
 
 
-def test_orders_that_scatter_forwards_are_refused():
-    """Their rings are in mean free paths, which are other shares of l* for each albedo."""
+def test_forward_orders_are_refused_and_white_media_and_numbers_allowed(white_run):
+    # Rings of forward orders are in mean free paths, which are other shares of l* for each albedo.
     run = simulate_orders(Grid(1.0, 3), 100, seed=1, setting=Setting(g=0.5))
     with pytest.raises(InputError, match=r"orders must be of light that scatters isotropically, got g = 0\.5"):
         Profiles.from_orders(run, [0.5])
-
-
-def test_a_white_medium_is_allowed():
     run = simulate_orders(Grid(1.0, 3), 1000, seed=1)
     assert Profiles.from_orders(run, [0.5, 1.0]).reflectance[1] > 0.9
+    assert Profiles.from_orders(white_run, 0.5).energy.shape == (1, 25)
+    assert Profiles.from_exact(0.5, [0.0, 1.0]).energy.shape == (1, 1)

@@ -1,4 +1,4 @@
-"""The measures: zero for the truth itself, by hand where a hand can, and sensitive to what they are named after; and their words."""
+"""The measures: zero for the truth itself, by hand where a hand can, sensitive to what they are named after."""
 
 from dataclasses import fields
 
@@ -50,9 +50,12 @@ def test_the_truth_has_no_error(setting):
     np.testing.assert_array_equal(found.alpha, ALPHAS)
 
 
-def test_a_law_is_measured_against_its_own_light():
-    """Negative control: the searchlight's profile called diffuse."""
+def test_rel_is_the_mean_relative_error_against_a_law_s_own_light():
+    found = profile_quality(Truth(brighter=1.07), ALPHAS)
+    np.testing.assert_allclose(found.rel, 0.07, rtol=1e-12)
+    np.testing.assert_array_equal(found.ks, 0.0)  # a cdf is normalised
 
+    # Negative control: the searchlight's profile called diffuse.
     class Mistaken(Truth):
         def profile(self, r, alpha, mfp=1.0):
             return exact.profile(r, alpha, mfp)
@@ -60,23 +63,14 @@ def test_a_law_is_measured_against_its_own_light():
     assert np.all(profile_quality(Mistaken(setting=Setting("diffuse")), ALPHAS).rel > 0.02)
 
 
-def test_rel_is_the_mean_relative_error():
-    found = profile_quality(Truth(brighter=1.07), ALPHAS)
-    np.testing.assert_allclose(found.rel, 0.07, rtol=1e-12)
-    np.testing.assert_array_equal(found.ks, 0.0)  # a cdf is normalised
-
-
-def test_ks_is_the_largest_shift_of_a_stretched_cdf():
+def test_ks_and_l1_of_a_stretch():
     """By brute force over a grid of its own, six times finer."""
     for alpha in ALPHAS:
         r = np.geomspace(0.05, 30, 6000)
         brute = np.max(np.abs(exact.cdf(r / 1.05, alpha) - exact.cdf(r, alpha)))
         # The measure's own 1600 radii are 0.9 % apart: near a maximum that costs the square of it.
         assert profile_quality(Truth(stretch=1.05), alpha).ks[0] == pytest.approx(brute, rel=1e-3)
-
-
-def test_l1_of_a_stretch_is_its_ks():
-    """Stretched light moves outward through one radius only: what is lost inside is all the misplaced energy."""
+    # Stretched light moves outward through one radius only: what is lost inside is all the misplaced energy.
     found = profile_quality(Truth(stretch=1.05), ALPHAS)
     np.testing.assert_allclose(found.l1, found.ks, rtol=2e-3)
 
@@ -117,7 +111,7 @@ def test_r_squared_by_hand():
     assert r_squared(np.array([1.0, 3]), np.array([2.0, 2])) == 0.0
 
 
-def test_the_exact_map_has_no_error():
+def test_maps_are_measured_against_the_exact_one():
     found = albedo_quality(ExactMap(Setting()))
     assert found.delta_A == 0.0
     assert found.delta_alpha < 1e-5  # the table's linear interpolation
@@ -125,8 +119,6 @@ def test_the_exact_map_has_no_error():
     assert found.fold == 1.0
     assert found.at_one == pytest.approx(1.0)
 
-
-def test_maps_are_measured_under_their_own_light():
     class Mistaken(ExactMap):
         def reflectance(self, alpha):
             return exact.reflectance(alpha)
@@ -136,28 +128,7 @@ def test_maps_are_measured_under_their_own_light():
     )
     assert albedo_quality(Mistaken(Setting("diffuse"))).delta_A == pytest.approx(expected, rel=1e-3)
 
-
-def test_a_map_that_folds_is_told():
-    found = albedo_quality(LiangAlbedo(Setting(), 5.67, 3.84, 0.84))
-    assert not found.monotone
-    assert found.fold == pytest.approx(np.sqrt(0.84), abs=1e-4)  # a grid of 5e-5
-    assert found.at_one == pytest.approx(0.9982, abs=5e-5)
-    # Where alpha > .99947 the map has no A at all, and 1 - alpha is wrong by more than its own size.
-    assert 0.05 < found.delta_A < 0.2
-    assert found.largest_s > 1.0
-
-
-def test_a_map_that_rises_is_told(normalisation):
-    found = albedo_quality(normalisation)
-    assert found.monotone
-    assert found.delta_A < 4e-6
-    assert found.largest_s < 1e-4
-    assert found.at_one == 1.0
-
-
-def test_no_reflectance_counts_as_one():
-    """A map that is NaN everywhere errs by 1 - A, not by nothing."""
-
+    # A map that is NaN everywhere errs by 1 - A, not by nothing.
     class Nothing(ExactMap):
         def reflectance(self, alpha):
             return np.full(np.shape(alpha), np.nan)
@@ -165,19 +136,28 @@ def test_no_reflectance_counts_as_one():
     assert albedo_quality(Nothing(Setting())).delta_A == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_worst_is_the_largest_but_where_large_is_good():
+def test_maps_that_fold_and_that_rise(normalisation):
+    found = albedo_quality(LiangAlbedo(Setting(), 5.67, 3.84, 0.84))
+    assert not found.monotone
+    assert found.fold == pytest.approx(np.sqrt(0.84), abs=1e-4)  # a grid of 5e-5
+    assert found.at_one == pytest.approx(0.9982, abs=5e-5)
+    # Where alpha > .99947 the map has no A at all, and 1 - alpha is wrong by more than its own size.
+    assert 0.05 < found.delta_A < 0.2
+    assert found.largest_s > 1.0
+    found = albedo_quality(normalisation)
+    assert found.monotone
+    assert found.delta_A < 4e-6
+    assert found.largest_s < 1e-4
+    assert found.at_one == 1.0
+
+
+def test_words_and_worst_values_of_measures():
     assert MEASURES["rel"].worst([0.1, 0.3, 0.2]) == 0.3
     assert MEASURES["r2"].worst([0.1, 0.3, 0.2]) == 0.1
     assert MEASURES["delta_A"].worst(0.5) == 0.5
-
-
-@pytest.mark.parametrize("kind", [Quality, AlbedoQuality])
-def test_every_measure_of_a_quality_has_words(kind):
-    whole = {field.name for field in fields(kind)} - {"alpha", "mse_halves", "r2_halves"}
-    assert whole <= set(MEASURES)
-
-
-def test_records_tell_those_that_laws_are_judged_by():
+    assert MEASURES["mse"].meaning == "of r R_d [1/mfp²]"
+    assert MEASURES["ks"].meaning == MEASURES["ks"].formula
+    assert (MEASURES["inversion_error"].header, MEASURES["rel"].header) == ("error", "rel")
     told = [
         content["quality"]["regenerated"]
         for content in Records(fits_folder()).contents().values()
@@ -187,7 +167,7 @@ def test_records_tell_those_that_laws_are_judged_by():
         assert any(name in one for one in told)
 
 
-def test_a_unit_stands_behind_what_has_one():
-    assert MEASURES["mse"].meaning == "of r R_d [1/mfp²]"
-    assert MEASURES["ks"].meaning == MEASURES["ks"].formula
-    assert (MEASURES["inversion_error"].header, MEASURES["rel"].header) == ("error", "rel")
+@pytest.mark.parametrize("kind", [Quality, AlbedoQuality])
+def test_every_measure_of_a_quality_has_words(kind):
+    whole = {field.name for field in fields(kind)} - {"alpha", "mse_halves", "r2_halves"}
+    assert whole <= set(MEASURES)

@@ -128,6 +128,9 @@ def test_a_stretch_costs_nothing_with_its_own_density(burley):
     assert found.inversion_error[0] == pytest.approx(
         np.max(np.abs(burley.cdf(1.1 * x, ALPHA) - burley.cdf(x, ALPHA))), rel=1e-4
     )
+    # Negative control: 1.1 times too dense, so 1/1.1 of the light.
+    found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
+    assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
 
 
 @TARGETS
@@ -138,12 +141,6 @@ def test_variance_is_the_chi_square_divergence(which, burley):
     square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
     found = sampler_quality(sampler, ALPHA, target)
     assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
-
-
-def test_a_density_that_is_not_the_sampler_s_is_seen(burley):
-    """Negative control: 1.1 times too dense, so 1/1.1 of the light."""
-    found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
-    assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
 
 
 # Clips
@@ -164,7 +161,7 @@ def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
 
 
 @pytest.mark.slow
-def test_the_paper_s_clip_is_an_atom(liang):
+def test_the_paper_s_clip_is_an_atom_and_loses_light(liang):
     """r = min(|g|, r_max) of (21), found from its radii alone; at 0.5 the law ends beyond the sampler's reach."""
     found = sampler_quality(liang.sampler, [0.1, 0.5, ALPHA])
     for alpha, share in zip(found.alpha[[0, 2]], found.atom[[0, 2]], strict=True):
@@ -178,11 +175,7 @@ def test_the_paper_s_clip_is_an_atom(liang):
     np.testing.assert_allclose(found.bias, [0.0, liang.cdf(reach, 0.5) - 1, 0.0], atol=1e-6)
     assert found.bias[1] < -0.01
     assert np.all(np.abs(found.edge_bias_by_law_pdf) > 0.1), "an approximate inverse is no sampler of its law"
-
-
-@pytest.mark.slow
-def test_light_that_the_paper_s_clip_loses(liang):
-    """Of the exact profile: what lies beyond r_max, and a division by zero where the law's density is used."""
+    # Of the exact profile: what lies beyond r_max, and a division by zero where the law's density is used.
     found = sampler_quality(liang.sampler, ALPHA, ExactTarget())
     beyond = 1 - exact.cdf(float(liang.largest_radius(ALPHA)), ALPHA)
     assert found.bias[0] == pytest.approx(-beyond, abs=1e-6)
@@ -238,10 +231,14 @@ def test_targets_are_of_their_setting(burley):
     np.testing.assert_allclose(density, step, rtol=1e-5)
 
 
-def test_bad_numbers_are_named(burley):
-    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got 0"):
-        sampler_quality(burley.sampler, [0.5, 0.0])
-    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got nan"):
-        sampler_quality(burley.sampler, np.nan)
-    with pytest.raises(InputError, match="edge must be a distance > 0, got 0"):
-        sampler_quality(burley.sampler, 0.5, edge=0.0)
+@pytest.mark.parametrize(
+    ("alpha", "edge", "said"),
+    [
+        ([0.5, 0.0], 1.0, r"alpha must be in \(0, 1\], got 0"),
+        (np.nan, 1.0, r"alpha must be in \(0, 1\], got nan"),
+        (0.5, 0.0, "edge must be a distance > 0, got 0"),
+    ],
+)
+def test_bad_numbers_are_named(burley, alpha, edge, said):
+    with pytest.raises(InputError, match=said):
+        sampler_quality(burley.sampler, alpha, edge=edge)

@@ -42,11 +42,20 @@ def test_scales_by_hand(name, scales, request):
     assert law.seen_by("energy") == law.constant_names()
 
 
-def test_profile_by_hand(burley):
+def test_profile_and_inverses_by_hand(burley):
     """A s (e^-s + e^(-s/3)) / (8 pi) at r = l, with A = 0.5."""
     alpha = burley.albedo.alpha(0.5)
     expected = 0.5 * 1.539 * (math.exp(-1.539) + math.exp(-0.513)) / (8 * math.pi)
     assert burley.profile(1.0, alpha) == pytest.approx(expected, rel=1e-12)
+    # The form that the memo's page gives since 2018: h^3 = 9 - 16 u + 8 u^2 + 4 (1 - u) sqrt(5 - 8 u + 4 u^2).
+    u = np.linspace(0, 0.99, 100)
+    h = np.cbrt(9 - 16 * u + 8 * u**2 + 4 * (1 - u) * np.sqrt(5 - 8 * u + 4 * u**2))
+    r = 3 * np.log((1 + 1 / h + h) / (4 * (1 - u))) / burley.falloff_rate(0.7)
+    np.testing.assert_allclose(burley.sampler.sample(u, 0.7), r, rtol=1e-11, atol=1e-14)
+    # (2 - 2.5715) / 2 - 2 = -2.28575, times ln(1/2) = -0.6931472: 1.5843612 falloff lengths.
+    expected = 1.5843612 / burley.falloff_rate(0.7)
+    assert burley.samplers["xie"].sample(0.5, 0.7) == pytest.approx(expected, rel=1e-7)
+    assert list(burley.samplers) == ["exact", "xie", "unreal"]
 
 
 def test_diffuse_mean_free_path_by_hand(per_diffuse_mfp):
@@ -55,6 +64,8 @@ def test_diffuse_mean_free_path_by_hand(per_diffuse_mfp):
     share = 1 - math.exp(-s) / 4 - 3 * math.exp(-s / 3) / 4
     assert per_diffuse_mfp.cdf(math.sqrt(2), 0.8) == pytest.approx(share, rel=1e-12)
     assert per_diffuse_mfp.cdf(3 * math.sqrt(2), 0.8, mfp=3.0) == pytest.approx(share, rel=1e-12)
+    np.testing.assert_allclose(per_diffuse_mfp.cdf([0.0, 1e6, np.inf], 1.0), [0.0, 0.0, 1.0], rtol=0, atol=1e-300)
+    np.testing.assert_allclose(per_diffuse_mfp.profile([1.0, np.inf], 1.0), 0.0, atol=1e-300)
 
 
 @pytest.mark.slow
@@ -70,11 +81,6 @@ def test_which_diffuse_mean_free_path_is_meant(per_diffuse_mfp):
     assert np.mean(np.abs(per_diffuse_mfp.profile(r * jensen, alpha) * jensen**2 / truth - 1)) > 0.18
 
 
-def test_infinitely_wide_where_nothing_is_absorbed(per_diffuse_mfp):
-    np.testing.assert_allclose(per_diffuse_mfp.cdf([0.0, 1e6, np.inf], 1.0), [0.0, 0.0, 1.0], rtol=0, atol=1e-300)
-    np.testing.assert_allclose(per_diffuse_mfp.profile([1.0, np.inf], 1.0), 0.0, atol=1e-300)
-
-
 @pytest.mark.parametrize("name", ["burley", "diffuse", "per_diffuse_mfp"])
 @pytest.mark.parametrize("alpha", [0.05, 0.5, 0.9, 0.999])
 def test_sampler_inverts_the_cdf(name, alpha, request):
@@ -83,36 +89,17 @@ def test_sampler_inverts_the_cdf(name, alpha, request):
     assert np.all(np.diff(law.sampler.sample(ENDS, alpha)) > 0)
 
 
-def test_sampler_is_the_authors_own_inverse_too(burley):
-    """The form that the memo's page gives since 2018: h^3 = 9 - 16 u + 8 u^2 + 4 (1 - u) sqrt(5 - 8 u + 4 u^2)."""
-    u = np.linspace(0, 0.99, 100)
-    h = np.cbrt(9 - 16 * u + 8 * u**2 + 4 * (1 - u) * np.sqrt(5 - 8 * u + 4 * u**2))
-    r = 3 * np.log((1 + 1 / h + h) / (4 * (1 - u))) / burley.falloff_rate(0.7)
-    np.testing.assert_allclose(burley.sampler.sample(u, 0.7), r, rtol=1e-11, atol=1e-14)
-
-
 # Approximate inverses
 
 
-def test_approximate_inverse_by_hand(burley):
-    """(2 - 2.5715) / 2 - 2 = -2.28575, times ln(1/2) = -0.6931472: 1.5843612 falloff lengths."""
-    expected = 1.5843612 / burley.falloff_rate(0.7)
-    assert burley.samplers["xie"].sample(0.5, 0.7) == pytest.approx(expected, rel=1e-7)
-    assert list(burley.samplers) == ["exact", "xie", "unreal"]
-
-
 @pytest.mark.parametrize(("name", "c", "worst"), [("xie", XIE, 0.00987), ("unreal", UNREAL, 0.00857)])
-def test_approximate_inverses_are_a_hundredth_off_the_cdf(burley, name, c, worst):
+def test_approximate_inverses_are_a_hundredth_off_the_cdf_and_have_their_own_density(burley, name, c, worst):
     sampler = burley.samplers[name]
     assert (sampler.c, {"xie": 2.5715, "unreal": 2.6}[name]) == (c, c)
     xi = np.linspace(0, 0.9999, 4001)
     error = np.max(np.abs(burley.cdf(sampler.sample(xi, 0.7), 0.7) - xi))
     assert error == pytest.approx(worst, abs=1e-4)
-
-
-@pytest.mark.parametrize("name", ["xie", "unreal"])
-def test_approximate_density_is_that_of_the_samples(burley, name):
-    """Both ways: against the slope of the map, and as an integral."""
+    # Both ways: against the slope of the map, and as an integral.
     sampler, alpha, step = burley.samplers[name], 0.7, 1e-6
     xi = np.linspace(0.01, 0.99, 50)
     slope = (sampler.sample(xi + step, alpha) - sampler.sample(xi - step, alpha)) / (2 * step)

@@ -33,6 +33,8 @@ def test_reflectance_there_and_back(light):
     values = np.array([0.0, 1e-9, 0.01, 0.3, 0.4999, 0.5, 0.8, 0.99, 0.9995, 1.0])
     np.testing.assert_allclose(reflectance_of(alpha_of(values, light), light), values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(alpha_of(reflectance_of(ALPHAS, light), light), ALPHAS, rtol=1e-12)
+    error = reflectance_of(alpha_of(1 - 1e-7, light), light) - (1 - 1e-7)
+    assert 1e-12 < abs(error) < 1e-8
 
 
 @LIGHTS
@@ -45,12 +47,6 @@ def test_reflectance_there_and_back_under_a_surface(light, n):
     assert alpha_of(0.5, light, n) != pytest.approx(alpha_of(0.5, light), abs=1e-5)
     with pytest.raises(InputError, match=r"reflectance must be in \[0, 0\.[89]\d*\], got 1"):
         alpha_of(1.0, light, n)
-
-
-@LIGHTS
-def test_beyond_there_rounding_of_alpha_is_what_limits(light):
-    error = reflectance_of(alpha_of(1 - 1e-7, light), light) - (1 - 1e-7)
-    assert 1e-12 < abs(error) < 1e-8
 
 
 def test_the_albedo_by_bisection():
@@ -67,7 +63,7 @@ def test_the_albedo_by_bisection():
 
 
 @EACH
-def test_every_length_there_and_back(name):
+def test_every_length_there_and_back_and_scaled(name):
     alpha, mfp = np.array([0.0, 0.2, 0.8, 0.97, 0.9999]), np.array([1e-3, 0.7, 1.0, 20.0, 1e4])
     medium = Optical(alpha, mfp)
     value = medium.length(name)
@@ -77,10 +73,6 @@ def test_every_length_there_and_back(name):
     np.testing.assert_allclose(back.mfp, mfp, rtol=1e-12)
     for other in BY_NAME:
         np.testing.assert_allclose(back.length(other), medium.length(other), rtol=1e-12)
-
-
-@EACH
-def test_every_length_scales_with_the_mean_free_path(name):
     np.testing.assert_allclose(Optical(0.9, 3.0).length(name), 3.0 * Optical(0.9, 1.0).length(name), rtol=1e-14)
 
 
@@ -102,22 +94,16 @@ def test_without_absorption_there_is_no_diffuse_mean_free_path():
             Optical.from_length(name, 1.0, 1.0)
 
 
-def test_the_memo_s_scales():
+def test_lengths_by_hand():
     """1.85 - A + 7 |A - .8|^3, 1.9 - A + 3.5 (A - .8)^2, 3.5 + 100 (A - .33)^4 at A = 0.3 and 1 by hand."""
     np.testing.assert_allclose(lengths.scale_searchlight([0.3, 1.0]), [1.55 + 0.875, 0.85 + 0.056], rtol=1e-14)
     np.testing.assert_allclose(lengths.scale_diffuse([0.3, 1.0]), [1.6 + 0.875, 0.9 + 0.14], rtol=1e-14)
     np.testing.assert_allclose(lengths.scale_dmfp([0.3, 1.0]), [3.500081, 3.5 + 20.151121], rtol=1e-14)
-
-
-def test_a_falloff_is_of_its_own_light():
     medium = Optical.from_length("falloff_diffuse", 0.4, alpha_of(0.3, "diffuse"))
     assert medium.mfp == pytest.approx(0.4 * 2.475, rel=1e-12)
     medium = Optical.from_length("falloff_searchlight", 0.4, alpha_of(0.3, "searchlight"))
     assert medium.mfp == pytest.approx(0.4 * 2.425, rel=1e-12)
-
-
-def test_three_diffuse_mean_free_paths_by_hand():
-    """alpha = 0.9: 1 / sqrt(0.3), sqrt(1.1 / 0.3), and the exact one between, its artanh checked."""
+    # alpha = 0.9: 1 / sqrt(0.3), sqrt(1.1 / 0.3), and the exact one between, its artanh checked.
     medium = Optical(0.9, 1.0)
     assert medium.length("dmfp_classical") == pytest.approx(0.3**-0.5, rel=1e-14)
     assert medium.length("dmfp") == pytest.approx((1.1 / 0.3) ** 0.5, rel=1e-14)
@@ -188,21 +174,15 @@ ALBEDO = {
 
 
 @pytest.mark.parametrize("name", list(MEASURED))
-def test_blender_renders_the_colour_that_is_predicted(name):
+def test_blender_renders_the_colours_and_edges_that_are_predicted(name):
     """Rounded to three digits, 0.166 is known to 0.3 %."""
     engine, alpha = ENGINE[name], ALBEDO[name]
     np.testing.assert_allclose(engine.typed_colour(alpha), COLOURS, rtol=1e-9)
     shown = engine.rendered(alpha)
     np.testing.assert_allclose(COLOURS if shown is None else shown, MEASURED[name][0], rtol=0.006)
-
-
-@pytest.mark.parametrize("name", list(MEASURED))
-def test_blender_s_edges_have_the_length_that_is_predicted(name):
-    """Within 8 %, or 11 % at 0.8 of the two that map by Wrenninge's fit.
-
-    Light enters the walk steeper than diffuse light does, whose edges were fitted: dark ones come out narrower, bright
-    ones wider. Wrenninge's alpha at 0.8, 0.99175 for 0.99058, widens the edge by another 4 %.
-    """
+    # Within 8 %, or 11 % at 0.8 of the two that map by Wrenninge's fit. Light enters the walk steeper than diffuse
+    # light does, whose edges were fitted: dark ones come out narrower, bright ones wider. Wrenninge's alpha at 0.8,
+    # 0.99175 for 0.99058, widens the edge by another 4 %.
     engine, ratio = ENGINE[name], np.array(MEASURED[name][1])
     radius = engine.typed_length(ALBEDO[name], np.ones(3))
     if name in ("cycles_walk", "cycles_legacy"):
@@ -241,7 +221,7 @@ def test_engines_with_g_walk_through_the_medium(g):
     assert medium.length("mfp_unreduced") == pytest.approx(1 / extinction)
 
 
-def test_wrenninge_s_fit_by_hand():
+def test_colours_of_engines_by_hand():
     np.testing.assert_allclose([colour.wrenninge_alpha(c) for c in COLOURS], wrenninge(COLOURS), rtol=1e-14)
     np.testing.assert_allclose(
         colour.wrenninge_colour(np.array([0.0, 1.0])), [0.0, 0.9182], atol=1e-4
@@ -249,9 +229,6 @@ def test_wrenninge_s_fit_by_hand():
     for g in (0.0, 0.4, 0.9):
         steps = np.diff([colour.wrenninge_alpha(c, g) for c in np.linspace(0, 1, 501)])
         assert np.all(steps > 0), "its inverse is unique"
-
-
-def test_engines_that_map_by_an_exponential_of_a_cubic():
     medium = Optical([0.3, 0.9, 0.99], 1.0)
     for name in ("cycles_walk_2", "hdrp_path_tracer", "appleseed_walk_2017"):
         np.testing.assert_allclose(chiang(typed(name, medium)[0]), medium.alpha, rtol=1e-10)
@@ -282,30 +259,21 @@ def test_cycles_skin_radius_is_a_classical_diffuse_mean_free_path():
         assert abs(alpha - root) <= 2.0**-12
         assert alpha != root
         assert (alpha * 2**12) % 1 == 0, "a midpoint of the last halving"
-
-
-def test_dipole_reflectance_by_hand():
-    """IOR 1: F = .668 + .0636 + .71 - 1.44 = .0016; alpha' = 2/3: s = 1, A = (1 + e^(-4/3 K)) / (3 e)."""
+    np.testing.assert_array_equal(engine.skin_alpha([0.0, 9e-5, 0.995, 1.0]), [0, 0, 0.999999, 0.999999])
+    # IOR 1: F = .668 + .0636 + .71 - 1.44 = .0016; alpha' = 2/3: s = 1, A = (1 + e^(-4/3 K)) / (3 e).
     k = 1.0016 / 0.9984
     expected = (1 + np.exp(-4 / 3 * k)) / (3 * np.e)
     assert engine.dipole_reflectance(2 / 3, 1.0) == pytest.approx(expected, rel=1e-12)
     assert engine.dipole_reflectance(1.0, 1.4) == 1.0
 
 
-def test_cycles_clamps_the_darkest_and_the_brightest_colours():
-    np.testing.assert_array_equal(engine.skin_alpha([0.0, 9e-5, 0.995, 1.0]), [0, 0, 0.999999, 0.999999])
-
-
-def test_hdrp_has_997_thousandths_within_its_radius():
+def test_hdrp_and_old_appleseed_by_hand():
     """UpdateKernel: cdf = 0.997 of 1 - e^(-r/d)/4 - 3 e^(-r/3d)/4, d the scattering distance."""
     medium = Optical(0.8, 1.7)
     t = medium.length("hdrp_radius") / medium.length("hdrp_distance")
     assert 1 - 0.25 * np.exp(-t) - 0.75 * np.exp(-t / 3) == pytest.approx(0.997, abs=1e-14)
     assert typed("hdrp", medium) == (medium.reflectance("diffuse"), medium.length("falloff_diffuse"))
-
-
-def test_hdrp_and_old_appleseed_walk_with_the_mean_free_path():
-    """sigma_t = 1 / (distance (1.9 - A + 3.5 (A - 0.8)^2)); appleseed of 2017 by the memo's eq. 5; A what is typed."""
+    # sigma_t = 1 / (distance (1.9 - A + 3.5 (A - 0.8)^2)); appleseed of 2017 by the memo's eq. 5; A what is typed.
     medium = Optical([0.5, 0.99], 2.0)
     c, d = typed("hdrp_path_tracer", medium)
     np.testing.assert_allclose(d * (1.9 - c + 3.5 * (c - 0.8) ** 2), medium.mfp, rtol=1e-12)
@@ -313,16 +281,13 @@ def test_hdrp_and_old_appleseed_walk_with_the_mean_free_path():
     np.testing.assert_allclose(mfp * (1.85 - c + 7 * np.abs(c - 0.8) ** 3), medium.mfp, rtol=1e-12)
 
 
-def test_unreal_s_own_numbers():
+def test_unreal_by_its_own_numbers_and_the_memo_s():
     """SubsurfaceProfile.cpp: "1 mfp can map to 1.44 dmfp (surface albedo -> 0.0) or 43.50 dmfp (-> 1.0)", times 0.3 as
     profiles before 5.1 were drawn 10/3 wider, over the 1 that is typed as 0.6 of l."""
     medium = Optical([0.0, 1.0], 1.0)
     ratio = medium.length("unreal_dmfp") / 0.3 / medium.length("unreal_mfp") * 0.6
     np.testing.assert_allclose(ratio / 0.6, [1.44, 43.50], atol=0.01)
-
-
-def test_unreal_draws_the_memo_s_falloff():
-    """GetDiffuseMeanFreePathFromMeanFreePath: dmfp = mfp s_dmfp / s / 0.6; Burley_Profile: d = dmfp / s_dmfp."""
+    # GetDiffuseMeanFreePathFromMeanFreePath: dmfp = mfp s_dmfp / s / 0.6; Burley_Profile: d = dmfp / s_dmfp.
     medium = Optical(alpha_of(0.7, "searchlight"), 0.3)
     s, s_dmfp = 1.15 + 7 * 0.001, 3.5 + 100 * 0.37**4
     c, mfp = typed("unreal", medium)
@@ -397,9 +362,6 @@ def test_numbers_and_lists_broadcast():
     np.testing.assert_array_equal(medium.mfp, [2.0, 2.0, 2.0])
     assert medium.length("dmfp").shape == (3,)
     assert Optical(0.5, 1.0).length("mfp").shape == ()
-
-
-def test_names_are_one_of_each():
     assert {length.colour for length in LENGTHS} == {"", "searchlight", "diffuse"}
     assert len(BY_NAME) == len(LENGTHS)
     assert len(ENGINE) == len(ENGINES) == len({engine.title for engine in ENGINES})

@@ -55,9 +55,14 @@ def test_moments_are_the_printed_fits(n):
     np.testing.assert_allclose(fresnel_moments(n), printed_moments(n), rtol=0, atol=0.008)
 
 
-def test_a_surface_that_does_not_refract():
+def test_moments_and_diffusion_at_their_ends():
     assert fresnel_moments(1.0) == pytest.approx((0.0, 0.0), abs=1e-14)
     assert exitance_factors(1.0) == pytest.approx((0.25, 0.5, 1.0), abs=1e-14)
+    # D = 2/3 and sigma = sqrt(3/2) where all is absorbed, 1/3 and 0 where nothing is.
+    with jax.enable_x64(True):
+        diffusion, sigma = grosjean(jnp.array([0.0, 1.0]))
+    np.testing.assert_allclose(diffusion, [2 / 3, 1 / 3])
+    np.testing.assert_allclose(sigma, [1.5**0.5, 0.0])
 
 
 @pytest.mark.parametrize("n", [0.8, 1.4])
@@ -68,14 +73,6 @@ def test_moments_by_plain_sums(n):
     reflected = 0.5 * (((n * mu - out) / (n * mu + out)) ** 2 + ((mu - n * out) / (mu + n * out)) ** 2)
     expected = 2 * np.mean(mu * reflected), 3 * np.mean(mu**2 * reflected)
     assert fresnel_moments(n) == pytest.approx(expected, abs=2e-8)  # midpoints meet a root at the critical angle
-
-
-def test_grosjeans_diffusion_at_both_ends():
-    """D = 2/3 and sigma = sqrt(3/2) where all is absorbed, 1/3 and 0 where nothing is."""
-    with jax.enable_x64(True):
-        diffusion, sigma = grosjean(jnp.array([0.0, 1.0]))
-    np.testing.assert_allclose(diffusion, [2 / 3, 1 / 3])
-    np.testing.assert_allclose(sigma, [1.5**0.5, 0.0])
 
 
 @pytest.mark.parametrize("setting", [Setting("diffuse"), Setting(g=0.5)])
@@ -121,16 +118,12 @@ def test_both_ends(law):
 
 
 @SAMPLED
-def test_sampler_inverts_the_cdf(law):
+def test_sampler_inverts_the_cdf_and_has_the_laws_density(law):
     xi = np.concatenate([[0.0], np.geomspace(1e-6, 0.5, 15), 1 - np.geomspace(0.49, 1e-9, 15), [1.0]])
     r = law.sampler.sample(xi, ALPHA)
     found = [law.cdf(row, ALPHA)[i] for i, row in enumerate(r)]
     np.testing.assert_allclose(found, [xi] * 3, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(r[:, [0, -1]], [[0.0, np.inf]] * 3)
-
-
-@SAMPLED
-def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     density = law.sampler.pdf(RADII, ALPHA) * law.reflectance(ALPHA)
     near = (RADII > 0) & (RADII < 1e3)
     expected = 2 * np.pi * RADII[near] * law.profile(RADII, ALPHA)[:, near]
@@ -138,10 +131,6 @@ def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     source = law.source_strength(jnp.asarray(ALPHA, jnp.float32))
     np.testing.assert_allclose(density[:, [0]], source, rtol=1e-6, atol=1e-12)
     np.testing.assert_array_equal(density[:, -1], 0.0)
-
-
-@SAMPLED
-def test_single_precision(law):
     single = law.cdf(jnp.float32(0.7), jnp.float32(0.5))
     assert single.dtype == jnp.float32
     assert float(single) == pytest.approx(law.cdf(np.full(32, 0.7), ALPHA)[1, 0], rel=1e-5)
@@ -204,14 +193,11 @@ def test_a_white_half_space_gives_all_light_back(n):
     assert law.reflectance(1.0) == pytest.approx(law.entered, rel=1e-12)
 
 
-def test_dipole_by_hand():
+def test_dipole_by_hand_and_as_the_authors_write_it():
     """At alpha = 1 and r = 0: (1 + 1 / z_v^2) / 4 pi, z_v = 1 + 4/3 (1.0016 / 0.9984)."""
     image = 1 + 4 / 3 * 1.0016 / 0.9984
     assert Dipole(Setting()).profile(0.0, 1.0) == pytest.approx((1 + image**-2) / (4 * math.pi), rel=1e-12)
-
-
-def test_dipole_as_the_authors_write_it():
-    """alpha'/4 pi (z_r (sigma d_r + 1) e^(-sigma d_r) / d_r^3 + z_v (sigma d_v + 1) e^(-sigma d_v) / d_v^3)."""
+    # alpha'/4 pi (z_r (sigma d_r + 1) e^(-sigma d_r) / d_r^3 + z_v (sigma d_v + 1) e^(-sigma d_v) / d_v^3).
     sigma, boundary = math.sqrt(3 * 0.05), (1 + diffuse_fresnel(1.3)) / (1 - diffuse_fresnel(1.3))
     terms = []
     for z in (1.0, 1.0 + 4 * boundary / 3):
@@ -302,7 +288,7 @@ def test_source_and_total():
 
 
 @pytest.mark.slow
-def test_more_nodes_change_nothing():
+def test_more_nodes_change_nothing_and_quality_is_a_tenth():
     """Profiles to 1e-9, shares to 1e-8; and what half of the nodes change is seen: a negative control."""
     law, r, alpha = BeamDiffusion(Setting()), np.array([0.01, 1.0, 10.0]), np.array([[0.3], [0.9], [1.0]])
     finer = BeamDiffusion(law.setting, law.albedo, 3)  # halves of the nodes: none in common
@@ -311,11 +297,7 @@ def test_more_nodes_change_nothing():
     np.testing.assert_allclose(law.cdf(r, alpha), shares, atol=1e-8)
     coarse = BeamDiffusion(law.setting, law.albedo, 1)
     assert np.max(np.abs(coarse.cdf(r, alpha) - shares)) > 10.0 * np.max(np.abs(law.cdf(r, alpha) - shares))
-
-
-@pytest.mark.slow
-def test_quality_is_a_tenth():
-    """Christensen and Burley judge it the best of the physically based profiles; a dipole is off by a half."""
+    # Christensen and Burley judge it the best of the physically based profiles; a dipole is off by a half.
     quality = profile_quality(BeamDiffusion(Setting()), [0.5, 0.95])
     assert np.all(quality.rel < 0.12)
     assert np.all(quality.ks < 0.04)

@@ -28,7 +28,7 @@ def four(normalisation):
     return law_class(4)(Setting(), normalisation, **FOUR)
 
 
-def test_parts_by_hand(four):
+def test_parts_and_profile_by_hand_and_at_both_ends(four):
     """At alpha = 3/4 s = 1/2: ln v_1 = -4.18 - 2.98 + 0.56; one ratio is 1 + e^3.17; weights e^(1.09 + 0.02) : 1."""
     with jax.enable_x64(True):
         variances = np.asarray(four.variances(jnp.asarray(0.75)))
@@ -37,9 +37,6 @@ def test_parts_by_hand(four):
     assert variances[1] / variances[0] == pytest.approx(1 + np.exp(3.17), rel=1e-13)
     assert weights[1] / weights[0] == pytest.approx(np.exp(1.11), rel=1e-13)
     assert weights.sum() == pytest.approx(1, rel=1e-14)
-
-
-def test_profile_is_the_plain_sum(four):
     alpha, r = 0.6, np.geomspace(0.01, 5, 3)
     with jax.enable_x64(True):
         variances, weights = np.asarray(four.variances(alpha)), np.exp(four.log_weights(jnp.asarray(alpha)))
@@ -47,9 +44,6 @@ def test_profile_is_the_plain_sum(four):
     np.testing.assert_allclose(four.profile(r, alpha), four.albedo.reflectance(alpha) * sum(gaussians), rtol=1e-12)
     share = sum(w * (1 - np.exp(-(r**2) / (2 * v))) for w, v in zip(weights, variances, strict=True))
     np.testing.assert_allclose(four.cdf(r, alpha), share, rtol=1e-11)
-
-
-def test_variances_rise_and_ends_are_finite(four):
     r, alpha = np.array([0.0, 1.0, np.inf]), np.array([[0.0], [0.5], [1.0]])
     with jax.enable_x64(True):
         assert np.all(np.diff(four.variances(jnp.asarray(alpha))) > 0)
@@ -127,11 +121,18 @@ PRINTED = """
 """
 
 
-def test_the_printed_table():
+def test_the_printed_table_and_its_weights():
     table = np.array([[float(word) for word in line.split()] for line in PRINTED.strip().splitlines()])
     np.testing.assert_array_equal(D_EON.variances, table[:, 0])
     np.testing.assert_array_equal(D_EON.weights, table[:, 1:])
     assert len(CHANNELS) == 3
+    # "The Gaussian weights for each profile sum to 1.0": white light stays white.
+    np.testing.assert_allclose(energy(D_EON), 1.0, rtol=1e-12)
+    # At the origin sum w / (2 pi v).
+    weights, variances = (0.233, 0.1, 0.118, 0.113, 0.358, 0.078), (0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41)
+    expected = sum(w / (2 * math.pi * v) for w, v in zip(weights, variances, strict=True))
+    assert D_EON.profile(0.0)[0] == pytest.approx(expected, rel=1e-14)
+    assert D_EON.profile(np.ones((2, 5))).shape == (2, 5, 3)
 
 
 def energy(skin):
@@ -139,24 +140,11 @@ def energy(skin):
     return np.sum(skin.weights, axis=0) * np.square(skin.stretches)
 
 
-def test_weights_sum_to_one():
-    """ "The Gaussian weights for each profile sum to 1.0": white light stays white."""
-    np.testing.assert_allclose(energy(D_EON), 1.0, rtol=1e-12)
-
-
 @pytest.mark.parametrize("skin", [D_EON, separable()], ids=["d_eon", "separable"])
 def test_profile_integrates_to_its_energy(skin):
     r = np.geomspace(1e-5, 30, 4001)
     total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
     np.testing.assert_allclose(total, energy(skin), rtol=1e-5)
-
-
-def test_red_by_hand():
-    """At the origin sum w / (2 pi v)."""
-    weights, variances = (0.233, 0.1, 0.118, 0.113, 0.358, 0.078), (0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41)
-    expected = sum(w / (2 * math.pi * v) for w, v in zip(weights, variances, strict=True))
-    assert D_EON.profile(0.0)[0] == pytest.approx(expected, rel=1e-14)
-    assert D_EON.profile(np.ones((2, 5))).shape == (2, 5, 3)
 
 
 def test_separable_is_red_without_the_narrowest():

@@ -70,7 +70,7 @@ def test_source_and_far_limits_hold_for_any_constants(law, alphas):
         assert rate == pytest.approx(kappa + 2 / r.mean(), rel=2e-3)
 
 
-def test_the_profile_is_the_slope_of_the_cdf(law):
+def test_the_profile_is_the_slope_of_the_cdf_and_ends_are_finite(law):
     r = np.geomspace(1e-3, 5, 40)  # farther out the cdf has no digits left to take differences of
     step = 1e-5 * r
     for alpha in (0.2, 0.9, 1.0):
@@ -78,9 +78,6 @@ def test_the_profile_is_the_slope_of_the_cdf(law):
         expected = 2 * np.pi * r * law.profile(r, alpha) / law.albedo.reflectance(alpha)
         np.testing.assert_allclose(slope, expected, rtol=2e-6)
     assert law.total(0.7) == pytest.approx(law.albedo.reflectance(0.7), rel=1e-14)
-
-
-def test_ends_are_finite_and_right(law):
     for alpha in (0.0, 1e-12, 0.5, 1.0):
         assert law.cdf(0.0, alpha) == 0.0
         assert law.cdf(np.inf, alpha) == 1.0
@@ -164,25 +161,19 @@ def test_the_sampler_draws_its_own_density(law):
 
 
 @pytest.mark.slow
-def test_scales_with_the_mean_free_path_and_begins_at_its_source(matched):
+def test_it_scales_has_derivatives_and_holds_in_single_precision(matched):
     np.testing.assert_allclose(matched.profile(R, 0.8, 2.5), matched.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-10)
     np.testing.assert_allclose(matched.cdf(R, 0.8, 2.5), matched.cdf(R / 2.5, 0.8), rtol=1e-10)
     assert matched.sampler.pdf(0.0, 0.5) == pytest.approx(0.25 / matched.albedo.reflectance(0.5), rel=1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("steps", "error"), [(1, 1e-4), (2, 1e-7)])
-def test_inverse_in_a_fixed_number_of_steps(matched, steps, error):
-    xi = np.concatenate([np.linspace(0, 0.999, 400), 1 - np.geomspace(1e-3, 1e-6, 20)[1:]])
-    sampler = HazardSampler(matched, steps)
-    missed = np.abs(matched.cdf(sampler.sample(xi, ALPHA[:, None]), ALPHA[:, None]) - xi)
-    assert np.max(missed) < error
-    assert np.max(missed) > error / 1e4  # fewer steps than these are not exact, and the bound says something
-
-
-@pytest.mark.slow
-def test_single_precision_costs_less_than_a_tenth_of_the_model_error(matched):
-    """As a shader runs it: everything that depends on r or xi in float32, the material's shape rounded to float32."""
+    with jax.enable_x64(True):
+        by_alpha = jax.vmap(jax.grad(lambda a: matched.profile(0.5, a)))(jnp.linspace(0.01, 0.99, 9))
+        by_radius = jax.vmap(jax.grad(lambda r: matched.profile(r, 0.9)))(jnp.asarray(R))
+    step = 1e-6
+    centre = (matched.profile(0.5, 0.5 + step) - matched.profile(0.5, 0.5 - step)) / (2 * step)
+    assert float(by_alpha[4]) == pytest.approx(centre, rel=1e-6)
+    assert np.all(np.asarray(by_alpha) > 0)
+    assert np.all(np.asarray(by_radius) < 0)
+    # As a shader runs it: everything that depends on r or xi in float32, the material's shape rounded to float32.
     with jax.enable_x64(True):
         shape = matched.shape(jnp.asarray(INNER)[:, None])
         truth = np.asarray(density(jnp.asarray(R), shape))
@@ -196,6 +187,16 @@ def test_single_precision_costs_less_than_a_tenth_of_the_model_error(matched):
     assert np.max(np.abs(matched.cdf(drawn, INNER[:, None]) - matched.cdf(x, INNER[:, None]))) < 1e-5
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("steps", "error"), [(1, 1e-4), (2, 1e-7)])
+def test_inverse_in_a_fixed_number_of_steps(matched, steps, error):
+    xi = np.concatenate([np.linspace(0, 0.999, 400), 1 - np.geomspace(1e-3, 1e-6, 20)[1:]])
+    sampler = HazardSampler(matched, steps)
+    missed = np.abs(matched.cdf(sampler.sample(xi, ALPHA[:, None]), ALPHA[:, None]) - xi)
+    assert np.max(missed) < error
+    assert np.max(missed) > error / 1e4  # fewer steps than these are not exact, and the bound says something
+
+
 def test_series_takes_over_where_the_logarithm_cancels(x64):
     """V and V' on both sides of the switch, against the plain formula in float64 and the limit 1/2 far away."""
     q = np.concatenate([np.geomspace(1e-3, 10, 50), SERIES * np.array([1 - 1e-12, 1 + 1e-12])])
@@ -204,18 +205,6 @@ def test_series_takes_over_where_the_logarithm_cancels(x64):
     np.testing.assert_allclose(value, z - z**2 * np.log1p(q), rtol=0, atol=3e-7)
     np.testing.assert_allclose(slope, 1 - 2 * z * np.log1p(q) + 1 / (1 + q), rtol=0, atol=1e-6)
     assert float(early_share(jnp.array(1e6), jnp.array(1e-6), 1.0, jnp.array(1.0))[0]) == pytest.approx(0.5, abs=1e-6)
-
-
-@pytest.mark.slow
-def test_differentiable_in_albedo_and_radius(matched):
-    with jax.enable_x64(True):
-        by_alpha = jax.vmap(jax.grad(lambda a: matched.profile(0.5, a)))(jnp.linspace(0.01, 0.99, 9))
-        by_radius = jax.vmap(jax.grad(lambda r: matched.profile(r, 0.9)))(jnp.asarray(R))
-    step = 1e-6
-    centre = (matched.profile(0.5, 0.5 + step) - matched.profile(0.5, 0.5 - step)) / (2 * step)
-    assert float(by_alpha[4]) == pytest.approx(centre, rel=1e-6)
-    assert np.all(np.asarray(by_alpha) > 0)
-    assert np.all(np.asarray(by_radius) < 0)
 
 
 # Under surfaces that refract
@@ -415,16 +404,13 @@ def test_where_it_does_not_hold_it_says_so():
 Q = np.unique(np.concatenate([np.linspace(0, 1, 201) ** 2, np.geomspace(1e-10, 1, 60)]))  # 1 - alpha, rising
 
 
-def test_decay_rate_is_the_root_to_the_stated_error(x64):
+def test_decay_rate_is_the_root_and_near_white_the_diffusion_length(x64):
     inner = 1 - Q[Q > 0]
     error = np.asarray(decay_rate(jnp.asarray(inner))) / exact.decay_rate(inner) - 1
     assert 1e-6 < np.max(np.abs(error)) < 2.5e-5  # a looser statement than this would say nothing
     assert decay_rate(jnp.float32(1.0)) == 0.0
     assert decay_rate(jnp.float32(0.0)) == 1.0
-
-
-def test_decay_rate_near_white_is_the_diffusion_length_and_falls_all_the_way(x64):
-    """kappa^2 = 3 q (1 - 4 q / 5), q = 1 - alpha: the first two terms of the root's own series. Its two pieces meet."""
+    # kappa^2 = 3 q (1 - 4 q / 5), q = 1 - alpha: the first two terms of the root's own series. Its two pieces meet.
     q = np.geomspace(1e-8, 1e-3, 6)
     kappa = np.asarray(decay_rate(jnp.asarray(1 - q)))
     np.testing.assert_allclose(kappa**2 / (3 * q), 1 - 0.8 * q, rtol=0, atol=1e-7)  # 1 - q has 1e-16 / q digits

@@ -9,7 +9,7 @@ import pytest
 ALPHAS = np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])
 
 
-def test_coefficients_by_hand(liang_printed, x64):
+def test_coefficients_profile_cdf_and_radii_by_hand(liang_printed, x64):
     """(9)-(15) at alpha = 0.5, from the printed digits with a pocket calculator.
 
     a = -0.0064 * 0.5 + 0.00316 * 0.1^15           = -0.0032
@@ -26,10 +26,7 @@ def test_coefficients_by_hand(liang_printed, x64):
     for alpha, share in ((1.0, 1.0), (1 - 1 / 30, 0.1), (0.9, 1e-3)):
         a = float(liang_printed.coefficients(jnp.asarray(alpha))[0])
         assert a + 0.0064 * alpha == pytest.approx(0.00316 * share, rel=1e-12)
-
-
-def test_profile_and_cdf_by_hand(liang_printed):
-    """(7), (16)-(18) at alpha = 0.5, r = 1 and 10, written out without the law's code."""
+    # (7), (16)-(18) at alpha = 0.5, r = 1 and 10, written out without the law's code.
     a, b, c = -0.0032 + 0.00316e-15, 0.461 * 0.5**2.608375, 0.0097 * math.exp(2.1) + 0.166
     farthest = -b / a
 
@@ -42,9 +39,17 @@ def test_profile_and_cdf_by_hand(liang_printed):
         profile = (a * r + b) / (r + c) / r * reflectance / energy(farthest)
         assert liang_printed.profile(r, 0.5) == pytest.approx(profile, rel=1e-12)
         assert liang_printed.cdf(r, 0.5) == pytest.approx(energy(r) / energy(farthest), rel=1e-12)
+    # (19)-(21) at alpha = 0.5, xi = 0.25 and 0.9. k1 = 1.504 * 0.5^(2.175 * 0.5^0.7 + 0.19), k2 = 3.993 * 0.5^(3.268 *
+    # 0.5 + 0.2838) = 3.993 * 0.5^1.9178
+    k1 = 1.504 * 0.5 ** (2.175 * 0.5**0.7 + 0.19)
+    k2 = 3.993 * 0.5**1.9178
+    for xi in (0.25, 0.9):
+        radius = (k1 * xi - k2) * math.sqrt(xi) * math.log(1.01 - xi)
+        assert liang_printed.sampler.sample(xi, 0.5) == pytest.approx(radius, rel=1e-12)
+    assert k2 == pytest.approx(1.0568, rel=1e-4)
 
 
-def test_nothing_beyond_the_largest_radius(liang):
+def test_nothing_beyond_the_largest_radius(liang, liang_printed):
     """r_max = -b/a, where (7) falls through zero."""
     for alpha in (0.2, 0.7, 0.99):
         farthest = float(liang.largest_radius(alpha))
@@ -55,6 +60,15 @@ def test_nothing_beyond_the_largest_radius(liang):
     # r_max = 0/0: the docstring keeps alpha = 0 out, and nobody gets a plausible wrong value there.
     assert math.isnan(liang.cdf(1.0, 0.0))
     assert not liang.profile(1.0, 0.0) > 0
+    # 2 to 13 mean free paths with the corrected b0, 17 to 92 as printed: too far for any light.
+    found = np.asarray(liang.largest_radius(ALPHAS))
+    np.testing.assert_allclose(found * 0.461 / 0.0641, liang_printed.largest_radius(ALPHAS), rtol=1e-12)
+    np.testing.assert_allclose(found[[0, -1]], [2.339, 12.72], rtol=1e-3)
+    end = float(liang.sampler.unclipped(np.array(1.0), 0.5))  # (k2 - k1) |ln eps| < r_max here
+    assert liang.sampler.pdf(0.999 * end, 0.5) > 0
+    assert liang.sampler.pdf(1.001 * end, 0.5) == 0
+    assert liang.sampler.pdf(1.001 * float(liang.largest_radius(0.9)), 0.9) == 0
+    assert liang.sampler.pdf(0.0, 0.9) == 0
 
 
 def test_b0_as_printed_breaks_the_energy_and_a_seventh_of_it_does_not(liang, liang_printed):
@@ -65,38 +79,15 @@ def test_b0_as_printed_breaks_the_energy_and_a_seventh_of_it_does_not(liang, lia
         assert ratio.max() < high
 
 
-def test_largest_radii(liang, liang_printed):
-    """2 to 13 mean free paths with the corrected b0, 17 to 92 as printed: too far for any light."""
-    found = np.asarray(liang.largest_radius(ALPHAS))
-    np.testing.assert_allclose(found * 0.461 / 0.0641, liang_printed.largest_radius(ALPHAS), rtol=1e-12)
-    np.testing.assert_allclose(found[[0, -1]], [2.339, 12.72], rtol=1e-3)
-
-
 # The inverse cdf
 
 
-def test_radii_by_hand(liang_printed):
-    """(19)-(21) at alpha = 0.5, xi = 0.25 and 0.9.
-
-    k1 = 1.504 * 0.5^(2.175 * 0.5^0.7 + 0.19), k2 = 3.993 * 0.5^(3.268 * 0.5 + 0.2838) = 3.993 * 0.5^1.9178
-    """
-    k1 = 1.504 * 0.5 ** (2.175 * 0.5**0.7 + 0.19)
-    k2 = 3.993 * 0.5**1.9178
-    for xi in (0.25, 0.9):
-        radius = (k1 * xi - k2) * math.sqrt(xi) * math.log(1.01 - xi)
-        assert liang_printed.sampler.sample(xi, 0.5) == pytest.approx(radius, rel=1e-12)
-    assert k2 == pytest.approx(1.0568, rel=1e-4)
-
-
-def test_the_radius_is_negative_below_eps_and_its_size_is_drawn(liang, x64):
+def test_the_radius_is_negative_below_eps_and_clipped_at_the_largest(liang, x64, liang_printed):
     """g changes sign at xi = eps, where the logarithm does."""
     below, above = (float(liang.sampler.unclipped(jnp.asarray(xi), 0.7)) for xi in (0.0099, 0.0101))
     assert below < 0 < above
     assert liang.sampler.sample(0.0099, 0.7) == pytest.approx(-below, rel=1e-14)
     assert liang.sampler.sample(0.01, 0.7) == pytest.approx(0.0, abs=1e-15)
-
-
-def test_the_clip_is_an_atom_at_the_largest_radius(liang, liang_printed):
     xi = (np.arange(100_000) + 0.5) / 100_000
     for alpha in (0.1, 0.9, 0.95):
         drawn = liang.sampler.sample(xi, alpha)
@@ -105,14 +96,6 @@ def test_the_clip_is_an_atom_at_the_largest_radius(liang, liang_printed):
         assert np.mean(drawn == farthest) > 1e-3
     for law, alphas in ((liang, 0.5), (liang_printed, ALPHAS)):  # no clip, no atom
         assert np.all(law.sampler.unclipped(1.0, alphas) < law.largest_radius(alphas))
-
-
-def test_the_sampler_has_no_density_beyond_its_reach(liang):
-    end = float(liang.sampler.unclipped(np.array(1.0), 0.5))  # (k2 - k1) |ln eps| < r_max here
-    assert liang.sampler.pdf(0.999 * end, 0.5) > 0
-    assert liang.sampler.pdf(1.001 * end, 0.5) == 0
-    assert liang.sampler.pdf(1.001 * float(liang.largest_radius(0.9)), 0.9) == 0
-    assert liang.sampler.pdf(0.0, 0.9) == 0
 
 
 def test_each_objective_moves_its_own_constants(liang):
