@@ -69,7 +69,7 @@ def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
     np.testing.assert_allclose(checks[0]["chance"], chi2.sf(distances[0], 2))
 
 
-def test_photons_of_another_truth_differ(toy, tallies, exactly):
+def test_photons_of_another_truth_differ_and_a_failed_fit_is_told(toy, tallies, exactly):
     profiles = tallies.profiles(tallies.draw(7, 1)[0])
     louder = replace(profiles, energy=1.02 * profiles.energy)  # the tally's error of A is 0.2 %
     check = compared(exactly, fit(louder, exactly.law, free=FREE), tallies.photons, 0, 0)
@@ -77,9 +77,6 @@ def test_photons_of_another_truth_differ(toy, tallies, exactly):
     assert list(check["constants"]) == ["k", "h"]
     assert check["constants"]["k"]["z"] > 5
     assert check["photons"] == tallies.photons
-
-
-def test_a_failed_fit_is_told(tallies, exactly):
     good = fit(tallies.profiles(tallies.draw(7, 1)[0]), exactly.law, free=FREE)
     failed = replace(good, solution=replace(good.solution, result="no convergence"))
     for pair, which in (((failed, good), "exact"), ((exactly, failed), "photon")):
@@ -170,7 +167,7 @@ def test_middles_are_wrong_by_the_square_of_the_width_and_integrals_by_next_to_n
     assert np.all(discretisation_error(one) < 1e-3 * discretisation_error(fits["radial"]))
 
 
-def test_wide_rings_are_the_sums_of_narrow_ones(fits):
+def test_wide_rings_are_the_sums_of_narrow_ones(fits, white_run, normalisation):
     rings = fits["radial"].rings
     wide = widened(rings, 5)
     assert wide.energy.shape == rings.energy.shape
@@ -191,8 +188,5 @@ def test_wide_rings_are_the_sums_of_narrow_ones(fits):
     kept = wide.used[:, wide.energy[0] > 0]
     assert kept.sum() == 12 * 7 - 1
     assert kept[2, 2] == 0.0
-
-
-def test_one_ring_has_no_width_to_tell(white_run, normalisation):
     one = fit(Profiles.from_orders(white_run.merged([0.0, white_run.grid.r_edges[-1]]), FEW), normalisation)
     np.testing.assert_array_equal(discretisation_error(one), np.zeros(3))

@@ -103,7 +103,7 @@ def test_reflectance_of_a_map(normalisation):
         derived.radius(known, 0.5)
 
 
-def test_a_record_says_it_again(known, truth):
+def test_a_record_says_it_again_and_a_summary_how_far_radii_are_off(known, truth):
     content = {
         "protocol": {"weighting": {"objective": "energy"}},
         "covariance": {"names": FREE, "statistical": known.statistical, "model": known.discrepancy.covariance},
@@ -115,10 +115,7 @@ def test_a_record_says_it_again(known, truth):
     silent = LawWithErrors.of_record(known.law, plain(old), {})
     assert silent.discrepancy is None
     assert np.isnan(derived.radius(silent, 0.8).model[0])
-
-
-def test_a_summary_knows_how_far_radii_are_off(known, truth):
-    """The far radius rests on light that the discrepancy does not look at: its error is that of the fitted albedos."""
+    # The far radius rests on light that the discrepancy does not look at: its error is that of the fitted albedos.
     found = derived.summary(known, truth)
     assert found["quantity"] == "radius"
     expected = np.array([float(exact.quantile(0.995, alpha)) for alpha in found["alpha"]])

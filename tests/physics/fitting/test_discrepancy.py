@@ -48,7 +48,7 @@ def drawn():
 
 
 @pytest.mark.slow
-def test_amplitude_and_lengths_are_found_again(drawn):
+def test_amplitude_lengths_and_scatter_of_constants_are_found_again(drawn):
     """Each within its own error, and all together without bias: four of the scatter's standard errors."""
     assert [one.result for one in drawn] == [FOUND] * DRAWS
     z = [np.log(one.amplitude / AMPLITUDE) / (one.amplitude_error / one.amplitude) for one in drawn]
@@ -57,11 +57,7 @@ def test_amplitude_and_lengths_are_found_again(drawn):
         found = np.log([getattr(one, name) for one in drawn])
         assert abs(found.mean() - np.log(known)) < 4 * found.std(ddof=1) / np.sqrt(DRAWS), name
     assert all(one.rms < AMPLITUDE for one in drawn)
-
-
-@pytest.mark.slow
-def test_constants_scatter_as_the_model_error_says(drawn):
-    """The fits' errors over 2000 draws against the covariance at the process's own amplitude and lengths."""
+    # The fits' errors over 2000 draws against the covariance at the process's own amplitude and lengths.
     own = true_process()
     rng = np.random.default_rng(13)
     along_s, along_u = roots()
@@ -130,9 +126,6 @@ def test_the_band_of_a_law_holds_the_truth_where_nothing_was_fitted():
     # Negative control: as if the fit had not followed.
     plain = AMPLITUDE**2 * np.eye(3)
     assert np.abs((off.T @ off / number - plain) / error).max() > 8
-
-
-def test_places_are_apart_in_albedo_surface_and_direction_alike():
     np.testing.assert_array_equal(apart(np.eye(3), np.zeros((1, 3))), np.ones((3, 1)))
 
 

@@ -119,7 +119,7 @@ def line():
     return alpha, reflectance, np.stack([np.ones(12), alpha], axis=1)
 
 
-def test_a_linear_fit_is_linear_algebra(line):
+def test_a_linear_fit_is_linear_algebra_of_the_albedos_that_count(line):
     alpha, reflectance, design = line
     factor = 0.01 * np.random.default_rng(5).standard_normal((1, 12, 12))
     one = fit(line_profiles(reflectance, alpha, factor), Line(Setting()), "reflectance")
@@ -132,6 +132,14 @@ def test_a_linear_fit_is_linear_algebra(line):
     np.testing.assert_allclose(one.variance, misfit @ misfit / 10, rtol=1e-8)
     np.testing.assert_allclose(one.misfit, one.variance * np.linalg.inv(design.T @ design), rtol=1e-7)
     assert one.result == "converged"
+    alpha, reflectance, design = line
+    counted = np.arange(12) % 3 > 0
+    spoilt = np.where(counted, reflectance, 0.9)
+    one = fit(line_profiles(spoilt, alpha), Line(Setting()), "reflectance", counted=counted)
+    expected = np.linalg.lstsq(design[counted], reflectance[counted])[0]
+    np.testing.assert_allclose(list(one.constants.values()), expected, rtol=1e-8)
+    misfit = reflectance[counted] - design[counted] @ expected
+    np.testing.assert_allclose(one.variance, misfit @ misfit / (8 - 2), rtol=1e-8)
 
 
 def test_the_jackknife_by_hand(line, monkeypatch):
@@ -169,17 +177,6 @@ def test_a_held_constant_stays_and_the_jackknife_sees_misfit_that_repeats_itself
     assert np.all(np.isnan(few.jackknife))
 
 
-def test_only_albedos_that_are_counted_count(line):
-    alpha, reflectance, design = line
-    counted = np.arange(12) % 3 > 0
-    spoilt = np.where(counted, reflectance, 0.9)
-    one = fit(line_profiles(spoilt, alpha), Line(Setting()), "reflectance", counted=counted)
-    expected = np.linalg.lstsq(design[counted], reflectance[counted])[0]
-    np.testing.assert_allclose(list(one.constants.values()), expected, rtol=1e-8)
-    misfit = reflectance[counted] - design[counted] @ expected
-    np.testing.assert_allclose(one.variance, misfit @ misfit / (8 - 2), rtol=1e-8)
-
-
 @pytest.mark.slow
 def test_only_rings_that_are_used_count(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
@@ -193,7 +190,7 @@ def test_only_rings_that_are_used_count(tallies, toy):
     assert abs(fit(spoilt, toy).constants["h"] - clean.constants["h"]) > 0.005
 
 
-def test_no_convergence_is_returned(line):
+def test_no_convergence_is_returned_and_settings_do_not_mix(line, tallies, toy):
     """1 / (1 + u^2) falls for ever."""
     alpha, reflectance, _ = line
 
@@ -204,9 +201,6 @@ def test_no_convergence_is_returned(line):
     one = fit(line_profiles(0.0 * reflectance, alpha), Runaway(Setting()), "reflectance", free=("u",))
     assert one.result.startswith("no convergence in")
     assert np.all(np.isfinite(one.solution.parameters))
-
-
-def test_settings_do_not_mix(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     with pytest.raises(SettingError, match=r"the law belongs to diffuse.* the profiles to searchlight.* do not mix"):
         fit(profiles, eqx.tree_at(lambda _: (), type(toy)(Setting("diffuse")), ()))

@@ -64,7 +64,7 @@ def test_energy_rows_are_weighted_and_rings_that_do_not_count_add_nothing(burley
     assert np.flatnonzero(table[1, :-2] == 0).tolist() == [4]
 
 
-def test_radial_vanishes_on_the_formula_itself(liang, x64):
+def test_radial_vanishes_on_the_formula_and_share_knows_the_negative_branch(liang, x64):
     """r R_d at the ring centre, from energies E = 2 pi dr r R_d."""
     centre, width = 0.5 * (EDGES[1:] + EDGES[:-1]), np.diff(EDGES)
     a, b, c = (np.asarray(value) for value in liang.coefficients(jnp.asarray(ALPHAS)[:, None]))
@@ -76,6 +76,13 @@ def test_radial_vanishes_on_the_formula_itself(liang, x64):
     used[:, 15:] = 0
     raised = made(2 * np.pi * width * (curve + 0.01), np.zeros(3), used=used)
     np.testing.assert_allclose(np.hstack(objectives.radial(liang, raised)), -0.01 * used, atol=1e-15)
+    # g(xi) < 0 for xi < eps: its share is minus the cdf of |g|, so the fit is told of the sign.
+    rings = made(
+        np.full((1, 2), 0.5), np.zeros(1), edges=np.array([0, 1.0, 2.0]), alpha=ALPHAS[:1], xi=np.array([0.004])
+    )
+    g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
+    assert g < 0
+    assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
 
 
 def test_albedo_and_reflectance_vanish_on_the_map_itself(normalisation, x64):
@@ -106,16 +113,6 @@ def test_radius_and_share_vanish_on_the_samplers_own_cdf_and_have_their_units(li
     np.testing.assert_allclose(np.hstack(objectives.radius(liang, rings))[0], g - 2 * xi, rtol=1e-12)
     np.testing.assert_allclose(np.hstack(objectives.relative_radius(liang, rings))[0], g / (2 * xi) - 1, rtol=1e-12)
     np.testing.assert_allclose(np.hstack(objectives.share(liang, rings))[0], g / 2 - xi, rtol=1e-12)
-
-
-def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
-    """g(xi) < 0 for xi < eps: its share is minus the cdf of |g|, so the fit is told of the sign."""
-    rings = made(
-        np.full((1, 2), 0.5), np.zeros(1), edges=np.array([0, 1.0, 2.0]), alpha=ALPHAS[:1], xi=np.array([0.004])
-    )
-    g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
-    assert g < 0
-    assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
 
 
 def _law(name, liang, normalisation):
@@ -180,7 +177,7 @@ def test_rings_of_leaves_out_what_is_not_trusted():
 
 
 @pytest.mark.slow
-def test_relative_is_a_mean_square_error_and_counts_misplaced_energy(burley, x64):
+def test_relative_is_a_mean_square_error_and_resists_a_fall_next_to_white(burley, x64):
     """A law that is 10 % off in every ring has rows of 0.1 whose squares add up to 0.01, however the rings are cut."""
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond / 1.1)
@@ -201,11 +198,7 @@ def test_relative_is_a_mean_square_error_and_counts_misplaced_energy(burley, x64
     assert np.any(beyond)
     assert np.all(table[:, :n][beyond] == 0)
 
-
-@pytest.mark.slow
-def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
-    """A law whose energy is 1 + v times another's, v = sqrt(1 - alpha), falls with the slope 1 in v at white."""
-
+    # A law whose energy is 1 + v times another's, v = sqrt(1 - alpha), falls with the slope 1 in v at white.
     class Falling:
         def under(self, surfaces):
             return self

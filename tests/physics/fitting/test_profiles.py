@@ -94,7 +94,7 @@ def test_merged_rings_hold_the_same_energy_and_covariance(white_run, photons):
     )
 
 
-def test_sandwich_is_the_dense_closed_form():
+def test_sandwich_and_draws_have_the_dense_closed_form(sidak):
     """(delta_ij sum_n (ab)^n H_in / N - E_i(a) E_j(b)) / (N - 1), every pair of rings and albedos written out."""
     one, dense = dense_covariance()
     factor, energy, photons = one.factor, one.energy, one.photons
@@ -105,6 +105,16 @@ def test_sandwich_is_the_dense_closed_form():
     # Negative control: without what is between rings it is another matrix.
     within = np.einsum("pai,iak,ibk,qbi->pq", gain, factor, factor, gain)
     assert np.max(np.abs(within - expected)) > 1e-2 * np.max(np.abs(expected))
+    # Ten thousand draws against the closed form, pair by pair (Wishart).
+    one, dense = dense_covariance()
+    number, closed = 10_000, dense.reshape(6, 6)
+    drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
+    error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
+    assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
+    assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
+    # Negative control: rings that do not share out their photons.
+    alone = np.where(np.eye(3, dtype=bool)[None, :, None, :], dense, 0.0).reshape(6, 6)
+    assert np.abs((np.cov(drawn, rowvar=False) - alone) / error).max() > 2 * sidak(21)
 
 
 def dense_covariance():
@@ -120,19 +130,6 @@ def dense_covariance():
         dense[a, i, b, j] = (same - energy[a, i] * energy[b, j]) / (photons - 1)
     factor = np.stack([_root(dense[:, i, :, i]) for i in range(3)])
     return Covariance(factor, energy, photons, 0.0), dense
-
-
-def test_draws_have_the_covariance_between_rings_too(sidak):
-    """Ten thousand draws against the closed form, pair by pair (Wishart)."""
-    one, dense = dense_covariance()
-    number, closed = 10_000, dense.reshape(6, 6)
-    drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
-    error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
-    assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
-    assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
-    # Negative control: rings that do not share out their photons.
-    alone = np.where(np.eye(3, dtype=bool)[None, :, None, :], dense, 0.0).reshape(6, 6)
-    assert np.abs((np.cov(drawn, rowvar=False) - alone) / error).max() > 2 * sidak(21)
 
 
 def test_draws_scatter_as_the_sandwich_where_many_rings_hold_few_photons(white_run):

@@ -50,7 +50,7 @@ def test_the_truth_has_no_error(setting):
     np.testing.assert_array_equal(found.alpha, ALPHAS)
 
 
-def test_rel_is_the_mean_relative_error_against_a_law_s_own_light():
+def test_measures_of_brighter_mistaken_and_stretched_light():
     found = profile_quality(Truth(brighter=1.07), ALPHAS)
     np.testing.assert_allclose(found.rel, 0.07, rtol=1e-12)
     np.testing.assert_array_equal(found.ks, 0.0)  # a cdf is normalised
@@ -61,10 +61,7 @@ def test_rel_is_the_mean_relative_error_against_a_law_s_own_light():
             return exact.profile(r, alpha, mfp)
 
     assert np.all(profile_quality(Mistaken(setting=Setting("diffuse")), ALPHAS).rel > 0.02)
-
-
-def test_ks_and_l1_of_a_stretch():
-    """By brute force over a grid of its own, six times finer."""
+    # By brute force over a grid of its own, six times finer.
     for alpha in ALPHAS:
         r = np.geomspace(0.05, 30, 6000)
         brute = np.max(np.abs(exact.cdf(r / 1.05, alpha) - exact.cdf(r, alpha)))
@@ -111,7 +108,7 @@ def test_r_squared_by_hand():
     assert r_squared(np.array([1.0, 3]), np.array([2.0, 2])) == 0.0
 
 
-def test_maps_are_measured_against_the_exact_one():
+def test_maps_are_measured_against_the_exact_one_and_folds_are_told(normalisation):
     found = albedo_quality(ExactMap(Setting()))
     assert found.delta_A == 0.0
     assert found.delta_alpha < 1e-5  # the table's linear interpolation
@@ -134,9 +131,6 @@ def test_maps_are_measured_against_the_exact_one():
             return np.full(np.shape(alpha), np.nan)
 
     assert albedo_quality(Nothing(Setting())).delta_A == pytest.approx(1.0, abs=1e-3)
-
-
-def test_maps_that_fold_and_that_rise(normalisation):
     found = albedo_quality(LiangAlbedo(Setting(), 5.67, 3.84, 0.84))
     assert not found.monotone
     assert found.fold == pytest.approx(np.sqrt(0.84), abs=1e-4)  # a grid of 5e-5

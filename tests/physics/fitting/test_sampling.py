@@ -90,7 +90,7 @@ def test_a_mixture_is_judged_part_by_part():
     assert lit > 1e-3
 
 
-def test_an_exact_inverse_has_no_error(burley):
+def test_an_exact_inverse_has_no_error_and_a_circle_by_hand(burley):
     found = sampler_quality(burley.sampler, [0.3, ALPHA])
     np.testing.assert_array_equal(found.alpha, [0.3, ALPHA])
     assert np.all(found.inversion_error < 1e-14)
@@ -99,20 +99,23 @@ def test_an_exact_inverse_has_no_error(burley):
         assert np.max(np.abs(measure)) < 1.01 * STEP
     for measure in (found.edge_bias, found.edge_bias_by_law_pdf):
         assert np.max(np.abs(measure)) < 20 * STEP  # the last step is all beyond the edge
+    # A circle of twice the distance shows the edge 120 degrees of its 360.
+    np.testing.assert_allclose(lit_beyond_edge(np.array([0.0, 0.5, 1.0, 2.0, 1e12]), 1.0), [0, 0, 0, 1 / 3, 0.5])
 
 
 @TARGETS
-def test_light_beyond_an_edge(which, burley):
+def test_light_beyond_an_edge_and_variance_are_plain_integrals(which, burley):
     """Against the plain integral of the density, of a law and of the exact profile."""
     target = ExactTarget() if which == "exact" else LawTarget(burley)
     light = integral(lambda x: target.density(x, ALPHA) * lit_beyond_edge(x, 0.7), 0.7, 90.0)
     assert edge_light(target, ALPHA, 0.7) == pytest.approx(light, abs=1e-7)  # a root at the edge
     assert edge_light(target, ALPHA, 1e-9) == pytest.approx(0.5, abs=1e-6)
-
-
-def test_a_circle_beyond_an_edge_by_hand():
-    """A circle of twice the distance shows the edge 120 degrees of its 360."""
-    np.testing.assert_allclose(lit_beyond_edge(np.array([0.0, 0.5, 1.0, 2.0, 1e12]), 1.0), [0, 0, 0, 1 / 3, 0.5])
+    # int f^2 / pdf dr - 1, by another quadrature in another variable.
+    target = ExactTarget() if which == "exact" else LawTarget(burley)
+    sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
+    square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
+    found = sampler_quality(sampler, ALPHA, target)
+    assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
 
 
 def test_a_stretch_costs_nothing_with_its_own_density(burley):
@@ -131,16 +134,6 @@ def test_a_stretch_costs_nothing_with_its_own_density(burley):
     # Negative control: 1.1 times too dense, so 1/1.1 of the light.
     found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
     assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
-
-
-@TARGETS
-def test_variance_is_the_chi_square_divergence(which, burley):
-    """int f^2 / pdf dr - 1, by another quadrature in another variable."""
-    target = ExactTarget() if which == "exact" else LawTarget(burley)
-    sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
-    square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
-    found = sampler_quality(sampler, ALPHA, target)
-    assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
 
 
 # Clips

@@ -104,6 +104,16 @@ def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
         return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
 
     assert "stalled beside an optimum" in least_squares(residual, [1.0], np.zeros(2)).result
+    data = problem(2.0, 1.7, 0.05, seed=4)
+    for residual, of_numpy, start, more in (
+        (decay, noisy, [1.0, 1.0], data),
+        (valley_of, valley, [-1.2, 1.0], np.zeros(2)),
+    ):
+        twin = optimize.least_squares(of_numpy, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        found = least_squares(residual, start, more)
+        assert found.converged
+        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-6)
+        np.testing.assert_allclose(covariance(twin.jac), found.covariance, rtol=1e-4)
 
 
 def valley(p):
@@ -164,9 +174,6 @@ def test_steps_are_no_longer_than_the_longest():
     assert np.max(np.abs(np.diff(seen, axis=0))[:, 0]) == pytest.approx(0.5)
     assert np.max(seen, axis=0)[1] > 0.9
     assert solve(lambda p: (p - [5.0, 1.0], np.eye(2)), np.zeros(2)).steps < found.steps - 4, "a control"
-
-
-def test_what_gains_little_ends_the_search():
     start = np.array([1.0, 1.0])
     early, late = (solve(differences(noisy, 1e-6), start, gain=gain) for gain in (1e-3, 0.0))
     assert early.converged
@@ -234,17 +241,3 @@ def test_the_optimum_is_that_of_a_trust_region(residual, start, bounds):
     assert found.converged
     assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
     np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
-
-
-@pytest.mark.slow
-def test_a_traced_problem_has_the_optimum_of_a_trust_region():
-    data = problem(2.0, 1.7, 0.05, seed=4)
-    for residual, of_numpy, start, more in (
-        (decay, noisy, [1.0, 1.0], data),
-        (valley_of, valley, [-1.2, 1.0], np.zeros(2)),
-    ):
-        twin = optimize.least_squares(of_numpy, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-        found = least_squares(residual, start, more)
-        assert found.converged
-        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-6)
-        np.testing.assert_allclose(covariance(twin.jac), found.covariance, rtol=1e-4)

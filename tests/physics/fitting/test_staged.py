@@ -55,7 +55,7 @@ def test_noise_free_curves_give_their_coefficients_back_from_any_start(clean, li
     np.testing.assert_allclose(found.values, coefficients(liang, ALPHAS), rtol=1e-6)
 
 
-def test_the_trimming_keeps_rings_up_to_the_cut(liang):
+def test_the_trimming_keeps_rings_up_to_the_cut_by_strides_of_length(liang):
     profiles = curve_profiles(liang)
     used, cut = trimmed(profiles, "r R_d", 0.005)
     np.testing.assert_array_equal(used, profiles.r <= cut[:, None])
@@ -67,6 +67,18 @@ def test_the_trimming_keeps_rings_up_to_the_cut(liang):
     np.testing.assert_array_equal(ends, profiles.r[-1])
     # R_d itself falls much sooner than r R_d.
     assert np.all(trimmed(profiles, "R_d", 0.005)[1] < cut)
+    # (6) walks in units of length: at another mean free path it stops at another number of them.
+    edges = np.arange(0.0, 12.01, 0.01)
+    r = 0.5 * (edges[1:] + edges[:-1])
+    energy = (2 * np.pi * np.exp(-r / 0.8) * 0.01)[None]  # r R_d = e^{-r/0.8}, low enough at 4.24
+    none = np.zeros_like(energy)
+    profiles = Profiles(np.array([0.5]), edges, energy, none, none + np.inf, np.zeros(1), "exact", Setting())
+    stops = {mfp: float(trimmed(profiles, "r R_d", 0.005, mfp)[1][0]) for mfp in (0.1, 1.0, 2.0)}
+    # 4.24 mfp are 0.424, 4.24 and 8.48 lengths, where strides are 0.05, 0.5 and 1: stops at 0.45, 4.5 and 9.
+    assert stops == pytest.approx({0.1: 4.5, 1.0: 4.5, 2.0: 4.5})
+    finer = float(trimmed(profiles, "r R_d", 0.005, 0.2)[1][0])  # 0.848 lengths, strides of 0.1: stops at 0.9
+    assert finer == pytest.approx(4.5)
+    assert float(trimmed(profiles, "r R_d", 0.005, 0.24)[1][0]) == pytest.approx(1.2 / 0.24)  # 1.02, strides of 0.2
 
 
 @pytest.mark.slow
@@ -130,18 +142,3 @@ def test_errors_of_the_stages_are_those_of_refitting(liang):
     assert misfit(np.array(constants), law.covariance) < 3.3
     assert misfit(np.array(constants), 2 * law.covariance) > 3.3
     assert one.standard_error.shape == (9, 3)
-
-
-def test_strides_of_the_trimming_are_lengths():
-    """(6) walks in units of length: at another mean free path it stops at another number of them."""
-    edges = np.arange(0.0, 12.01, 0.01)
-    r = 0.5 * (edges[1:] + edges[:-1])
-    energy = (2 * np.pi * np.exp(-r / 0.8) * 0.01)[None]  # r R_d = e^{-r/0.8}, low enough at 4.24
-    none = np.zeros_like(energy)
-    profiles = Profiles(np.array([0.5]), edges, energy, none, none + np.inf, np.zeros(1), "exact", Setting())
-    stops = {mfp: float(trimmed(profiles, "r R_d", 0.005, mfp)[1][0]) for mfp in (0.1, 1.0, 2.0)}
-    # 4.24 mfp are 0.424, 4.24 and 8.48 lengths, where strides are 0.05, 0.5 and 1: stops at 0.45, 4.5 and 9.
-    assert stops == pytest.approx({0.1: 4.5, 1.0: 4.5, 2.0: 4.5})
-    finer = float(trimmed(profiles, "r R_d", 0.005, 0.2)[1][0])  # 0.848 lengths, strides of 0.1: stops at 0.9
-    assert finer == pytest.approx(4.5)
-    assert float(trimmed(profiles, "r R_d", 0.005, 0.24)[1][0]) == pytest.approx(1.2 / 0.24)  # 1.02, strides of 0.2

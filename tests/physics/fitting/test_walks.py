@@ -31,12 +31,13 @@ def test_a_normal_density_is_sampled():
     np.testing.assert_array_equal(found.samples, again.samples)
 
 
-def test_a_walk_that_is_too_short_says_so(offset):
+def test_a_walk_that_is_too_short_says_so_and_walkers_that_start_nowhere_come_in():
     found = walk(log_density, start(), np.zeros(2), seed=1, max_steps=60, kept=100)
     assert found.steps == 60
     assert found.result.startswith("chain of 60 steps is under 50 autocorrelation times")
-    found = walk(log_density, start(offset), np.zeros(2), seed=1, max_steps=100, kept=100)
-    assert np.all(np.isfinite(found.log_density))
+    for offset in (-60.0, -1000.0):
+        found = walk(log_density, start(offset), np.zeros(2), seed=1, max_steps=100, kept=100)
+        assert np.all(np.isfinite(found.log_density))
 
 
 BEND, WIDTH = 0.3, 0.6

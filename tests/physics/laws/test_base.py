@@ -85,6 +85,14 @@ def test_numbers_give_numbers_and_arrays_broadcast(law):
     alphas = jnp.linspace(0.2, 0.9, 8)
     mapped = jax.vmap(lambda a: law.cdf(jnp.float32(0.5), a))(alphas)
     np.testing.assert_allclose(mapped, law.cdf(0.5, np.asarray(alphas, float)), rtol=2e-6)
+    names = law.constant_names()
+    assert jax.tree.leaves(law) == [law.constants()[name] for name in names]
+    moved = law.with_vector(names[:2], [7.0, 8.0])
+    assert moved.constants() == {**law.constants(), names[0]: 7.0, names[1]: 8.0}
+    np.testing.assert_array_equal(moved.vector(names[:2]), [7.0, 8.0])
+    assert moved.setting == law.setting
+    with pytest.raises(AttributeError, match="cannot assign"):
+        law.setting = None
 
 
 @pytest.mark.slow
@@ -119,18 +127,6 @@ def test_derivatives_are_finite_differences_and_finite_at_both_ends(law, alpha, 
     # A gradient at r = 0 or beyond all light must not turn a fit into NaN.
     for r in (0.0, 1e9):
         assert np.isfinite(jax.grad(lambda a, r=r: law.cdf(jnp.asarray(r), a))(jnp.asarray(0.7)))
-
-
-@LAWS
-def test_a_law_is_its_constants(law):
-    names = law.constant_names()
-    assert jax.tree.leaves(law) == [law.constants()[name] for name in names]
-    moved = law.with_vector(names[:2], [7.0, 8.0])
-    assert moved.constants() == {**law.constants(), names[0]: 7.0, names[1]: 8.0}
-    np.testing.assert_array_equal(moved.vector(names[:2]), [7.0, 8.0])
-    assert moved.setting == law.setting
-    with pytest.raises(AttributeError, match="cannot assign"):
-        law.setting = None
 
 
 # Samplers

@@ -83,9 +83,6 @@ def test_coefficients_there_and_back():
     np.testing.assert_allclose(medium.mu_s, mu_s, rtol=1e-12)
     np.testing.assert_allclose(medium.alpha, [1.0, 1.09 / 1.103, 0.0], rtol=1e-15)
     np.testing.assert_allclose(medium.mfp, [0.5, 1 / 1.103, 0.2], rtol=1e-15)
-
-
-def test_without_absorption_there_is_no_diffuse_mean_free_path():
     medium = Optical(1.0, 2.0)
     infinite = {name for name in BY_NAME if not np.isfinite(medium.length(name))}
     assert infinite == {"dmfp", "dmfp_classical", "decay_length", "falloff_dmfp"}
@@ -110,10 +107,7 @@ def test_lengths_by_hand():
     kappa = 1 / medium.length("decay_length")
     assert 0.9 * np.arctanh(kappa) / kappa == pytest.approx(1.0, rel=1e-12)
     assert medium.length("dmfp_classical") < medium.length("decay_length") < medium.length("dmfp")
-
-
-def test_the_memo_means_grosjean_s():
-    """Its scales imply l_d / l = s_dmfp / s_searchlight: Grosjean's is the nearest of the three, as the module says."""
+    # Its scales imply l_d / l = s_dmfp / s_searchlight: Grosjean's is the nearest of the three, as the module says.
     alpha = 1 - np.linspace(0.98, 0.005, 100) ** 2
     a = reflectance_of(alpha, "searchlight")
     inside = (a > 0.02) & (a < 0.95)
@@ -191,12 +185,20 @@ def test_blender_renders_the_colours_and_edges_that_are_predicted(name):
     assert np.all(np.abs(ratio - 1) <= bound), ratio
 
 
-def test_what_blender_s_walks_render_of_a_medium_is_darker_than_it():
+def test_blender_by_hand():
     """By a sixth at A = 0.2: colours are mapped as if light entered diffusely. Skin's half does."""
     alpha = alpha_of(COLOURS, "diffuse")
     np.testing.assert_allclose(ENGINE["cycles_walk"].rendered(alpha) / COLOURS, [0.822, 0.889, 0.956], atol=1e-3)
     assert np.all(ENGINE["cycles_skin"].rendered(alpha) > ENGINE["cycles_walk"].rendered(alpha))
     assert ENGINE["cycles_burley"].rendered(alpha) is None
+    # Since 3.0 by setup_radius alone; before, divided by the diffuse s of the typed colour on top.
+    medium = Optical(alpha_of(0.6, "diffuse"), 0.3)
+    d = 0.3 / (1.3 + 3.5 * 0.04)
+    c, radius = typed("cycles_burley", medium)
+    assert [c, radius * 0.07957747] == pytest.approx([0.6, d], rel=1e-6)
+    c, radius = typed("cycles_burley_2", medium)
+    assert [c, radius * 0.07957747 / (1.9 - c + 3.5 * (c - 0.8) ** 2)] == pytest.approx([0.6, d], rel=1e-6)
+    assert typed("cycles_walk_2", medium)[1] * 0.07957747 == pytest.approx(0.3, rel=1e-6)
 
 
 @pytest.mark.parametrize("g", [-0.5, 0.0, 0.8])
@@ -238,17 +240,6 @@ def test_colours_of_engines_by_hand():
     np.testing.assert_allclose(c, entered, atol=0.05)  # it is a map under a surface of 1.4
 
 
-def test_blender_s_burley_draws_d_of_radius_over_4_pi():
-    """Since 3.0 by setup_radius alone; before, divided by the diffuse s of the typed colour on top."""
-    medium = Optical(alpha_of(0.6, "diffuse"), 0.3)
-    d = 0.3 / (1.3 + 3.5 * 0.04)
-    c, radius = typed("cycles_burley", medium)
-    assert [c, radius * 0.07957747] == pytest.approx([0.6, d], rel=1e-6)
-    c, radius = typed("cycles_burley_2", medium)
-    assert [c, radius * 0.07957747 / (1.9 - c + 3.5 * (c - 0.8) ** 2)] == pytest.approx([0.6, d], rel=1e-6)
-    assert typed("cycles_walk_2", medium)[1] * 0.07957747 == pytest.approx(0.3, rel=1e-6)
-
-
 def test_cycles_skin_radius_is_a_classical_diffuse_mean_free_path():
     """radius sqrt(3 (1 - alpha')) = l, with alpha' where the dipole has the typed colour, to twelve halvings."""
     for a in (0.05, 0.4, 0.8):
@@ -267,7 +258,7 @@ def test_cycles_skin_radius_is_a_classical_diffuse_mean_free_path():
     assert engine.dipole_reflectance(1.0, 1.4) == 1.0
 
 
-def test_hdrp_and_old_appleseed_by_hand():
+def test_hdrp_old_appleseed_pbrt_and_openpbr_by_hand():
     """UpdateKernel: cdf = 0.997 of 1 - e^(-r/d)/4 - 3 e^(-r/3d)/4, d the scattering distance."""
     medium = Optical(0.8, 1.7)
     t = medium.length("hdrp_radius") / medium.length("hdrp_distance")
@@ -279,6 +270,13 @@ def test_hdrp_and_old_appleseed_by_hand():
     np.testing.assert_allclose(d * (1.9 - c + 3.5 * (c - 0.8) ** 2), medium.mfp, rtol=1e-12)
     c, mfp = typed("appleseed_walk_2017", medium)
     np.testing.assert_allclose(mfp * (1.85 - c + 7 * np.abs(c - 0.8) ** 3), medium.mfp, rtol=1e-12)
+    # Both tend to 1 in white media; photon beam diffusion is brighter than the truth by up to a tenth.
+    alpha = np.array([0.5, 0.9, 0.99])
+    truth = ENGINE["openpbr_definition"].typed_colour(alpha, 1.4)
+    np.testing.assert_allclose(truth * (1 - (0.4 / 2.4) ** 2), exact.reflectance(alpha, Setting(n=1.4)), rtol=1e-12)
+    ratio = ENGINE["pbrt"].typed_colour(alpha, 1.4) / truth
+    assert np.all((ratio > 1) & (ratio < 1.1))
+    assert ENGINE["pbrt"].typed_colour(np.array([1.0]), 1.4) == 1.0
 
 
 def test_unreal_by_its_own_numbers_and_the_memo_s():
@@ -296,16 +294,6 @@ def test_unreal_by_its_own_numbers_and_the_memo_s():
     c, dmfp = typed("unreal_before_5_1", medium)
     assert dmfp / 0.3 / s_dmfp == pytest.approx(medium.length("falloff_searchlight"), rel=1e-12)
     assert typed("unreal_path_tracer", medium)[1] * 0.6 == pytest.approx(mfp), "they disagree about one profile"
-
-
-def test_pbrt_and_openpbr_count_light_that_entered():
-    """Both tend to 1 in white media; photon beam diffusion is brighter than the truth by up to a tenth."""
-    alpha = np.array([0.5, 0.9, 0.99])
-    truth = ENGINE["openpbr_definition"].typed_colour(alpha, 1.4)
-    np.testing.assert_allclose(truth * (1 - (0.4 / 2.4) ** 2), exact.reflectance(alpha, Setting(n=1.4)), rtol=1e-12)
-    ratio = ENGINE["pbrt"].typed_colour(alpha, 1.4) / truth
-    assert np.all((ratio > 1) & (ratio < 1.1))
-    assert ENGINE["pbrt"].typed_colour(np.array([1.0]), 1.4) == 1.0
 
 
 @pytest.mark.parametrize("name", list(ENGINE))
@@ -326,9 +314,6 @@ def test_a_pair_has_the_engine_s_unit():
     assert typed("unreal", medium, unit="mm")[1] == pytest.approx(0.072)
     assert typed("gltf", medium, unit="mm")[1] == pytest.approx(0.0012)
     assert typed("mitsuba", medium, unit="mm")[1] == pytest.approx(1 / 1.2), "of the scene, whatever it is"
-
-
-def test_what_a_renderer_has_no_g_for_is_no_number():
     medium = Optical(0.9, 1.0, 0.95)
     nothing = {name for name in ENGINE if not np.isfinite(typed(name, medium)[1])}
     walks = {"cycles_legacy", "cycles_skin", "cycles_walk_4", "cycles_fixed_radius", "cycles_walk_3"}

@@ -193,7 +193,7 @@ def test_a_white_half_space_gives_all_light_back(n):
     assert law.reflectance(1.0) == pytest.approx(law.entered, rel=1e-12)
 
 
-def test_dipole_by_hand_and_as_the_authors_write_it():
+def test_dipoles_by_hand_and_as_they_are_written():
     """At alpha = 1 and r = 0: (1 + 1 / z_v^2) / 4 pi, z_v = 1 + 4/3 (1.0016 / 0.9984)."""
     image = 1 + 4 / 3 * 1.0016 / 0.9984
     assert Dipole(Setting()).profile(0.0, 1.0) == pytest.approx((1 + image**-2) / (4 * math.pi), rel=1e-12)
@@ -205,10 +205,7 @@ def test_dipole_by_hand_and_as_the_authors_write_it():
         terms.append(z * (sigma * d + 1) * np.exp(-sigma * d) / d**3)
     expected = 0.95 / (4 * np.pi) * sum(terms) * 5.2 / 5.29  # 4 n / (n + 1)^2 enters
     np.testing.assert_allclose(Dipole(Setting(n=1.3)).profile(R, 0.95), expected, rtol=1e-12)
-
-
-def test_better_dipole_as_implementations_write_it():
-    """a^2/4 pi (e_r (C_E z_r (1 + sigma d_r) / d_r^2 + C_phi / D) - e_v (C_E z_v ... + C_phi / D)), z_v below 0."""
+    # a^2/4 pi (e_r (C_E z_r (1 + sigma d_r) / d_r^2 + C_phi / D) - e_v (C_E z_v ... + C_phi / D)), z_v below 0.
     alpha, n = 0.9, 1.4
     first, second = fresnel_moments(n)
     c_phi, c_e, boundary = (1 - first) / 4, (1 - second) / 2, (1 + second) / (1 - first)

@@ -133,6 +133,13 @@ def test_the_printed_table_and_its_weights():
     expected = sum(w / (2 * math.pi * v) for w, v in zip(weights, variances, strict=True))
     assert D_EON.profile(0.0)[0] == pytest.approx(expected, rel=1e-14)
     assert D_EON.profile(np.ones((2, 5))).shape == (2, 5, 3)
+    # In every channel, stretched by 0.001 + falloff, by default 1, 0.37, 0.3.
+    skin, r = separable(), 0.8
+    for channel, falloff in enumerate((1.0, 0.37, 0.3)):
+        scaled = r / (0.001 + falloff)
+        narrowest = 0.233 * math.exp(-(scaled**2) / (2 * 0.0064)) / (2 * math.pi * 0.0064)
+        assert skin.profile(r)[channel] == pytest.approx(D_EON.profile(scaled)[0] - narrowest, rel=1e-12)
+    assert energy(skin)[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)
 
 
 def energy(skin):
@@ -145,13 +152,3 @@ def test_profile_integrates_to_its_energy(skin):
     r = np.geomspace(1e-5, 30, 4001)
     total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
     np.testing.assert_allclose(total, energy(skin), rtol=1e-5)
-
-
-def test_separable_is_red_without_the_narrowest():
-    """In every channel, stretched by 0.001 + falloff, by default 1, 0.37, 0.3."""
-    skin, r = separable(), 0.8
-    for channel, falloff in enumerate((1.0, 0.37, 0.3)):
-        scaled = r / (0.001 + falloff)
-        narrowest = 0.233 * math.exp(-(scaled**2) / (2 * 0.0064)) / (2 * math.pi * 0.0064)
-        assert skin.profile(r)[channel] == pytest.approx(D_EON.profile(scaled)[0] - narrowest, rel=1e-12)
-    assert energy(skin)[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)

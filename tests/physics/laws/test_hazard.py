@@ -320,7 +320,7 @@ def test_beyond_the_indices_of_exact_light_photons_judge(light, n):
         assert abs(law.albedo.reflectance(one) / photons.reflectance(one).value - 1.0) < 0.01
 
 
-def test_similarity_is_told_from_it():
+def test_similarity_is_told_from_it_and_lengths_are_the_medium_s():
     """A negative control: the law of isotropic light at the same reduced albedo and l*."""
     alpha, length = reduced(unreduced(0.3, 0.8), 0.8)
     r = np.geomspace(0.3, 8.0, 20)
@@ -332,6 +332,20 @@ def test_similarity_is_told_from_it():
     for light in LIGHTS:
         isotropic = exact.reflectance(0.3, Setting(light, 1.4))
         assert isotropic / exact.reflectance(unreduced(0.3, 0.8), Setting(light, 1.4, 0.8)) > 5 / 3
+    # As those of `exact`; its shader source has reduced ones, as `in_reduced`.
+    law = load("hazard", setting=TISSUE)
+    own, (by, length) = law.in_reduced(), reduced(FEW, 0.8)
+    np.testing.assert_allclose(law.profile(WIDE, FEW, 2.0), own.profile(WIDE, by, 2.0 * length), rtol=1e-12)
+    np.testing.assert_allclose(law.cdf(WIDE, FEW, 2.0), own.cdf(WIDE, by, 2.0 * length), rtol=1e-11)
+    np.testing.assert_allclose(law.albedo.reflectance(FEW), own.albedo.reflectance(by), rtol=1e-12)
+    np.testing.assert_allclose(law.total(by), own.albedo.reflectance(by), rtol=1e-6)  # as the scaled functions
+    np.testing.assert_allclose(law.albedo.alpha(law.albedo.reflectance(FEW)), FEW, rtol=1e-9)
+    assert own.text_constants() == law.text_constants()
+    assert own.text_numbers() == law.text_numbers()
+    energy = np.trapezoid(2 * np.pi * WIDE**2 * law.profile(WIDE, 0.9), np.log(WIDE))
+    assert energy == pytest.approx(
+        law.albedo.reflectance(0.9), rel=0.05
+    )  # coarse, but no factor 1 - alpha g of an mfp is lost
 
 
 def test_a_negative_h_is_not_finite_next_to_the_source():
@@ -352,23 +366,6 @@ def test_ends_are_exact_with_g(setting):
     np.testing.assert_allclose(law.cdf([0.0, 1e9], 0.9), [0, 1], atol=1e-12)
     assert np.all(np.diff(law.cdf(WIDE, FEW), axis=1) >= 0)
     assert np.all(law.profile(WIDE, FEW) >= 0)
-
-
-def test_albedos_and_lengths_are_those_of_the_medium():
-    """As those of `exact`; its shader source has reduced ones, as `in_reduced`."""
-    law = load("hazard", setting=TISSUE)
-    own, (by, length) = law.in_reduced(), reduced(FEW, 0.8)
-    np.testing.assert_allclose(law.profile(WIDE, FEW, 2.0), own.profile(WIDE, by, 2.0 * length), rtol=1e-12)
-    np.testing.assert_allclose(law.cdf(WIDE, FEW, 2.0), own.cdf(WIDE, by, 2.0 * length), rtol=1e-11)
-    np.testing.assert_allclose(law.albedo.reflectance(FEW), own.albedo.reflectance(by), rtol=1e-12)
-    np.testing.assert_allclose(law.total(by), own.albedo.reflectance(by), rtol=1e-6)  # as the scaled functions
-    np.testing.assert_allclose(law.albedo.alpha(law.albedo.reflectance(FEW)), FEW, rtol=1e-9)
-    assert own.text_constants() == law.text_constants()
-    assert own.text_numbers() == law.text_numbers()
-    energy = np.trapezoid(2 * np.pi * WIDE**2 * law.profile(WIDE, 0.9), np.log(WIDE))
-    assert energy == pytest.approx(
-        law.albedo.reflectance(0.9), rel=0.05
-    )  # coarse, but no factor 1 - alpha g of an mfp is lost
 
 
 @pytest.mark.parametrize("g", [0.6, *slow(0.1, 0.95)])

@@ -77,6 +77,10 @@ def test_b0_as_printed_breaks_the_energy_and_a_seventh_of_it_does_not(liang, lia
         ratio = np.asarray(law.unscaled_energy(np.inf, ALPHAS)) / law.albedo.reflectance(ALPHAS)
         assert low < ratio.min()
         assert ratio.max() < high
+    profile, inverse = liang.seen_by("energy"), liang.seen_by("radius")
+    assert liang.seen_by("radial") == profile
+    assert liang.seen_by("share") == inverse
+    assert profile + inverse == liang.constant_names()
 
 
 # The inverse cdf
@@ -96,10 +100,3 @@ def test_the_radius_is_negative_below_eps_and_clipped_at_the_largest(liang, x64,
         assert np.mean(drawn == farthest) > 1e-3
     for law, alphas in ((liang, 0.5), (liang_printed, ALPHAS)):  # no clip, no atom
         assert np.all(law.sampler.unclipped(1.0, alphas) < law.largest_radius(alphas))
-
-
-def test_each_objective_moves_its_own_constants(liang):
-    profile, inverse = liang.seen_by("energy"), liang.seen_by("radius")
-    assert liang.seen_by("radial") == profile
-    assert liang.seen_by("share") == inverse
-    assert profile + inverse == liang.constant_names()

@@ -136,7 +136,7 @@ def test_types_and_slopes(name):
     np.testing.assert_allclose(slopes * back, 1.0, rtol=1e-8)
 
 
-def test_chiangs_error_and_ends():
+def test_errors_and_ends_of_printed_maps():
     """0.007 in alpha under diffuse light, and 0.005 in A at these albedos; nothing maps beyond 0.9989."""
     assert np.max(np.abs(CHIANG.alpha(EXACT) - ALPHA)) == pytest.approx(0.0069, abs=2e-4)
     assert np.max(np.abs(CHIANG.reflectance(ALPHA) - EXACT)) == pytest.approx(0.0047, abs=1e-4)
@@ -149,16 +149,23 @@ def test_chiangs_error_and_ends():
     for constants in ((-3.0, 0.0, 0.0), (-3.0, 2.0, -1.0)):
         law = Chiang(DIFFUSE, *constants)
         np.testing.assert_allclose(law.reflectance(law.alpha(even)), even, rtol=0, atol=1e-13)
-
-
-def test_van_de_hulsts_error_and_ends():
-    """0.0021 in A under diffuse light, near A = 0.18."""
+    # 0.0021 in A under diffuse light, near A = 0.18.
     error = np.abs(VAN_DE_HULST.reflectance(ALPHA) - EXACT)
     assert 0.0019 < error.max() < 0.0021
     assert ALPHA[error.argmax()] in (0.5, 0.6)
     assert VAN_DE_HULST.reflectance(0.0) == 0.0
     assert VAN_DE_HULST.reflectance(1.0) == pytest.approx(1.0, abs=2e-5)
     assert VAN_DE_HULST.alpha([0.0, 1.0]) == pytest.approx([0.0, 1.0], abs=6e-6)
+    # Its inverse is the rising branch; above the peak there is no reflectance.
+    assert LIANG.alpha(0.0) == LIANG.reflectance(0.0) == 0.0
+    assert LIANG.fold == pytest.approx(0.9165, abs=5e-5)
+    near = LIANG.alpha(LIANG.fold + np.array([-1e-3, 0.0, 1e-3]))
+    assert near[1] > max(near[0], near[2])
+    assert near[1] == pytest.approx(0.99947, abs=5e-6)
+    # 0.84 / 1 on the one side and 1 on the other: two reflectances, one albedo.
+    assert LIANG.alpha(0.84) == pytest.approx(LIANG.alpha(1.0), rel=1e-15)
+    assert LIANG.alpha(1.0) == pytest.approx(5.67 / 5.68, rel=1e-15)
+    np.testing.assert_array_equal(np.isnan(LIANG.reflectance([0.9994, 0.9995, 1.0])), [False, True, True])
 
 
 @pytest.mark.slow
@@ -171,19 +178,6 @@ def test_errors_of_printed_maps_everywhere():
     assert other.monotone
     # Negative control: it is not meant for a searchlight.
     assert albedo_quality(VanDeHulst(Setting(), **VAN_DE_HULST.constants())).delta_A > 0.06
-
-
-def test_liangs_map_folds_at_the_root_of_w():
-    """Its inverse is the rising branch; above the peak there is no reflectance."""
-    assert LIANG.alpha(0.0) == LIANG.reflectance(0.0) == 0.0
-    assert LIANG.fold == pytest.approx(0.9165, abs=5e-5)
-    near = LIANG.alpha(LIANG.fold + np.array([-1e-3, 0.0, 1e-3]))
-    assert near[1] > max(near[0], near[2])
-    assert near[1] == pytest.approx(0.99947, abs=5e-6)
-    # 0.84 / 1 on the one side and 1 on the other: two reflectances, one albedo.
-    assert LIANG.alpha(0.84) == pytest.approx(LIANG.alpha(1.0), rel=1e-15)
-    assert LIANG.alpha(1.0) == pytest.approx(5.67 / 5.68, rel=1e-15)
-    np.testing.assert_array_equal(np.isnan(LIANG.reflectance([0.9994, 0.9995, 1.0])), [False, True, True])
 
 
 @pytest.mark.parametrize("constants", [(0.45058, 2.35857, 1.36799), (0.5, 2.0, 1.0), (-0.2, 0.3, 0.1)])

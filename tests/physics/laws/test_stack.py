@@ -106,9 +106,6 @@ def test_it_is_a_value_between_its_ends():
     with jax.enable_x64(True):
         slope = jax.grad(lambda d: law.total(d))(jax.numpy.asarray(0.1))
     assert float(slope) == pytest.approx((law.total(0.1 + 1e-6) - law.total(0.1 - 1e-6)) / 2e-6, rel=1e-6)
-
-
-def test_one_layer_is_its_half_space():
     law = stack_law(half_space(0.9, mfp=0.5, n=1.3), "diffuse")
     known = profilefit.load("hazard", setting=Setting("diffuse", n=1.3))
     np.testing.assert_allclose(law.profile(R), known.profile(R, 0.9, 0.5), rtol=1e-12)
