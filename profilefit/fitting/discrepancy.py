@@ -164,9 +164,8 @@ def of_residuals(data: Residuals) -> Discrepancy:
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    theta, curved, worth, converged = likeliest(
-        begin, limits, (apart(u, u), apart(s, s), y, unit_columns(slope), noise)
-    )
+    given = apart(u, u), apart(s, s), y, unit_columns(slope), noise
+    theta, curved, worth, converged = likeliest(begin, limits, given)
     amplitude, length_u, length_s = map(float, np.exp(theta))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = (matern(apart(x, x) / length) for x, length in ((data.u, length_u), (data.s, length_s)))
@@ -455,9 +454,8 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.discrepancy is not None:
-        spread = known.discrepancy.law_covariance(
-            0.0 * albedos, known.discrepancy.places(albedos, known.law.setting), slope[:, 0] / energy
-        )
+        places = known.discrepancy.places(albedos, known.law.setting)
+        spread = known.discrepancy.law_covariance(0.0 * albedos, places, slope[:, 0] / energy)
         model = value * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 

@@ -29,7 +29,7 @@ NEAREST, FARTHEST = -25.0, 40.0
 # A bracket of 65 halved so often is 6e-5 wide, and Newton squares what is left.
 HALVINGS, NEWTON_STEPS = 20, 3
 # What the texts of dipoles rest on, and what completes them.
-TEXT_PARTS, TEXT_ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
+PARTS, ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
 
 
 class DiffusionSampler(Sampler):
@@ -241,7 +241,7 @@ class Dipole(DiffusionLaw):
     translucent materials, SIGGRAPH 2002, eq. 5.
     """
 
-    entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS))
+    entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", PARTS, ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:
         """Return the share of the light that enters [-], and the height of the image [mfp]."""
@@ -291,9 +291,7 @@ class BetterDipole(DiffusionLaw):
     better dipole model, Pixar Technical Memo 12-11, 2012.
     """
 
-    entry = Entry(
-        "better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS)
-    )
+    entry = Entry("better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", PARTS, ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:
         """Return the share of light that enters, both factors of exitance, and the image's height over D less 1 [-]."""

@@ -17,14 +17,7 @@ from mcml_sim.exact.light import reduced, unreduced
 from profilefit.laws.base import CLAMPS, CLOSED, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
-from profilefit.laws.refracting_rational import (
-    COSINES,
-    INDICES,
-    REFRACTING,
-    FoldedRational,
-    ForwardRational,
-    RefractingRational,
-)
+from profilefit.laws.refracting_rational import COSINES, INDICES, REFRACTING, FoldedRational
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there
@@ -218,9 +211,8 @@ def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int)
     bend = 1.0 + g * jnp.sqrt(t)
     once = 1.0 + ONCE * t
     length = jnp.where(is_once, t * once, jnp.sqrt(t * (t + 2.0 * d)) * stretch)
-    x = length / jnp.where(
-        is_once, first.kappa * once + (first.source - first.kappa), (rest.kappa * stretch + slowest) * bend
-    )
+    again = (rest.kappa * stretch + slowest) * bend
+    x = length / jnp.where(is_once, first.kappa * once + (first.source - first.kappa), again)
     shape = jax.tree.map(lambda one, other: jnp.where(is_once, one, other), first, rest)
     for _ in range(steps):
         near = jnp.clip(x, NEAREST, FARTHEST)
@@ -273,7 +265,6 @@ class RefractingHazard(TwoPartHazard):
     map to A (held fixed). Two exponentials and two logarithms a profile.
     """
 
-    albedo: RefractingRational = eqx.field(static=True)
     __annotations__ |= dict.fromkeys(IN_RHO, "float")
     once_h: float
     once_a0: float
@@ -347,8 +338,7 @@ class ForwardHazard(TwoPartHazard):
     .95, alpha in [0, 1] and r in [0, inf]; at one n and g they come to 15. kappa is that of isotropic light.
     """
 
-    albedo: ForwardRational = eqx.field(static=True)
-    __annotations__ |= {f"{name}{term}": "float" for name in SHAPES for term in "0gn"}
+    __annotations__ = {f"{name}{term}": "float" for name in SHAPES for term in "0gn"}
     entry = replace(
         ENTRY,
         start={f"{name}{term}": k for name, row in STARTS.items() for term, k in zip("0gn", row, strict=True)},

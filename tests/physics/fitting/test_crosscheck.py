@@ -13,16 +13,8 @@ from mcml_sim import Grid, Setting, exact, simulate_orders
 from profilefit import load
 from profilefit.fitting.estimate import fit, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.checks import (
-    AGREE,
-    DIFFER,
-    by_width,
-    compared,
-    crosscheck,
-    discretisation_error,
-    mahalanobis,
-    widened,
-)
+from profilefit.recipes import checks
+from profilefit.recipes.checks import AGREE, DIFFER, by_width, compared, crosscheck, mahalanobis, widened
 
 pytestmark = pytest.mark.slow
 
@@ -49,24 +41,21 @@ def exactly(toy, tallies):
     """The toy's energies without noise, and a fit to them that is no truth: h alone, k 2 % too large."""
     energy = tallies.energy(tallies.chance.reshape(tallies.edges.size - 1, -1) * tallies.photons)
     none = np.zeros_like(energy)
-    profiles = replace(
-        tallies.profiles(tallies.draw(1, 1)[0]), energy=energy, standard_error=none, source="exact", covariance=None
-    )
+    photons = tallies.profiles(tallies.draw(1, 1)[0])
+    profiles = replace(photons, energy=energy, standard_error=none, source="exact", covariance=None)
     return fit(profiles, replace(toy, q=0.52), free=FREE)
 
 
 def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
     """chi2 of 60 runs of photons is chi2 of two degrees of freedom, for a law that is not the truth too."""
-    counts = tallies.draw(7, 60)
-    checks = [
-        compared(exactly, fit(tallies.profiles(one), exactly.law, free=FREE), tallies.photons, 0, 0) for one in counts
-    ]
-    distances = np.array([check["chi2"] for check in checks])
-    assert {check["rank"] for check in checks} == {2}
+    found = [fit(tallies.profiles(one), exactly.law, free=FREE) for one in tallies.draw(7, 60)]
+    told = [compared(exactly, one, tallies.photons, 0, 0) for one in found]
+    distances = np.array([check["chi2"] for check in told])
+    assert {check["rank"] for check in told} == {2}
     assert kstest(distances, chi2(2).cdf).pvalue > 1e-3
     assert kstest(1.5 * distances, chi2(2).cdf).pvalue < kstest(distances, chi2(2).cdf).pvalue
-    assert sum(check["result"] == AGREE for check in checks) >= 58
-    np.testing.assert_allclose(checks[0]["chance"], chi2.sf(distances[0], 2))
+    assert sum(check["result"] == AGREE for check in told) >= 58
+    np.testing.assert_allclose(told[0]["chance"], chi2.sf(distances[0], 2))
 
 
 def test_photons_of_another_truth_differ_and_a_failed_fit_is_told(toy, tallies, exactly):
@@ -96,9 +85,8 @@ ALPHA = np.array([0.2, 0.5, 0.8, 0.9, 0.97, 0.99999])
 def map_pair(normalisation):
     """A fit of the map to the exact reflectance, and that reflectance."""
     none, total = np.zeros((ALPHA.size, 1)), np.asarray(exact.reflectance(ALPHA))
-    profiles = Profiles(
-        ALPHA, np.array([0.0, 30.0]), total[:, None], none, none + np.inf, none[:, 0], "exact", Setting()
-    )
+    edges, noise = np.array([0.0, 30.0]), (none, none + np.inf)
+    profiles = Profiles(ALPHA, edges, total[:, None], *noise, none[:, 0], "exact", Setting())
     return fit(profiles, normalisation, "reflectance", free=("b", "c")), profiles
 
 
@@ -160,11 +148,11 @@ def test_middles_are_wrong_by_the_square_of_the_width_and_integrals_by_next_to_n
     by_square = [(moved[k] - moved[1]) / (k**2 - 1) for k in (2, 3)]
     np.testing.assert_allclose(by_square[0], by_square[1], rtol=0.2)
     # What it says is what it is, to a fourth: terms beyond the square, of the rings next to the source.
-    np.testing.assert_allclose(discretisation_error(one), np.abs(off), rtol=0.25)
+    np.testing.assert_allclose(checks.discretisation_error(one), np.abs(off), rtol=0.25)
     assert np.all(np.abs(off / true) > 1e-6)
     one = fits["energy"]
     np.testing.assert_allclose(one.solution.parameters, liang.vector(TWO), rtol=1e-6)
-    assert np.all(discretisation_error(one) < 1e-3 * discretisation_error(fits["radial"]))
+    assert np.all(checks.discretisation_error(one) < 1e-3 * checks.discretisation_error(fits["radial"]))
 
 
 def test_wide_rings_are_the_sums_of_narrow_ones(fits, white_run, normalisation):
@@ -189,4 +177,4 @@ def test_wide_rings_are_the_sums_of_narrow_ones(fits, white_run, normalisation):
     assert kept.sum() == 12 * 7 - 1
     assert kept[2, 2] == 0.0
     one = fit(Profiles.from_orders(white_run.merged([0.0, white_run.grid.r_edges[-1]]), FEW), normalisation)
-    np.testing.assert_array_equal(discretisation_error(one), np.zeros(3))
+    np.testing.assert_array_equal(checks.discretisation_error(one), np.zeros(3))

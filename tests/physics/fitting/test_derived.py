@@ -54,12 +54,8 @@ def test_statistical_errors_are_those_of_moved_constants(known):
         step = np.zeros(4)
         step[i] = 1e-4 * theta[i]
         up, down = (known.law.with_vector(FREE, theta + sign * step) for sign in (1, -1))
-        slopes["radius"].append(
-            (float(up.sampler.sample(0.9, alpha)) - float(down.sampler.sample(0.9, alpha))) / (2 * step[i])
-        )
-        slopes["profile"].append(
-            (np.asarray(up.profile(r, alpha)) - np.asarray(down.profile(r, alpha))) / (2 * step[i])
-        )
+        slopes["radius"].append((up.sampler.sample(0.9, alpha) - down.sampler.sample(0.9, alpha)) / (2 * step[i]))
+        slopes["profile"].append((up.profile(r, alpha) - down.profile(r, alpha)) / (2 * step[i]))
     sigma = np.sqrt(np.diag(known.statistical))
     radius = np.linalg.norm(np.array(slopes["radius"]) * sigma)
     assert derived.radius(known, alpha, 0.9).statistical[0] == pytest.approx(radius, rel=3e-2)

@@ -25,9 +25,8 @@ def refits(tallies, law, free, seed=5):
     start = fit(tallies.profiles(tallies.draw(0, 1)[0]), law, free=free)
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (REPLICATES, *np.shape(leaf))), (law, start.rings))
     data = eqx.tree_at(lambda tree: tree[1].energy, data, energy)
-    found = solve_batch(
-        ResidualFunction("energy", start.free), np.tile(start.solution.parameters, (REPLICATES, 1)), data
-    )
+    starts = np.tile(start.solution.parameters, (REPLICATES, 1))
+    found = solve_batch(ResidualFunction("energy", start.free), starts, data)
     assert all(one.converged for one in found)
     return start, np.stack([one.parameters for one in found])
 

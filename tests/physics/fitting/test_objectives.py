@@ -77,9 +77,8 @@ def test_radial_vanishes_on_the_formula_and_share_knows_the_negative_branch(lian
     raised = made(2 * np.pi * width * (curve + 0.01), np.zeros(3), used=used)
     np.testing.assert_allclose(np.hstack(objectives.radial(liang, raised)), -0.01 * used, atol=1e-15)
     # g(xi) < 0 for xi < eps: its share is minus the cdf of |g|, so the fit is told of the sign.
-    rings = made(
-        np.full((1, 2), 0.5), np.zeros(1), edges=np.array([0, 1.0, 2.0]), alpha=ALPHAS[:1], xi=np.array([0.004])
-    )
+    xi, edges = np.array([0.004]), np.array([0, 1.0, 2.0])
+    rings = made(np.full((1, 2), 0.5), np.zeros(1), edges=edges, alpha=ALPHAS[:1], xi=xi)
     g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
     assert g < 0
     assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
@@ -117,10 +116,8 @@ def test_radius_and_share_vanish_on_the_samplers_own_cdf_and_have_their_units(li
 
 def _law(name, liang, normalisation):
     """One that the objective is of."""
-    maps = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84)} | dict.fromkeys(
-        ("reflectance", "relative_reflectance"), normalisation
-    )
-    return maps.get(name, liang)
+    maps = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}
+    return maps.get(name.removeprefix("relative_"), liang)
 
 
 @pytest.mark.parametrize("name", OBJECTIVES)

@@ -120,9 +120,8 @@ def test_maps_are_measured_against_the_exact_one_and_folds_are_told(normalisatio
         def reflectance(self, alpha):
             return exact.reflectance(alpha)
 
-    expected = np.max(
-        exact.reflectance(np.linspace(0, 1, 400), Setting("diffuse")) - exact.reflectance(np.linspace(0, 1, 400))
-    )
+    even = np.linspace(0, 1, 400)
+    expected = np.max(exact.reflectance(even, Setting("diffuse")) - exact.reflectance(even))
     assert albedo_quality(Mistaken(Setting("diffuse"))).delta_A == pytest.approx(expected, rel=1e-3)
 
     # A map that is NaN everywhere errs by 1 - A, not by nothing.

@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from benchmarks.refits import (
-    LEVELS,
-    Bootstrap,
-    binomial_band,
-    bootstrap,
-    counted,
-    coverage,
-    drawn_noise,
-    energies,
-    refits,
-)
+from benchmarks import refits as module
+from benchmarks.refits import LEVELS, Bootstrap, binomial_band, bootstrap, counted, coverage, drawn_noise, refits
 from mcml_sim import Grid, InputError, Setting, simulate_orders
 from profilefit.fitting.chains import posterior
 from profilefit.fitting.estimate import fit
@@ -166,7 +157,7 @@ def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     # Negative control: the misfit taken for noise is another number.
     wrong = np.sqrt(np.diag(one.misfit) / BATCHES)
     assert np.all(np.abs(found.standard_error / wrong - 1.0) > 0.45)
-    found = energies(batches, one)
+    found = module.energies(batches, one)
     assert found.shape == (BATCHES, ALPHA.size, 2)
     np.testing.assert_allclose(found[3].sum(axis=1), batches[3].reflectance(ALPHA).value, rtol=1e-12)
 

@@ -5,18 +5,8 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from profilefit.fitting.solver import (
-    CONVERGED,
-    MAX_STEPS,
-    NOT_FINITE,
-    Solution,
-    covariance,
-    differences,
-    least_squares,
-    minimise,
-    solve,
-    solve_batch,
-)
+from profilefit.fitting import solver
+from profilefit.fitting.solver import Solution, covariance, differences, least_squares, minimise, solve, solve_batch
 
 X = np.linspace(0, 3, 20)
 
@@ -34,7 +24,7 @@ def test_known_parameters_come_back_whatever_scale_start_and_precision():
     found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-9)  # the solver's own tolerance is 1e-10
     assert found.converged
-    assert found.result == CONVERGED == "converged"
+    assert found.result == solver.CONVERGED == "converged"
     assert found.cost < 1e-18
     assert 0 < found.steps < 50
     # Constants that differ by ten decades are found as well as equal ones: they are scaled by their start.
@@ -73,18 +63,20 @@ def test_a_linear_problem_is_lstsq():
 def test_failures_are_results():
     found = least_squares(lambda p, _: jnp.exp(-p), [1.0], None)  # falls for ever
     assert not found.converged
-    expected = f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
-    assert (found.result, found.steps) == (expected, MAX_STEPS)
+    expected = (
+        f"no convergence in {solver.MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
+    )
+    assert (found.result, found.steps) == (expected, solver.MAX_STEPS)
     good, bad = solve_batch(lambda p, d: jnp.log(p) - d, [[1.0], [-1.0]], np.array([[0.5], [0.5]]))
     assert good.converged
     assert good.parameters[0] == pytest.approx(np.exp(0.5), rel=1e-8)
     assert "not finite" in bad.result
     found = solve(lambda p: (np.full(3, np.nan), np.ones((3, 1))), np.ones(1))
-    assert (found.result, found.steps) == (NOT_FINITE, 1)
+    assert (found.result, found.steps) == (solver.NOT_FINITE, 1)
 
 
 def solution(jacobian):
-    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
+    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, solver.CONVERGED)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e8])

@@ -30,10 +30,8 @@ def curve_profiles(law, scale=1.0, covariance=None):
     r = 0.5 * (edges[1:] + edges[:-1])
     y = (a * r + b) / (r + c)  # below zero past r_max, where the last stride of (6) may end
     energy = y / r * np.pi * np.diff(edges**2)
-    none = np.zeros_like(energy)
-    return Profiles(
-        ALPHAS, edges / scale, energy, none, none + np.inf, np.zeros(9), "made", Setting(), 10**6, covariance
-    )
+    noise, rest = (np.zeros_like(energy), np.full_like(energy, np.inf)), np.zeros(9)
+    return Profiles(ALPHAS, edges / scale, energy, *noise, rest, "made", Setting(), 10**6, covariance)
 
 
 @pytest.fixture(scope="module")

@@ -6,17 +6,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.light import unreduced
-from profilefit.convert import (
-    BY_NAME,
-    ENGINES,
-    LENGTHS,
-    Optical,
-    alpha_of,
-    colour,
-    engine,
-    lengths,
-    reflectance_of,
-)
+from profilefit.convert import BY_NAME, ENGINES, LENGTHS, Optical, alpha_of, colour, engine, lengths, reflectance_of
 from profilefit.errors import InputError, SettingError
 from tests.fixtures import slow
 

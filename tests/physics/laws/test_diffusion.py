@@ -12,16 +12,8 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from profilefit.errors import SettingError
 from profilefit.fitting.quality import profile_quality
-from profilefit.laws.diffusion import (
-    BeamDiffusion,
-    BetterDipole,
-    Dipole,
-    diffuse_fresnel,
-    exitance_factors,
-    fresnel_moments,
-    grosjean,
-    once_scattered_within,
-)
+from profilefit.laws import diffusion as laws
+from profilefit.laws.diffusion import BeamDiffusion, BetterDipole, Dipole, diffuse_fresnel, fresnel_moments
 from profilefit.materials import BY_NAME
 
 # Shares are closed in the dipoles; the beam's are quadrature, to 5e-9.
@@ -57,10 +49,10 @@ def test_moments_are_the_printed_fits(n):
 
 def test_moments_and_diffusion_at_their_ends():
     assert fresnel_moments(1.0) == pytest.approx((0.0, 0.0), abs=1e-14)
-    assert exitance_factors(1.0) == pytest.approx((0.25, 0.5, 1.0), abs=1e-14)
+    assert laws.exitance_factors(1.0) == pytest.approx((0.25, 0.5, 1.0), abs=1e-14)
     # D = 2/3 and sigma = sqrt(3/2) where all is absorbed, 1/3 and 0 where nothing is.
     with jax.enable_x64(True):
-        diffusion, sigma = grosjean(jnp.array([0.0, 1.0]))
+        diffusion, sigma = laws.grosjean(jnp.array([0.0, 1.0]))
     np.testing.assert_allclose(diffusion, [2 / 3, 1 / 3])
     np.testing.assert_allclose(sigma, [1.5**0.5, 0.0])
 
@@ -271,9 +263,11 @@ def test_single_scattering_is_the_simulators(n):
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 20, 30)])
     within = np.cumsum(single_scattering.ring_shares(edges, Setting(n=n))[:-1])
     with jax.enable_x64(True):
-        np.testing.assert_allclose(once_scattered_within(jnp.asarray(edges[1:]), n), within, rtol=1e-12)
+        np.testing.assert_allclose(laws.once_scattered_within(jnp.asarray(edges[1:]), n), within, rtol=1e-12)
         if n == 1.0:  # all of it, by hand: int mu / (1 + mu) dmu / 2
-            assert float(once_scattered_within(jnp.asarray(1e12), n)) == pytest.approx((1 - math.log(2)) / 2, rel=1e-10)
+            assert float(laws.once_scattered_within(jnp.asarray(1e12), n)) == pytest.approx(
+                (1 - math.log(2)) / 2, rel=1e-10
+            )
 
 
 def test_source_and_total():

@@ -110,9 +110,8 @@ def test_cdf_is_the_inverse_of_the_map_and_pdf_its_slope(law):
     alpha = ALBEDOS[:, None]
     np.testing.assert_allclose(law.cdf(law.sampler.sample(xi, alpha), alpha), xi + 0 * alpha, rtol=0, atol=2e-14)
     xi, step, alpha = np.linspace(0.01, 0.99, 25), 1e-5, np.array([[0.0], [0.5], [0.95], [1.0]])
-    low, here, high, end = np.split(
-        law.sampler.sample([*(xi - step), *xi, *(xi + step), 0.999], alpha), [25, 50, 75], 1
-    )
+    radii = law.sampler.sample([*(xi - step), *xi, *(xi + step), 0.999], alpha)
+    low, here, high, end = np.split(radii, [25, 50, 75], 1)
     nodes, weights = np.polynomial.legendre.leggauss(200)
     u = 0.5 * (nodes + 1)  # x = end u^3: dense at the source
     x = np.concatenate([here, end * u**3], axis=1)
