@@ -48,6 +48,13 @@ def sidak():
     return lambda m: float(norm.isf((1 - (1 - 1e-3) ** (1 / m)) / 2))
 
 
+def whitened(values, covariance, number):
+    """z (p, p) of a sample covariance of so many values about the identity, where `covariance` is 1 (Wishart)."""
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    sample, one = np.cov(values @ root.T, rowvar=False), np.eye(len(covariance))
+    return (sample - one) / np.sqrt((1 + one) / number)
+
+
 @pytest.fixture
 def x64():
     """Double precision for tests that call jax themselves."""

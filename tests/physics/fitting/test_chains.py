@@ -14,7 +14,7 @@ from profilefit.errors import InputError
 from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Covariance, Profiles
-from tests.fixtures import Line
+from tests.fixtures import Line, whitened
 
 pytestmark = pytest.mark.slow
 
@@ -45,13 +45,6 @@ def test_one_constant_has_a_chain_too():
     assert np.std(found.samples) == pytest.approx(np.sqrt(one.misfit[0, 0]), rel=0.1)
 
 
-def whitened(samples, covariance):
-    """z of the sample covariance about the identity, where `covariance` is 1."""
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    sample = np.cov(samples @ root.T, rowvar=False)
-    return (sample - np.eye(len(sample))) / np.sqrt((1 + np.eye(len(sample))) / INDEPENDENT)
-
-
 @pytest.mark.parametrize("kind", ["statistical", "misfit"])
 def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     found = posterior(line_fit, kind, seed=1, max_steps=4000)
@@ -60,13 +53,13 @@ def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     assert found.steps >= 50 * found.tau
     assert found.kind == kind
     assert found.names == ("u", "v")
-    assert np.abs(whitened(found.samples, expected)).max() < sidak(3)
+    assert np.abs(whitened(found.samples, expected, INDEPENDENT)).max() < sidak(3)
     z = (found.samples.mean(axis=0) - line_fit.solution.parameters) / np.sqrt(np.diag(expected) / INDEPENDENT)
     assert np.abs(z).max() < sidak(2)
     # Negative control: the other kind's covariance is not this one.
     other = line_fit.misfit if kind == "statistical" else line_fit.statistical
-    assert np.abs(whitened(found.samples, other)).max() > 3 * sidak(3)
-    assert np.abs(whitened(found.samples, 2 * expected)).max() > 1.5 * sidak(3)
+    assert np.abs(whitened(found.samples, other, INDEPENDENT)).max() > 3 * sidak(3)
+    assert np.abs(whitened(found.samples, 2 * expected, INDEPENDENT)).max() > 1.5 * sidak(3)
 
 
 def test_intervals_and_deviations_are_those_of_a_normal(line_fit):

@@ -14,7 +14,7 @@ from profilefit.fitting.estimate import ResidualFunction, fit, followed, residua
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import least_squares, solve_batch
 from profilefit.laws.printed_maps import LiangAlbedo
-from tests.fixtures import Line
+from tests.fixtures import Line, whitened
 
 REPLICATES = 200
 
@@ -39,14 +39,6 @@ def spread(values, covariance):
     return 2 * min(chi2.cdf(statistic, freedom), chi2.sf(statistic, freedom))
 
 
-def whitened(values, covariance):
-    """z (p, p) of the sample covariance about the identity, in units where `covariance` is 1 (Wishart)."""
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    sample = np.cov(values @ root.T, rowvar=False)
-    size = len(sample)
-    return (sample - np.eye(size)) / np.sqrt((1 + np.eye(size)) / (len(values) - 1))
-
-
 # Photon noise
 
 
@@ -56,7 +48,7 @@ def test_constants_scatter_as_predicted(tallies, toy, sidak):
     one, scattered = refits(tallies, toy, None)
     assert one.free == ("k", "h", "q")
     assert spread(scattered, one.statistical) > 1e-3
-    assert np.abs(whitened(scattered, one.statistical)).max() < sidak(6)
+    assert np.abs(whitened(scattered, one.statistical, REPLICATES - 1)).max() < sidak(6)
     # A fit of the truth has no bias: 4 standard errors of the mean of 200, for three constants.
     z = (scattered.mean(axis=0) - [1.0, 0.5, 0.5]) / np.sqrt(np.diag(one.statistical) / REPLICATES)
     assert np.abs(z).max() < 4
@@ -70,7 +62,7 @@ def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sida
     one, scattered = refits(tallies, burley, ("s0", "s1", "s2"))
     assert one.structure.rms > 0.02
     assert spread(scattered, one.statistical) > 1e-3
-    assert np.abs(whitened(scattered, one.statistical)).max() < sidak(6)
+    assert np.abs(whitened(scattered, one.statistical, REPLICATES - 1)).max() < sidak(6)
     # The misfit taken for noise is another question, and no answer to this one.
     assert spread(scattered, one.misfit) < 1e-20
 

@@ -127,8 +127,8 @@ def dense_covariance():
     for a, i, b, j in np.ndindex(2, 3, 2, 3):
         same = np.sum(weights[a] * weights[b] * counts[i]) / photons if i == j else 0.0
         dense[a, i, b, j] = (same - energy[a, i] * energy[b, j]) / (photons - 1)
-    factor = np.stack([_root(dense[:, i, :, i]) for i in range(3)])
-    return Covariance(factor, energy, photons, 0.0), dense
+    value, vector = np.linalg.eigh(np.stack([dense[:, i, :, i] for i in range(3)]))
+    return Covariance(vector * np.sqrt(np.maximum(value, 0.0))[:, None], energy, photons, 0.0), dense
 
 
 def test_draws_scatter_as_the_sandwich_where_many_rings_hold_few_photons(white_run):
@@ -155,11 +155,6 @@ def test_rank_eight_loses_nothing_of_a_sum_and_rank_four_does(white_run):
     assert dropped[8] < 1e-3 < 1e-2 < dropped[4]
     np.testing.assert_allclose(errors[8] / errors[20], 1.0, atol=1e-3)
     assert np.max(np.abs(errors[4] / errors[20] - 1.0)) > 1e-3
-
-
-def _root(matrix):
-    value, vector = np.linalg.eigh(matrix)
-    return vector * np.sqrt(np.maximum(value, 0.0))
 
 
 def test_sandwich_is_the_scatter_of_synthetic_tallies(tallies, sidak):

@@ -171,24 +171,18 @@ def test_the_paper_s_clip_is_an_atom_and_loses_light(liang):
 # By random numbers
 
 
-def weights(sampler, target, number, seed):
-    """Weights by the sampler's own density and by the law's, and the share of each circle beyond the edge."""
-    xi = np.random.default_rng(seed).random(number) * -np.expm1(-sampling.LAST)
-    x = in_batches(lambda part: sampler.sample(part, ALPHA), xi)
-    light, density = target.density(x, ALPHA), in_batches(lambda part: sampler.pdf(part, ALPHA), x)
-    own = np.divide(light, density, out=np.zeros_like(x), where=density > 0)  # an atom has no density
-    law = LawTarget(sampler.law).density(x, ALPHA)
-    return own, np.divide(light, law, out=np.ones_like(x), where=density > 0), lit_beyond_edge(x, 1.0)
-
-
 @pytest.mark.parametrize("name", ["approximate", pytest.param("paper", marks=pytest.mark.slow)])
 def test_means_and_variance_against_random_numbers(name, burley, liang, sidak):
     """Twenty thousand draws, seed 5; three means and a variance to 1e-3 together, by Sidak."""
     sampler = Stretched(burley, 1.1) if name == "approximate" else liang.sampler
     target = LawTarget(sampler.law)
     found = sampler_quality(sampler, ALPHA)
-    own, by_law, lit = weights(sampler, target, 40 * BATCH, 5)
-    light = edge_light(target, ALPHA, 1.0)
+    xi = np.random.default_rng(5).random(40 * BATCH) * -np.expm1(-sampling.LAST)
+    x = in_batches(lambda part: sampler.sample(part, ALPHA), xi)
+    light, density = target.density(x, ALPHA), in_batches(lambda part: sampler.pdf(part, ALPHA), x)
+    own = np.divide(light, density, out=np.zeros_like(x), where=density > 0)  # an atom has no density
+    by_law = np.divide(light, LawTarget(sampler.law).density(x, ALPHA), out=np.ones_like(x), where=density > 0)
+    lit, light = lit_beyond_edge(x, 1.0), edge_light(target, ALPHA, 1.0)
     squares = (own - own.mean()) ** 2
     pairs = [
         (own, 1 + found.bias[0]),

@@ -39,7 +39,7 @@ def test_reflectance_there_and_back_under_a_surface(light, n):
         alpha_of(1.0, light, n)
 
 
-def test_the_albedo_by_bisection():
+def test_albedos_by_bisection_and_anisotropic_colours():
     """The plainest inverse there is."""
     low, high = 0.0, 1.0
     for _ in range(60):
@@ -47,6 +47,13 @@ def test_the_albedo_by_bisection():
         low, high = (middle, high) if exact.reflectance(middle, Setting("diffuse")) < 0.7 else (low, middle)
     assert alpha_of(0.7, "diffuse") == pytest.approx(low, rel=1e-14)
     assert alpha_of(0.7, "searchlight") > low + 0.005, "the same A is another medium under another light"
+    setting = Setting("diffuse", 1.4, 0.8)
+    expected = exact.reflectance(unreduced(0.9, 0.8), setting)
+    assert reflectance_of(0.9, "diffuse", 1.4, 0.8) == pytest.approx(expected, rel=1e-12)
+    assert alpha_of(expected, "diffuse", 1.4, 0.8) == pytest.approx(0.9, rel=1e-9)
+    assert reflectance_of(0.9, "diffuse", 1.0, 0.8) == reflectance_of(0.9, "diffuse")
+    with pytest.raises(SettingError, match="exact light needs n >= 1"):
+        reflectance_of(0.9, "diffuse", 1.6, 0.8)
 
 
 # Lengths
@@ -317,16 +324,6 @@ def test_reflectance_by_cosine_sums_to_the_exact_one(light):
     mu, weight = (np.ones(1), np.ones(1)) if light == "searchlight" else (0.5 * (x + 1), 0.5 * w * (x + 1))
     shares = colour.reflectance_by_cosine(alpha, mu) @ weight
     np.testing.assert_allclose(shares, reflectance_of(alpha, light), atol=1e-10)
-
-
-def test_anisotropic_colours_are_exact_where_they_are_solved_and_similar_else():
-    setting = Setting("diffuse", 1.4, 0.8)
-    expected = exact.reflectance(unreduced(0.9, 0.8), setting)
-    assert reflectance_of(0.9, "diffuse", 1.4, 0.8) == pytest.approx(expected, rel=1e-12)
-    assert alpha_of(expected, "diffuse", 1.4, 0.8) == pytest.approx(0.9, rel=1e-9)
-    assert reflectance_of(0.9, "diffuse", 1.0, 0.8) == reflectance_of(0.9, "diffuse")
-    with pytest.raises(SettingError, match="exact light needs n >= 1"):
-        reflectance_of(0.9, "diffuse", 1.6, 0.8)
 
 
 # Input
