@@ -278,8 +278,10 @@ def solve(
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
         least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
+        if ended or steps >= most:
+            break
         change = best[2] @ ((aimed - y) * scale)  # of the residuals, by the linear model
-        if ended or steps >= most or -float(change @ (2.0 * best[1] + change)) < least:
+        if -float(change @ (2.0 * best[1] + change)) < least:
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
