@@ -51,8 +51,7 @@ def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     expected = getattr(line_fit, kind)
     assert found.result == "converged"
     assert found.steps >= 50 * found.tau
-    assert found.kind == kind
-    assert found.names == ("u", "v")
+    assert (found.kind, found.names) == (kind, ("u", "v"))
     assert np.abs(whitened(found.samples, expected, INDEPENDENT)).max() < sidak(3)
     z = (found.samples.mean(axis=0) - line_fit.solution.parameters) / np.sqrt(np.diag(expected) / INDEPENDENT)
     assert np.abs(z).max() < sidak(2)
@@ -72,8 +71,7 @@ def test_intervals_and_deviations_are_those_of_a_normal(line_fit):
     assert np.all(outer[:, 0] < inner[:, 0])
     assert np.all(inner[:, 1] < outer[:, 1])
     assert np.all((inner[:, 0] < line_fit.solution.parameters) & (line_fit.solution.parameters < inner[:, 1]))
-    assert found.walkers == 32
-    assert found.samples.shape[1] == 2
+    assert (found.walkers, found.samples.shape[1]) == (32, 2)
     assert len(found.samples) <= 1000
     assert 0.1 < found.acceptance < 0.9
 

@@ -153,8 +153,7 @@ def test_the_jackknife_by_hand(line, monkeypatch):
 def test_a_held_constant_stays_and_the_jackknife_sees_misfit_that_repeats_itself(line):
     alpha, reflectance, _ = line
     one = fit(line_profiles(reflectance, alpha), Line(Setting(), u=0.25), "reflectance", free=("v",))
-    assert one.free == ("v",)
-    assert one.law.u == 0.25
+    assert (one.free, one.law.u) == (("v",), 0.25)
     assert one.law.v == pytest.approx(alpha @ (reflectance - 0.25) / (alpha @ alpha), rel=1e-8)
     assert one.statistical is None
     # Points on a parabola: their neighbours agree, so independent noise promises too much.

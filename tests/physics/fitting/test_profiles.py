@@ -38,9 +38,7 @@ def test_exact_rings_are_differences_of_the_cdf(truth):
         np.testing.assert_allclose(truth.energy[row], np.diff(inside), rtol=1e-12, atol=1e-16)
         assert truth.reflectance[row] == pytest.approx(exact.reflectance(alpha), rel=1e-14)
         np.testing.assert_allclose(truth.cdf[row], exact.cdf(truth.r_edges, alpha), atol=1e-14)
-    assert truth.source == "exact"
-    assert truth.covariance is None
-    assert truth.photons is None
+    assert (truth.source, truth.covariance, truth.photons) == ("exact", None, None)
     assert np.all(truth.standard_error == 0)
     assert np.all(truth.trusted)
     found = Profiles.from_exact([0.5], [0.0, 1.0], Setting("diffuse"))

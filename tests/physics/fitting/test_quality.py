@@ -145,8 +145,7 @@ def test_maps_are_measured_against_the_exact_one_and_folds_are_told(normalisatio
 
 
 def test_words_and_worst_values_of_measures():
-    assert MEASURES["rel"].worst([0.1, 0.3, 0.2]) == 0.3
-    assert MEASURES["r2"].worst([0.1, 0.3, 0.2]) == 0.1
+    assert [MEASURES[name].worst([0.1, 0.3, 0.2]) for name in ("rel", "r2")] == [0.3, 0.1]
     assert MEASURES["delta_A"].worst(0.5) == 0.5
     assert MEASURES["mse"].meaning == "of r R_d [1/mfp²]"
     assert MEASURES["ks"].meaning == MEASURES["ks"].formula

@@ -149,8 +149,7 @@ def one(batches, normalisation):
 def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     """A run of all batches has the error of one over sqrt(48); 48 batches know it to a tenth."""
     found = bootstrap(batches, one, number=400, seed=1)
-    assert found.failed == 0
-    assert found.constants.shape == (400, 2)
+    assert (found.failed, found.constants.shape) == (0, (400, 2))
     ratio = found.standard_error * np.sqrt(BATCHES) / np.sqrt(np.diag(one.statistical))
     # Four of 1/sqrt(2 * 48), and 3.5 % for each of the 400 resamples' own scatter and the one batch's covariance.
     np.testing.assert_allclose(ratio, 1.0, atol=0.45)

@@ -86,9 +86,8 @@ def test_the_coefficient_laws_come_back(clean, liang):
         assert law.solution.converged, letter
         np.testing.assert_allclose(law.solution.parameters, liang.vector(law.names), rtol=1e-4)
         assert law.covariance is None
-    assert laws["a"].names == ("a1", "a2", "a3")
-    assert laws["b"].names == ("b0", "b1", "b2", "b3", "b4")
-    assert laws["c"].names == ("c1", "c2", "c3")
+    names = {"a": ("a1", "a2", "a3"), "b": ("b0", "b1", "b2", "b3", "b4"), "c": ("c1", "c2", "c3")}
+    assert {letter: law.names for letter, law in laws.items()} == names
     laws = fit_coefficient_laws(clean, liang, held=("a3",))
     assert laws["a"].names == ("a1", "a2")
     np.testing.assert_allclose(laws["a"].solution.parameters, liang.vector(("a1", "a2")), rtol=1e-4)

@@ -21,8 +21,7 @@ def start(offset=0.0):
 @pytest.mark.slow
 def test_a_normal_density_is_sampled():
     found = walk(log_density, start(), np.zeros(2), seed=1, max_steps=4000, kept=4000)
-    assert found.result == "converged"
-    assert found.samples.shape == (4000, 2)
+    assert (found.result, found.samples.shape) == ("converged", (4000, 2))
     np.testing.assert_allclose(found.log_density, log_density(found.samples))
     effective = found.walkers * found.steps / 2 / found.tau
     # The standard error of a standard deviation is 1/sqrt(2 n): four of these.

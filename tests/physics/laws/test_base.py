@@ -75,8 +75,7 @@ def test_numbers_give_numbers_and_arrays_broadcast(law):
     for value in (law.profile(1, 0.5), law.cdf(1, 0.5), law.sampler.sample(0.5, 0.5), law.sampler.pdf(1.0, 0.5)):
         assert type(value) is float
     table = law.profile([0.1, 1.0, 2.0], np.array([[0.5], [0.9]]), mfp=[1.0, 2.0, 3.0])
-    assert table.shape == (2, 3)
-    assert table.dtype == np.float64
+    assert (table.shape, table.dtype) == ((2, 3), np.float64)
     assert table[1, 2] == pytest.approx(law.profile(2.0, 0.9, 3.0), rel=1e-14)  # vector code may round otherwise
     assert law.sampler.pdf([0.1, 1.0, 2.0], [[0.5], [0.9]]).shape == (2, 3)
     outside = law.cdf([0.3, 1.0], 0.9)

@@ -93,10 +93,9 @@ def test_lengths_by_hand():
     np.testing.assert_allclose(lengths.scale_searchlight([0.3, 1.0]), [1.55 + 0.875, 0.85 + 0.056], rtol=1e-14)
     np.testing.assert_allclose(lengths.scale_diffuse([0.3, 1.0]), [1.6 + 0.875, 0.9 + 0.14], rtol=1e-14)
     np.testing.assert_allclose(lengths.scale_dmfp([0.3, 1.0]), [3.500081, 3.5 + 20.151121], rtol=1e-14)
-    medium = Optical.from_length("falloff_diffuse", 0.4, alpha_of(0.3, "diffuse"))
-    assert medium.mfp == pytest.approx(0.4 * 2.475, rel=1e-12)
-    medium = Optical.from_length("falloff_searchlight", 0.4, alpha_of(0.3, "searchlight"))
-    assert medium.mfp == pytest.approx(0.4 * 2.425, rel=1e-12)
+    for light, s in (("diffuse", 2.475), ("searchlight", 2.425)):  # a falloff is of its own light
+        medium = Optical.from_length(f"falloff_{light}", 0.4, alpha_of(0.3, light))
+        assert medium.mfp == pytest.approx(0.4 * s, rel=1e-12)
     # alpha = 0.9: 1 / sqrt(0.3), sqrt(1.1 / 0.3), and the exact one between, its artanh checked.
     medium = Optical(0.9, 1.0)
     assert medium.length("dmfp_classical") == pytest.approx(0.3**-0.5, rel=1e-14)
@@ -110,11 +109,9 @@ def test_lengths_by_hand():
     inside = (a > 0.02) & (a < 0.95)
     implied = lengths.scale_dmfp(a) / lengths.scale_searchlight(a)
     medium = Optical(alpha, 1.0)
-    off = {
-        name: np.mean(np.abs(medium.length(name) / implied - 1)[inside])
-        for name in ("dmfp", "decay_length", "dmfp_classical")
-    }
-    assert [round(100 * value) for value in off.values()] == [4, 7, 10]
+    names = "dmfp", "decay_length", "dmfp_classical"
+    off = [np.mean(np.abs(medium.length(name) / implied - 1)[inside]) for name in names]
+    assert [round(100 * value) for value in off] == [4, 7, 10]
 
 
 # Engines
@@ -133,10 +130,6 @@ def typed(name, medium, n=1.0, unit=""):
 def van_de_hulst(c, q0=9.59217):
     """s^2 = (1 - alpha) / (1 - g alpha) of colour c, as engines print it."""
     return (4.09712 + 4.20863 * c - np.sqrt(q0 + 41.6808 * c + 17.7126 * c * c)) ** 2
-
-
-def chiang(c):
-    return 1 - np.exp(c * (-5.09406 + c * (2.61188 - c * 4.31805)))
 
 
 def wrenninge(c):
@@ -174,10 +167,9 @@ def test_blender_renders_the_colours_and_edges_that_are_predicted(name):
     # Within 8 %, or 11 % at 0.8 of the two that map by Wrenninge's fit. Light enters the walk steeper than diffuse
     # light does, whose edges were fitted: dark ones come out narrower, bright ones wider. Wrenninge's alpha at 0.8,
     # 0.99175 for 0.99058, widens the edge by another 4 %.
-    engine, ratio = ENGINE[name], np.array(MEASURED[name][1])
-    radius = engine.typed_length(ALBEDO[name], np.ones(3))
+    ratio = np.array(MEASURED[name][1])
     if name in ("cycles_walk", "cycles_legacy"):
-        ratio = ratio * radius
+        ratio = ratio * engine.typed_length(alpha, np.ones(3))
     bound = [0.08, 0.08, 0.11 if name in ("cycles_legacy", "cycles_skin") else 0.08]
     assert np.all(np.abs(ratio - 1) <= bound), ratio
 
@@ -222,15 +214,15 @@ def test_engines_with_g_walk_through_the_medium(g):
 
 def test_colours_of_engines_by_hand():
     np.testing.assert_allclose([colour.wrenninge_alpha(c) for c in COLOURS], wrenninge(COLOURS), rtol=1e-14)
-    np.testing.assert_allclose(
-        colour.wrenninge_colour(np.array([0.0, 1.0])), [0.0, 0.9182], atol=1e-4
-    )  # passes 1 there
+    ends = colour.wrenninge_colour(np.array([0.0, 1.0]))
+    np.testing.assert_allclose(ends, [0.0, 0.9182], atol=1e-4)  # passes 1 there
     for g in (0.0, 0.4, 0.9):
         steps = np.diff([colour.wrenninge_alpha(c, g) for c in np.linspace(0, 1, 501)])
         assert np.all(steps > 0), "its inverse is unique"
     medium = Optical([0.3, 0.9, 0.99], 1.0)
     for name in ("cycles_walk_2", "hdrp_path_tracer", "appleseed_walk_2017"):
-        np.testing.assert_allclose(chiang(typed(name, medium)[0]), medium.alpha, rtol=1e-10)
+        c = typed(name, medium)[0]
+        np.testing.assert_allclose(1 - np.exp(c * (-5.09406 + c * (2.61188 - c * 4.31805))), medium.alpha, rtol=1e-10)
     c = typed("unreal_path_tracer", medium)[0]
     np.testing.assert_allclose(1 - np.exp(c * (-11.43 + c * (15.38 - 13.91 * c))), medium.alpha, rtol=1e-10)
     entered = reflectance_of(medium.alpha, "diffuse", 1.4) / reflectance_of(1.0, "diffuse", 1.4)
@@ -332,8 +324,7 @@ def test_reflectance_by_cosine_sums_to_the_exact_one(light):
 def test_numbers_and_lists_broadcast():
     medium = Optical([0.1, 0.5, 0.9], 2.0)
     np.testing.assert_array_equal(medium.mfp, [2.0, 2.0, 2.0])
-    assert medium.length("dmfp").shape == (3,)
-    assert Optical(0.5, 1.0).length("mfp").shape == ()
+    assert (medium.length("dmfp").shape, Optical(0.5, 1.0).length("mfp").shape) == ((3,), ())
     assert {length.colour for length in LENGTHS} == {"", "searchlight", "diffuse"}
     assert len(BY_NAME) == len(LENGTHS)
     assert len(ENGINE) == len(ENGINES) == len({engine.title for engine in ENGINES})

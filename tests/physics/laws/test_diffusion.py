@@ -19,7 +19,6 @@ from profilefit.materials import BY_NAME
 # Shares are closed in the dipoles; the beam's are quadrature, to 5e-9.
 LAWS = [(Dipole(Setting()), 1e-12), (BetterDipole(Setting(n=0.8)), 1e-12), (BeamDiffusion(Setting(n=1.4)), 1e-8)]
 NAMES = ["dipole", "better", "beam"]
-EVERY = pytest.mark.parametrize("law", [law for law, _ in LAWS], ids=NAMES)
 # The sampler is one loop over the law's own formulas: the dipole tests it, the others take seconds to compile.
 SAMPLED = pytest.mark.parametrize(
     "law", [LAWS[0][0], *(pytest.param(law, marks=pytest.mark.slow) for law, _ in LAWS[1:])], ids=NAMES
@@ -81,26 +80,20 @@ ALPHA = np.array([[0.0], [0.5], [1.0]])
 RADII = np.concatenate([[0.0], np.geomspace(1e-9, 1e9, 30), [np.inf]])
 
 
-def nodes(low, high, power):
-    """Gauss's rule on r = low + (high - low) u^power: 32 radii and weights."""
-    x, w = np.polynomial.legendre.leggauss(32)
-    u = 0.5 * (x + 1)
-    return low + (high - low) * u**power, 0.5 * w * (high - low) * power * u ** (power - 1)
-
-
 @pytest.mark.parametrize(("law", "tolerance"), [*LAWS[:2], pytest.param(*LAWS[2], marks=pytest.mark.slow)], ids=NAMES)
 def test_share_is_the_integral_of_the_profile(law, tolerance):
     edges = np.array([0.0, 0.05, 0.7, 0.999, 1.001, 2.5, 7.0, 15.0])
-    total, inside = law.reflectance(ALPHA), np.zeros((3, 1))
+    total, inside, (x, w) = law.reflectance(ALPHA), np.zeros((3, 1)), np.polynomial.legendre.leggauss(32)
     shares = law.cdf(np.resize(edges, 32), ALPHA)
     for i, (low, high) in enumerate(itertools.pairwise(edges)):
-        r, dr = nodes(low, high, 1 if low else 3)  # r ln r at the source is smooth in u
+        power, width, u = 1 if low else 3, high - low, 0.5 * (x + 1)  # r ln r at the source is smooth in u
+        r, dr = low + width * u**power, 0.5 * w * width * power * u ** (power - 1)
         inside = inside + np.sum(2 * np.pi * r * law.profile(r, ALPHA) * dr, axis=1, keepdims=True)
         np.testing.assert_allclose((shares * total)[:, i + 1], inside[:, 0], rtol=0, atol=tolerance)
 
 
 @pytest.mark.slow
-@EVERY
+@pytest.mark.parametrize("law", [law for law, _ in LAWS], ids=NAMES)
 def test_both_ends(law):
     """Shares rise from 0 to 1, and profiles are finite, from alpha = 0 to 1 and from the source to infinity."""
     shares, values = law.cdf(RADII, ALPHA), law.profile(RADII, ALPHA)

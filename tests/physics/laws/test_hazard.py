@@ -72,15 +72,12 @@ def test_the_profile_is_the_slope_of_the_cdf_and_ends_are_finite(law):
         np.testing.assert_allclose(slope, expected, rtol=2e-6)
     assert law.total(0.7) == pytest.approx(law.albedo.reflectance(0.7), rel=1e-14)
     for alpha in (0.0, 1e-12, 0.5, 1.0):
-        assert law.cdf(0.0, alpha) == 0.0
-        assert law.cdf(np.inf, alpha) == 1.0
-        assert law.profile(np.inf, alpha) == 0.0
+        assert (law.cdf(0.0, alpha), law.cdf(np.inf, alpha), law.profile(np.inf, alpha)) == (0.0, 1.0, 0.0)
         assert law.sampler.sample(0.0, alpha) == pytest.approx(0.0, abs=1e-12)
         assert law.sampler.sample(1.0, alpha) == np.inf
         assert np.isfinite(law.sampler.pdf(0.0, alpha))
         assert np.all(np.isfinite(law.profile(R, alpha)))
-    assert law.profile(0.0, 0.5) == np.inf
-    assert law.profile(0.0, 0.0) == 0.0
+    assert (law.profile(0.0, 0.5), law.profile(0.0, 0.0)) == (np.inf, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -328,8 +325,7 @@ def test_similarity_is_told_from_it_and_lengths_are_the_medium_s():
     np.testing.assert_allclose(law.albedo.reflectance(FEW), own.albedo.reflectance(by), rtol=1e-12)
     np.testing.assert_allclose(law.total(by), own.albedo.reflectance(by), rtol=1e-6)  # as the scaled functions
     np.testing.assert_allclose(law.albedo.alpha(law.albedo.reflectance(FEW)), FEW, rtol=1e-9)
-    assert own.text_constants() == law.text_constants()
-    assert own.text_numbers() == law.text_numbers()
+    assert (own.text_constants(), own.text_numbers()) == (law.text_constants(), law.text_numbers())
     energy = np.trapezoid(2 * np.pi * WIDE**2 * law.profile(WIDE, 0.9), np.log(WIDE))
     assert energy == pytest.approx(
         law.albedo.reflectance(0.9), rel=0.05
@@ -395,8 +391,7 @@ def test_decay_rate_is_the_root_and_near_white_the_diffusion_length(x64):
     inner = 1 - Q[Q > 0]
     error = np.asarray(decay_rate(jnp.asarray(inner))) / exact.decay_rate(inner) - 1
     assert 1e-6 < np.max(np.abs(error)) < 2.5e-5  # a looser statement than this would say nothing
-    assert decay_rate(jnp.float32(1.0)) == 0.0
-    assert decay_rate(jnp.float32(0.0)) == 1.0
+    assert (decay_rate(jnp.float32(1.0)), decay_rate(jnp.float32(0.0))) == (0.0, 1.0)
     # kappa^2 = 3 q (1 - 4 q / 5), q = 1 - alpha: the first two terms of the root's own series. Its two pieces meet.
     q = np.geomspace(1e-8, 1e-3, 6)
     kappa = np.asarray(decay_rate(jnp.asarray(1 - q)))
