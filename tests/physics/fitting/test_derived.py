@@ -33,7 +33,7 @@ def known(truth, burley):
     return LawWithErrors(one.law, one.free, "energy", noise, discrepancy(one, truth))
 
 
-def test_radius_is_the_law_s_own_and_misuse_is_named(known):
+def test_radius_is_the_law_s_own_and_statistical_errors_are_of_moved_constants(known):
     for alpha in (0.3, 0.9):
         for share in (0.3, 0.995):
             found = derived.radius(known, alpha, share)
@@ -44,10 +44,7 @@ def test_radius_is_the_law_s_own_and_misuse_is_named(known):
     with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
         derived.reflectance(known, 0.5)
     assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
-
-
-def test_statistical_errors_are_those_of_moved_constants(known):
-    """Central differences, a constant at a time."""
+    # Central differences, a constant at a time.
     theta, alpha, r = known.law.vector(FREE), 0.8, np.array([0.1, 1.0, 4.0])
     slopes = {"radius": [], "profile": []}
     for i in range(4):

@@ -146,7 +146,7 @@ def one(batches, normalisation):
 
 
 @pytest.mark.slow
-def test_the_scatter_of_batches_is_the_closed_form(batches, one):
+def test_the_scatter_of_batches_is_the_closed_form_and_batches_must_be_alike(batches, one):
     """A run of all batches has the error of one over sqrt(48); 48 batches know it to a tenth."""
     found = bootstrap(batches, one, number=400, seed=1)
     assert (found.failed, found.constants.shape) == (0, (400, 2))
@@ -159,10 +159,6 @@ def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     found = module.energies(batches, one)
     assert found.shape == (BATCHES, ALPHA.size, 2)
     np.testing.assert_allclose(found[3].sum(axis=1), batches[3].reflectance(ALPHA).value, rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_batches_must_be_alike(batches, one):
     with pytest.raises(InputError, match="batches must be at least 10, got 3"):
         bootstrap(batches[:3], one)
     with pytest.raises(InputError, match="batches must be of different seeds, got one twice"):

@@ -111,7 +111,7 @@ def test_light_beyond_an_edge_and_variance_are_plain_integrals(which, burley):
     assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
 
 
-def test_a_stretch_costs_nothing_with_its_own_density(burley):
+def test_a_stretch_costs_nothing_and_a_clip_is_an_atom(burley):
     """With the law's it moves the light: what lies beyond the edge is what was beyond edge / 1.1."""
     found = sampler_quality(Stretched(burley, 1.1), ALPHA)
     assert abs(found.bias[0]) < 1e-6
@@ -126,12 +126,6 @@ def test_a_stretch_costs_nothing_with_its_own_density(burley):
     # Negative control: 1.1 times too dense, so 1/1.1 of the light.
     found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
     assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
-
-
-# Clips
-
-
-def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
     found = sampler_quality(Clipped(burley, 2.0), ALPHA)
     beyond = 1 - burley.cdf(2.0, ALPHA)
     assert found.atom[0] == pytest.approx(beyond, rel=1e-10)
@@ -143,6 +137,9 @@ def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
     light = edge_light(LawTarget(burley), ALPHA, 1.0)
     assert found.edge_bias[0] == pytest.approx(within / light - 1, abs=1e-6)
     assert found.edge_bias_by_law_pdf[0] == pytest.approx((within + beyond / 3) / light - 1, abs=1e-6)
+
+
+# Clips
 
 
 @pytest.mark.slow

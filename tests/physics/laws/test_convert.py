@@ -73,21 +73,6 @@ def test_every_length_there_and_back_and_scaled(name):
     np.testing.assert_allclose(Optical(0.9, 3.0).length(name), 3.0 * Optical(0.9, 1.0).length(name), rtol=1e-14)
 
 
-def test_coefficients_there_and_back():
-    mu_a, mu_s = np.array([0.0, 0.013, 5.0]), np.array([2.0, 1.09, 0.0])
-    medium = Optical.from_coefficients(mu_a, mu_s)
-    np.testing.assert_allclose(medium.mu_a, mu_a, rtol=1e-12)
-    np.testing.assert_allclose(medium.mu_s, mu_s, rtol=1e-12)
-    np.testing.assert_allclose(medium.alpha, [1.0, 1.09 / 1.103, 0.0], rtol=1e-15)
-    np.testing.assert_allclose(medium.mfp, [0.5, 1 / 1.103, 0.2], rtol=1e-15)
-    medium = Optical(1.0, 2.0)
-    infinite = {name for name in BY_NAME if not np.isfinite(medium.length(name))}
-    assert infinite == {"dmfp", "dmfp_classical", "decay_length", "falloff_dmfp"}
-    for name in infinite:
-        with pytest.raises(InputError, match=f"{name} must be another length at alpha = 1"):
-            Optical.from_length(name, 1.0, 1.0)
-
-
 def test_lengths_by_hand():
     """1.85 - A + 7 |A - .8|^3, 1.9 - A + 3.5 (A - .8)^2, 3.5 + 100 (A - .33)^4 at A = 0.3 and 1 by hand."""
     np.testing.assert_allclose(lengths.scale_searchlight([0.3, 1.0]), [1.55 + 0.875, 0.85 + 0.056], rtol=1e-14)
@@ -112,6 +97,18 @@ def test_lengths_by_hand():
     names = "dmfp", "decay_length", "dmfp_classical"
     off = [np.mean(np.abs(medium.length(name) / implied - 1)[inside]) for name in names]
     assert [round(100 * value) for value in off] == [4, 7, 10]
+    mu_a, mu_s = np.array([0.0, 0.013, 5.0]), np.array([2.0, 1.09, 0.0])
+    medium = Optical.from_coefficients(mu_a, mu_s)
+    np.testing.assert_allclose(medium.mu_a, mu_a, rtol=1e-12)
+    np.testing.assert_allclose(medium.mu_s, mu_s, rtol=1e-12)
+    np.testing.assert_allclose(medium.alpha, [1.0, 1.09 / 1.103, 0.0], rtol=1e-15)
+    np.testing.assert_allclose(medium.mfp, [0.5, 1 / 1.103, 0.2], rtol=1e-15)
+    medium = Optical(1.0, 2.0)
+    infinite = {name for name in BY_NAME if not np.isfinite(medium.length(name))}
+    assert infinite == {"dmfp", "dmfp_classical", "decay_length", "falloff_dmfp"}
+    for name in infinite:
+        with pytest.raises(InputError, match=f"{name} must be another length at alpha = 1"):
+            Optical.from_length(name, 1.0, 1.0)
 
 
 # Engines
@@ -307,6 +304,12 @@ def test_a_pair_has_the_engine_s_unit():
     nothing = {name for name in ENGINE if not np.isfinite(typed(name, medium)[1])}
     walks = {"cycles_legacy", "cycles_skin", "cycles_walk_4", "cycles_fixed_radius", "cycles_walk_3"}
     assert nothing == walks | {"unreal_path_tracer", "pbrt", "arnold"}
+    medium = Optical([0.1, 0.5, 0.9], 2.0)
+    np.testing.assert_array_equal(medium.mfp, [2.0, 2.0, 2.0])
+    assert (medium.length("dmfp").shape, Optical(0.5, 1.0).length("mfp").shape) == ((3,), ())
+    assert {length.colour for length in LENGTHS} == {"", "searchlight", "diffuse"}
+    assert len(BY_NAME) == len(LENGTHS)
+    assert len(ENGINE) == len(ENGINES) == len({engine.title for engine in ENGINES})
 
 
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
@@ -319,15 +322,6 @@ def test_reflectance_by_cosine_sums_to_the_exact_one(light):
 
 
 # Input
-
-
-def test_numbers_and_lists_broadcast():
-    medium = Optical([0.1, 0.5, 0.9], 2.0)
-    np.testing.assert_array_equal(medium.mfp, [2.0, 2.0, 2.0])
-    assert (medium.length("dmfp").shape, Optical(0.5, 1.0).length("mfp").shape) == ((3,), ())
-    assert {length.colour for length in LENGTHS} == {"", "searchlight", "diffuse"}
-    assert len(BY_NAME) == len(LENGTHS)
-    assert len(ENGINE) == len(ENGINES) == len({engine.title for engine in ENGINES})
 
 
 @pytest.mark.parametrize(

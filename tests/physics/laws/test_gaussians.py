@@ -121,7 +121,7 @@ PRINTED = """
 """
 
 
-def test_the_printed_table_and_its_weights():
+def test_printed_skin_its_weights_and_its_energy():
     table = np.array([[float(word) for word in line.split()] for line in PRINTED.strip().splitlines()])
     np.testing.assert_array_equal(D_EON.variances, table[:, 0])
     np.testing.assert_array_equal(D_EON.weights, table[:, 1:])
@@ -140,15 +140,12 @@ def test_the_printed_table_and_its_weights():
         narrowest = 0.233 * math.exp(-(scaled**2) / (2 * 0.0064)) / (2 * math.pi * 0.0064)
         assert skin.profile(r)[channel] == pytest.approx(D_EON.profile(scaled)[0] - narrowest, rel=1e-12)
     assert energy(skin)[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)
+    r = np.geomspace(1e-5, 30, 4001)
+    for skin in (D_EON, separable()):
+        total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
+        np.testing.assert_allclose(total, energy(skin), rtol=1e-5)
 
 
 def energy(skin):
     """Integral of 2 pi r R over all r, of red, green, blue [-]."""
     return np.sum(skin.weights, axis=0) * np.square(skin.stretches)
-
-
-@pytest.mark.parametrize("skin", [D_EON, separable()], ids=["d_eon", "separable"])
-def test_profile_integrates_to_its_energy(skin):
-    r = np.geomspace(1e-5, 30, 4001)
-    total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
-    np.testing.assert_allclose(total, energy(skin), rtol=1e-5)

@@ -330,10 +330,7 @@ def test_similarity_is_told_from_it_and_lengths_are_the_medium_s():
     assert energy == pytest.approx(
         law.albedo.reflectance(0.9), rel=0.05
     )  # coarse, but no factor 1 - alpha g of an mfp is lost
-
-
-def test_a_negative_h_is_not_finite_next_to_the_source():
-    """A fit takes such a step back: one that stayed ended at 17 times the least cost, and was called converged."""
+    # A fit takes such a step back: one that stayed ended at 17 times the least cost, and was called converged.
     law = replace(load("hazard", setting=Setting(n=1.4, g=0.05)), once_h0=9.6, once_hg=-10.4)
     assert float(law.coefficients().once_h) < 0
     assert not np.any(np.isfinite(law.profile(np.array([1e-3, 1e-2]), 0.5)))

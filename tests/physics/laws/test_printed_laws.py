@@ -162,7 +162,7 @@ def test_coefficients_profile_cdf_and_radii_by_hand(liang_printed, x64):
     assert k2 == pytest.approx(1.0568, rel=1e-4)
 
 
-def test_nothing_beyond_the_largest_radius(liang, liang_printed):
+def test_nothing_beyond_the_largest_radius_and_b0_as_printed_breaks_the_energy(liang, liang_printed):
     """r_max = -b/a, where (7) falls through zero."""
     for alpha in (0.2, 0.7, 0.99):
         farthest = float(liang.largest_radius(alpha))
@@ -182,10 +182,7 @@ def test_nothing_beyond_the_largest_radius(liang, liang_printed):
     assert liang.sampler.pdf(1.001 * end, 0.5) == 0
     assert liang.sampler.pdf(1.001 * float(liang.largest_radius(0.9)), 0.9) == 0
     assert liang.sampler.pdf(0.0, 0.9) == 0
-
-
-def test_b0_as_printed_breaks_the_energy_and_a_seventh_of_it_does_not(liang, liang_printed):
-    """cdf(r_max) of (17) before (18), which should be 1."""
+    # cdf(r_max) of (17) before (18), which should be 1.
     for law, low, high in ((liang_printed, 13.5, 15.1), (liang, 0.96, 1.075)):
         ratio = np.asarray(law.unscaled_energy(np.inf, ALPHAS)) / law.albedo.reflectance(ALPHAS)
         assert low < ratio.min()
