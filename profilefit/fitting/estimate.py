@@ -253,7 +253,13 @@ class Fit:
     @cached_property
     def second_derivatives(self) -> tuple[Floats, Floats]:
         """Derivatives of half the sum of squares, by two constants (p, p) and by an energy and one (m, n + 1, p)."""
-        return _second_derivatives(ResidualFunction(self.objective, self.free), self.solution, self.law, self.rings)
+        problem = ResidualFunction(self.objective, self.free)
+        with jax.enable_x64(True):
+            law = jax.tree.map(jnp.asarray, self.law)  # traced, so that other constants compile nothing
+            here = jnp.asarray(self.solution.parameters)
+            columns = [_curved(problem, here, along, law, self.rings) for along in np.eye(here.size)]
+        hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
+        return hessian, mixed
 
 
 @dataclass(frozen=True)
@@ -314,16 +320,15 @@ def fit(
     if counted is not None:
         rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
     solution = judged(least_squares(problem, law.vector(names), (law, rings)), names)
-    statistical = None
-    if profiles.covariance is not None:
-        statistical = np.full((len(names),) * 2, np.nan)
-        if solution.converged:
-            moved = followed(*_second_derivatives(problem, solution, law, rings))
-            statistical = profiles.covariance.sandwich(moved)
     spread = _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan)
     structure = residual_structure(solution.residuals.reshape(profiles.alpha.size, -1))
     best = law.with_vector(names, [float(value) for value in solution.parameters])
-    return Fit(best, names, target, rings, solution, statistical, misfit_covariance(solution), spread, structure)
+    own = Fit(best, names, target, rings, solution, None, misfit_covariance(solution), spread, structure)
+    if profiles.covariance is None:
+        return own
+    if not solution.converged:
+        return replace(own, statistical=np.full((len(names),) * 2, np.nan))
+    return replace(own, statistical=profiles.covariance.sandwich(followed(*own.second_derivatives)))
 
 
 @dataclass(frozen=True)
@@ -395,18 +400,6 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
 def followed(hessian: Floats, mixed: Floats) -> Floats:
     """Return d constants / d energies (p, m, n + 1) at an optimum, from its second derivatives; light beyond last."""
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
-
-
-def _second_derivatives(
-    problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
-) -> tuple[Floats, Floats]:
-    """Compute `Fit.second_derivatives` by one compiled program."""
-    with jax.enable_x64(True):
-        law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
-        here = jnp.asarray(solution.parameters)
-        columns = [_curved(problem, here, along, law, rings) for along in np.eye(here.size)]
-    hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
-    return hessian, mixed
 
 
 @filter_jit

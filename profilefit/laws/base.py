@@ -110,7 +110,6 @@ class Entry:
 
     @property
     def has_text(self) -> bool:
-        """True if it has a shader source."""
         return isinstance(self.text, Text)
 
 
@@ -166,7 +165,6 @@ class Constants(eqx.Module):
         return cls.constant_names()
 
     def constants(self) -> dict[str, float]:
-        """Every constant by name."""
         return {name: float(getattr(self, name)) for name in self.constant_names()}
 
     def text_numbers(self) -> dict[str, float]:
@@ -182,7 +180,6 @@ class Constants(eqx.Module):
         return {name: {name: 1.0} for name in self.constant_names()}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Return the named constants as a vector."""
         return np.array([getattr(self, name) for name in names], float)
 
     def with_vector(self, names: tuple[str, ...], values) -> Self:
@@ -265,7 +262,6 @@ class ProfileLaw(Constants):
 
     @property
     def sampler(self) -> Any:
-        """Draws radii for this law."""
         return self.sampler_class(self)
 
     @property
