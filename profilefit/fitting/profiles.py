@@ -187,11 +187,13 @@ STRIDES = ((0.5, 0.05), (1.0, 0.1), (2.0, 0.2), (5.0, 0.5))
 
 def walk(last: float) -> Floats:
     """Return the radii that the search visits, from 0 to the first beyond `last`."""
-    radii, begin = [np.zeros(1)], 0.0
+    radii = [0.0]
+    begin = 0.0
     for end, stride in STRIDES:
-        radii.append(begin + stride * np.arange(1, round((end - begin) / stride) + 1))
+        radii += [begin + stride * (i + 1) for i in range(round((end - begin) / stride))]
         begin = end
-    return np.concatenate([*radii, np.arange(begin + 1.0, last + 1.0)])
+    radii += list(np.arange(begin + 1.0, last + 1.0))
+    return np.array(radii)
 
 
 def trimmed_radius(r: Floats, quantity: Floats, epsilon: float = 0.005) -> float:

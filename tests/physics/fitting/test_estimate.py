@@ -43,7 +43,7 @@ def spread(values, covariance):
 
 
 @pytest.mark.slow
-def test_constants_scatter_as_predicted(tallies, toy, sidak):
+def test_constants_of_the_true_law_and_of_another_scatter_as_predicted(tallies, toy, sidak, burley):
     """200 refits of the true law. Halved or doubled covariances have probabilities below 1e-12."""
     one, scattered = refits(tallies, toy, None)
     assert one.free == ("k", "h", "q")
@@ -54,11 +54,7 @@ def test_constants_scatter_as_predicted(tallies, toy, sidak):
     assert np.abs(z).max() < 4
     for wrong in (0.5, 2.0):
         assert spread(scattered, wrong * one.statistical) < 1e-12
-
-
-@pytest.mark.slow
-def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sidak):
-    """Normalized diffusion misses these photons by a tenth, and only the sandwich knows how it scatters."""
+    # Normalized diffusion misses these photons by a tenth, and only the sandwich knows how it scatters.
     one, scattered = refits(tallies, burley, ("s0", "s1", "s2"))
     assert one.structure.rms > 0.02
     assert spread(scattered, one.statistical) > 1e-3
