@@ -14,7 +14,7 @@ from mcml_sim import Grid, Setting, simulate_orders
 from mcml_sim.results.estimate import covariance_factor
 from profilefit.errors import ShaderError
 from profilefit.fitting.profiles import Covariance, Profiles
-from profilefit.laws.base import Constants
+from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.published import SETS
@@ -46,6 +46,13 @@ def recorded(work, out, say=silent):
 def sidak():
     """|z| that the largest of m independent normal deviates exceeds with probability 1e-3."""
     return lambda m: float(norm.isf((1 - (1 - 1e-3) ** (1 / m)) / 2))
+
+
+def whitened(values, covariance, number):
+    """z (p, p) of a sample covariance of so many values about the identity, where `covariance` is 1 (Wishart)."""
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    sample, one = np.cov(values @ root.T, rowvar=False), np.eye(len(covariance))
+    return (sample - one) / np.sqrt((1 + one) / number)
 
 
 @pytest.fixture
@@ -155,6 +162,19 @@ class Tallies:
         return Profiles(
             self.alpha, self.edges, value, error, effective, rest, "orders", Setting(), self.photons, covariance
         )
+
+
+class Line(AlbedoLaw):
+    """A = u + v alpha, linear in its constants: errors have closed forms, and posteriors are normal."""
+
+    u: float = 0.3
+    v: float = 0.5
+
+    def alpha(self, reflectance):
+        return (reflectance - self.u) / self.v
+
+    def reflectance(self, alpha):
+        return self.u + self.v * alpha
 
 
 @pytest.fixture(scope="session")

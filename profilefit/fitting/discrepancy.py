@@ -156,13 +156,16 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
 
 def of_residuals(data: Residuals) -> Discrepancy:
     """Estimate the process that makes residuals likeliest, and not smaller than they are."""
-    u, s, y, slope, noise = _flat(data)
+    a, g = np.nonzero(data.live)  # live points in one row
+    u, s, y, slope = data.u[g], data.s[a], data.table[a, g], data.slope[a, g]
+    each = np.einsum("gak,gbk->gab", data.noise, data.noise)
+    noise = np.where(g[:, None] == g, each[g[:, None], a[:, None], a], 0.0)
+    noise += LEFT_OUT * np.diag(np.diag(noise))
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    theta, curved, worth, converged = likeliest(
-        begin, limits, (apart(u, u), apart(s, s), y, unit_columns(slope), noise)
-    )
+    given = apart(u, u), apart(s, s), y, unit_columns(slope), noise
+    theta, curved, worth, converged = likeliest(begin, limits, given)
     amplitude, length_u, length_s = map(float, np.exp(theta))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = (matern(apart(x, x) / length) for x, length in ((data.u, length_u), (data.s, length_s)))
@@ -170,16 +173,16 @@ def of_residuals(data: Residuals) -> Discrepancy:
     covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
     result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED
     shown_u = length_u if data.u.size > 1 else np.nan
-    facts = amplitude, amplitude * _error(curved), shown_u, length_s, gain, float(np.sqrt(np.mean(y**2))), result
+    known, relative = np.diag(curved) > 1e-3, np.inf  # what the loss bends with: it may be blind to a length
+    if known[0]:
+        inverse = np.linalg.pinv(curved[np.ix_(known, known)], hermitian=True)
+        relative = float(np.sqrt(max(inverse[0, 0], 0.0)))
+    facts = amplitude, amplitude * relative, shown_u, length_s, gain, float(np.sqrt(np.mean(y**2))), result
     one = Discrepancy(*facts, covariance, data.u, data.s, data.influence)
     if result == NOT_SEEN:
         return one
-    return _as_large(one, one.law_covariance(u, s, slope), float(y @ y - np.trace(noise)))
-
-
-def _as_large(one: Discrepancy, left: Floats, squares: float) -> Discrepancy:
-    """Return `one`, or if the residuals it leaves, of covariance `left`, have less than `squares`, a larger one."""
-    more = squares / np.trace(left)
+    left = one.law_covariance(u, s, slope)
+    more = float(y @ y - np.trace(noise)) / np.trace(left)  # times the variance that `one` leaves
     if more <= 1.0:
         return one
     amplitude, relative = one.amplitude * float(np.sqrt(more)), float(np.sqrt(0.5 * np.sum(left**2)) / np.trace(left))
@@ -197,8 +200,13 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     data, counted = profiles.energy, albedos & (np.asarray(rings.used) > 0)
     judged = counted & (data > 0) & (profiles.cdf[:, 1:] <= ENERGY_WITHIN)
     judged &= profiles.r_edges[1:] > NEAREST
-    u = np.log(np.sqrt(profiles.r_edges[1:] * np.maximum(profiles.r_edges[:-1], 0.25 * profiles.r_edges[1:])))
-    group = _groups(u, np.any(judged, axis=0), max(min(GROUPS, MOST_ROWS // profiles.alpha.size), FEWEST_GROUPS))
+    u = np.log(middles(profiles.r_edges))
+    # Groups are even in ln r over the judged rings; rings beyond them go with the nearest.
+    inner, most = u[np.any(judged, axis=0)], max(min(GROUPS, MOST_ROWS // profiles.alpha.size), FEWEST_GROUPS)
+    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(most, inner.size) + 1)
+    group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
+    known = np.unique(group[np.any(judged, axis=0)])
+    group = known[np.abs(group[:, None] - known).argmin(axis=1)]
     member = (group[:, None] == np.unique(group)).astype(float)  # (n, g)
     unit = unit_energy(fit.objective, profiles.energy, profiles.alpha, profiles.r_edges)
     own, seen, live = energy * judged @ member, data * judged @ member, (judged @ member) > 0
@@ -209,6 +217,11 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     middle = (u * judged.sum(axis=0)) @ member / np.maximum(judged.sum(axis=0) @ member, 1)
     noise = _noise(profiles, judged, member, safe)
     return Residuals(np.where(live, (own - seen) / safe, 0.0), live, middle, _s(profiles), tilt, noise, parts @ whole)
+
+
+def middles(r_edges: Floats) -> Floats:
+    """Return the radii (n,) that stand for rings: geometric means, of the first one half its edge."""
+    return np.sqrt(r_edges[1:] * np.maximum(r_edges[:-1], 0.25 * r_edges[1:]))
 
 
 def unit_energy(objective: str, energy: Floats, alpha: Floats, r_edges: Floats) -> Floats:
@@ -250,15 +263,6 @@ def _placed(alpha: Floats, settings: Sequence[Setting], size: int) -> Floats:
     return np.column_stack([s, [(surface_of(one).trapped, one.g)[: size - 1] for one in settings]])
 
 
-def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
-    """Return the group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
-    inner = u[judged]
-    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(number, inner.size) + 1)
-    group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
-    known = np.unique(group[judged])
-    return known[np.abs(group[:, None] - known).argmin(axis=1)]
-
-
 def _noise(profiles: Profiles, judged: Live, member: Floats, law: Floats) -> Floats:
     """Return factors (g, m, k) of the relative covariance of groups, whose rings add up and share photons."""
     groups = member.shape[1]
@@ -272,15 +276,6 @@ def _noise(profiles: Profiles, judged: Live, member: Floats, law: Floats) -> Flo
 def _root(covariance: Floats) -> Floats:
     value, vector = np.linalg.eigh(covariance)
     return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)))
-
-
-def _flat(data: Residuals):
-    """Return live points in one row: u, s, residual (n,), slope (n, p), noise (n, n)."""
-    a, g = np.nonzero(data.live)
-    noise = np.einsum("gak,gbk->gab", data.noise, data.noise)
-    full = np.where(g[:, None] == g, noise[g[:, None], a[:, None], a], 0.0)
-    full += LEFT_OUT * np.diag(np.diag(full))
-    return data.u[g], data.s[a], data.table[a, g], data.slope[a, g], full
 
 
 def _scales(x: Floats) -> Floats:
@@ -311,15 +306,6 @@ def _energy(objective: str, law, rings: Rings) -> Array:
         inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
         return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
     return jnp.diff(law.unscaled_energy(edges, alpha[:, None]), axis=-1)
-
-
-def _error(curved: Floats) -> float:
-    """Return the standard error of ln amplitude from the curvature (3, 3) of the loss, blind to lengths or not."""
-    keep = np.diag(curved) > 1e-3
-    if not keep[0]:
-        return np.inf
-    inverse = np.linalg.pinv(curved[np.ix_(keep, keep)], hermitian=True)
-    return float(np.sqrt(max(inverse[0, 0], 0.0)))
 
 
 @dataclass(frozen=True)
@@ -416,7 +402,7 @@ class AtAlbedo:
     @property
     def middle(self) -> Floats:
         """(n,) [mfp]."""
-        return np.sqrt(EDGES[1:] * np.maximum(EDGES[:-1], 0.25 * EDGES[1:]))
+        return middles(EDGES)
 
     def radius(self, share: float) -> tuple[float, float, float]:
         """Return the radius within which `share` of the energy leaves [mfp], and its two errors."""
@@ -468,9 +454,8 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.discrepancy is not None:
-        spread = known.discrepancy.law_covariance(
-            0.0 * albedos, known.discrepancy.places(albedos, known.law.setting), slope[:, 0] / energy
-        )
+        places = known.discrepancy.places(albedos, known.law.setting)
+        spread = known.discrepancy.law_covariance(0.0 * albedos, places, slope[:, 0] / energy)
         model = value * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 

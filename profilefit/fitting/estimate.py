@@ -115,7 +115,12 @@ def relative(law, rings: Rings) -> Tables:
     of squares is the mean square of (law/data - 1), the `rel` of `quality`. Then come the errors of the cdf at all
     edges, then what resists a law that falls with alpha next to white, ring by ring: absorption must not add light.
     """
-    added = _added_light(law, rings)
+    # d ln E / d sqrt(1 - alpha) of each ring next to white plus `LEAST_FALL` (j, n), at each index; 0 if negative.
+    near = jnp.array([1.0 - NEXT_TO_WHITE, 1.0])[:, None, None]
+    darker, white = jnp.diff(law.under(rings.surfaces).unscaled_energy(rings.r_edges, near), axis=-1)
+    lit = (darker > DARK) & (white > DARK)
+    slope = jnp.log(jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)) / np.sqrt(NEXT_TO_WHITE)
+    added = jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
     alpha, law = rings.alpha[:, None], law.under(rings.surface)
     inside = law.unscaled_energy(rings.r_edges, alpha)
     widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
@@ -129,15 +134,6 @@ def relative(law, rings: Rings) -> Tables:
     of_each = rings.alpha.size // len(added)
     added = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(added, of_each, axis=0)
     return misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, added
-
-
-def _added_light(law, rings: Rings) -> Array:
-    """(j, n) d ln E / d sqrt(1 - alpha) of each ring next to white plus `LEAST_FALL`, at each index; 0 if negative."""
-    alpha = jnp.array([1.0 - NEXT_TO_WHITE, 1.0])[:, None, None]
-    darker, white = jnp.diff(law.under(rings.surfaces).unscaled_energy(rings.r_edges, alpha), axis=-1)
-    lit = (darker > DARK) & (white > DARK)
-    slope = jnp.log(jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)) / np.sqrt(NEXT_TO_WHITE)
-    return jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
 
 
 def radial(law, rings: Rings) -> Tables:
@@ -257,7 +253,13 @@ class Fit:
     @cached_property
     def second_derivatives(self) -> tuple[Floats, Floats]:
         """Derivatives of half the sum of squares, by two constants (p, p) and by an energy and one (m, n + 1, p)."""
-        return _second_derivatives(ResidualFunction(self.objective, self.free), self.solution, self.law, self.rings)
+        problem = ResidualFunction(self.objective, self.free)
+        with jax.enable_x64(True):
+            law = jax.tree.map(jnp.asarray, self.law)  # traced, so that other constants compile nothing
+            here = jnp.asarray(self.solution.parameters)
+            columns = [_curved(problem, here, along, law, self.rings) for along in np.eye(here.size)]
+        hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
+        return hessian, mixed
 
 
 @dataclass(frozen=True)
@@ -318,16 +320,15 @@ def fit(
     if counted is not None:
         rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
     solution = judged(least_squares(problem, law.vector(names), (law, rings)), names)
-    statistical = None
-    if profiles.covariance is not None:
-        statistical = np.full((len(names),) * 2, np.nan)
-        if solution.converged:
-            moved = followed(*_second_derivatives(problem, solution, law, rings))
-            statistical = profiles.covariance.sandwich(moved)
     spread = _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan)
     structure = residual_structure(solution.residuals.reshape(profiles.alpha.size, -1))
     best = law.with_vector(names, [float(value) for value in solution.parameters])
-    return Fit(best, names, target, rings, solution, statistical, misfit_covariance(solution), spread, structure)
+    own = Fit(best, names, target, rings, solution, None, misfit_covariance(solution), spread, structure)
+    if profiles.covariance is None:
+        return own
+    if not solution.converged:
+        return replace(own, statistical=np.full((len(names),) * 2, np.nan))
+    return replace(own, statistical=profiles.covariance.sandwich(followed(*own.second_derivatives)))
 
 
 @dataclass(frozen=True)
@@ -399,18 +400,6 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
 def followed(hessian: Floats, mixed: Floats) -> Floats:
     """Return d constants / d energies (p, m, n + 1) at an optimum, from its second derivatives; light beyond last."""
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
-
-
-def _second_derivatives(
-    problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
-) -> tuple[Floats, Floats]:
-    """Compute `Fit.second_derivatives` by one compiled program."""
-    with jax.enable_x64(True):
-        law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
-        here = jnp.asarray(solution.parameters)
-        columns = [_curved(problem, here, along, law, rings) for along in np.eye(here.size)]
-    hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
-    return hessian, mixed
 
 
 @filter_jit

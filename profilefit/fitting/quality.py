@@ -47,9 +47,8 @@ class Quality:
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
     """Measure a law against the exact profile of its own setting at each (reduced) albedo in `alpha` (m,)."""
     albedos = np.atleast_1d(np.asarray(alpha, float))
-    truths = [
-        _truth(*pair, law.setting) for pair in zip(albedos.tolist(), _outer(tuple(albedos), law.setting), strict=True)
-    ]
+    outer = _outer(tuple(albedos), law.setting)
+    truths = [_truth(*pair, law.setting) for pair in zip(albedos.tolist(), outer, strict=True)]
     own, mfp = np.array([_medium(one, law.setting) for one in albedos.tolist()]).T[:, :, None]
     # All albedos in one call of each method.
     profile, even = (law.profile(np.stack(r), own, mfp) for r in ([t.r for t in truths], [t.even for t in truths]))

@@ -278,7 +278,10 @@ def solve(
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
         least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
-        if ended or steps >= most or _promised(best, (aimed - y) * scale) < least:
+        if ended or steps >= most:
+            break
+        change = best[2] @ ((aimed - y) * scale)  # of the residuals, by the linear model
+        if -float(change @ (2.0 * best[1] + change)) < least:
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
@@ -296,13 +299,6 @@ def solve(
     counts = ~active & (np.multiply(uphill, longest, out=np.zeros(start.size), where=uphill > 0) > gain)
     result = _explain(settled, most, best[1], best[2][:, counts], gain)
     return Solution(*best, steps, result, active)
-
-
-def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
-    """Return the reduction of the sum of squares that the linear model promises for a step."""
-    _, values, jacobian = best
-    change = jacobian @ step
-    return -float(change @ (2.0 * values + change))
 
 
 def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: Floats, slope: Floats) -> Floats:

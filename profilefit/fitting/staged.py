@@ -93,9 +93,11 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
         solution = least_squares(residual, start.vector(names), (start, points.alpha, data))
         covariance = None
         if points.covariance is not None:
-            block = points.covariance[column::3, column::3]
-            gain = _gain(residual, solution.parameters, start, points.alpha, data)
-            covariance = gain @ block @ gain.T
+            with jax.enable_x64(True):
+                here = jnp.asarray(solution.parameters), start, jnp.asarray(points.alpha), jnp.asarray(data)
+                hessian, mixed = _gain_arrays(residual, *here)
+            gain = -scaled_inverse(np.asarray(hessian)) @ np.asarray(mixed).T  # d constants / d coefficients (p, m)
+            covariance = gain @ points.covariance[column::3, column::3] @ gain.T
         laws[letter] = CoefficientLaw(names, solution, covariance)
     return laws
 
@@ -155,10 +157,3 @@ def _gain_arrays(residual, vector, law, alpha, data):
         return 0.5 * jnp.sum(residual(p, (law, alpha, d)) ** 2)
 
     return jax.hessian(cost)(vector, data), jax.jacfwd(jax.grad(cost, argnums=1))(vector, data)
-
-
-def _gain(residual, vector, law, alpha, data) -> Floats:
-    """Return d constants / d coefficients (p, m) of a coefficient law."""
-    with jax.enable_x64(True):
-        hessian, mixed = _gain_arrays(residual, jnp.asarray(vector), law, jnp.asarray(alpha), jnp.asarray(data))
-    return -scaled_inverse(np.asarray(hessian)) @ np.asarray(mixed).T

@@ -110,7 +110,6 @@ class Entry:
 
     @property
     def has_text(self) -> bool:
-        """True if it has a shader source."""
         return isinstance(self.text, Text)
 
 
@@ -126,7 +125,7 @@ class Constants(eqx.Module):
     entry  what is known of it by name; one that is in no table of `profilefit.laws` needs none
     """
 
-    setting: eqx.AbstractVar[Setting]
+    setting: Setting = eqx.field(static=True)
     entry: ClassVar[Entry] = Entry()
 
     @classmethod
@@ -166,7 +165,6 @@ class Constants(eqx.Module):
         return cls.constant_names()
 
     def constants(self) -> dict[str, float]:
-        """Every constant by name."""
         return {name: float(getattr(self, name)) for name in self.constant_names()}
 
     def text_numbers(self) -> dict[str, float]:
@@ -182,7 +180,6 @@ class Constants(eqx.Module):
         return {name: {name: 1.0} for name in self.constant_names()}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Return the named constants as a vector."""
         return np.array([getattr(self, name) for name in names], float)
 
     def with_vector(self, names: tuple[str, ...], values) -> Self:
@@ -238,9 +235,9 @@ class ProfileLaw(Constants):
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         """Share of the reflected energy within x = r/l [-]."""
 
-    @abc.abstractmethod
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
         """Energy reflected within x = r/l [-], before any scaling to the exact reflectance: what a fit compares."""
+        return self.reflected(alpha) * self.scaled_cdf(x, alpha)
 
     @abc.abstractmethod
     def source_strength(self, alpha: Array) -> Array:
@@ -249,6 +246,10 @@ class ProfileLaw(Constants):
     def total(self, alpha) -> Array:
         """Return the total reflectance A [-] that the profile integrates to at an albedo of the scaled functions."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
+
+    def reflected(self, alpha: Array) -> Array:
+        """Return `total`, or, of a law that spans indices, A at those that it was put under [-]."""
+        return self.total(alpha)
 
     def text_shape(self) -> dict[str, float] | None:
         """Return members of the shape in the shader source by dotted names, for a law of one albedo; else None."""
@@ -261,7 +262,6 @@ class ProfileLaw(Constants):
 
     @property
     def sampler(self) -> Any:
-        """Draws radii for this law."""
         return self.sampler_class(self)
 
     @property

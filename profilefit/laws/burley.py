@@ -14,7 +14,6 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
@@ -86,7 +85,7 @@ class NormalizedDiffusion(ProfileLaw):
     q is `falloff_rate(alpha)`, A the reflectance at alpha by `albedo` (held fixed). Infinite at r = 0.
     """
 
-    albedo: eqx.AbstractVar[Normalisation]
+    albedo: Normalisation = eqx.field(static=True)
     sampler_class = BurleySampler
 
     @abc.abstractmethod
@@ -103,9 +102,6 @@ class NormalizedDiffusion(ProfileLaw):
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         t = self.falloff_rate(alpha) * x
         return -0.25 * jnp.expm1(-t) - 0.75 * jnp.expm1(-t / 3.0)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.albedo.reflectance(alpha) * self.scaled_cdf(x, alpha)
 
     def source_strength(self, alpha: Array) -> Array:
         return 0.5 * self.albedo.reflectance(alpha) * self.falloff_rate(alpha)
@@ -129,8 +125,6 @@ class Burley(NormalizedDiffusion):
     Valid for alpha in (0, 1].
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
     s0: float
     s1: float
     s2: float
@@ -172,8 +166,6 @@ class BurleyDiffuseMfp(NormalizedDiffusion):
     22 % off at A = 0.05, not 5 %. Valid for alpha in (0, 1): at alpha = 1 l_d is infinite, and so is the law's width.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
     s0: float
     s1: float
     s2: float

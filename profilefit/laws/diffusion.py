@@ -18,7 +18,6 @@ from jax import Array, lax
 from mcml_sim.exact import single_scattering
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.evaluate import evaluated
@@ -30,7 +29,7 @@ NEAREST, FARTHEST = -25.0, 40.0
 # A bracket of 65 halved so often is 6e-5 wide, and Newton squares what is left.
 HALVINGS, NEWTON_STEPS = 20, 3
 # What the texts of dipoles rest on, and what completes them.
-TEXT_PARTS, TEXT_ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
+PARTS, ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
 
 
 class DiffusionSampler(Sampler):
@@ -75,7 +74,6 @@ class DiffusionLaw(ProfileLaw):
     simulator's. `cdf` is a share of the law's own reflectance; `albedo` is not used.
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: Normalisation | None = eqx.field(static=True, default=None)
     own_reflectance = True
     sampler_class = DiffusionSampler
@@ -84,9 +82,9 @@ class DiffusionLaw(ProfileLaw):
         if self.setting.illumination != "searchlight" or self.setting.g != 0.0:
             raise SettingError(f"setting must be a searchlight with g = 0 (use reduced lengths), got {self.setting}")
 
-    @abc.abstractmethod
     def prefactor(self, alpha: Array) -> Array:
         """c(alpha) [-], which vanishes where alpha does."""
+        return alpha
 
     @abc.abstractmethod
     def shape_profile(self, x: Array, alpha: Array) -> Array:
@@ -243,7 +241,7 @@ class Dipole(DiffusionLaw):
     translucent materials, SIGGRAPH 2002, eq. 5.
     """
 
-    entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS))
+    entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", PARTS, ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:
         """Return the share of the light that enters [-], and the height of the image [mfp]."""
@@ -254,9 +252,6 @@ class Dipole(DiffusionLaw):
         """Height of the image above the surface z_v [mfp]."""
         reflected = diffuse_fresnel(self.setting.n)
         return 1.0 + 4.0 / 3.0 * (1.0 + reflected) / (1.0 - reflected)
-
-    def prefactor(self, alpha: Array) -> Array:
-        return alpha
 
     def shape_profile(self, x: Array, alpha: Array) -> Array:
         sigma = transport_rate(alpha)
@@ -296,9 +291,7 @@ class BetterDipole(DiffusionLaw):
     better dipole model, Pixar Technical Memo 12-11, 2012.
     """
 
-    entry = Entry(
-        "better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS)
-    )
+    entry = Entry("better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", PARTS, ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:
         """Return the share of light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
@@ -353,9 +346,6 @@ class BeamDiffusion(DiffusionLaw):
         "of 20 by 48 nodes; better_dipole is its near relative",
     )
 
-    def prefactor(self, alpha: Array) -> Array:
-        return alpha
-
     def shape_profile(self, x: Array, alpha: Array) -> Array:
         safe = jnp.where(x > 0, x, 1.0)
         once = once_scattered(safe, self.setting.n, self.halves) / (2.0 * jnp.pi * safe)
@@ -363,7 +353,11 @@ class BeamDiffusion(DiffusionLaw):
         return jnp.where(x > 0, once + many, jnp.inf)
 
     def shape_energy(self, x: Array, alpha: Array) -> Array:
-        return once_scattered_within(x, self.setting.n, self.halves) + alpha * self._beam_within(x, alpha)
+        # The beam's energy in closed form at each depth, less what kappa takes away.
+        depth, weight = depths(x, self.halves)
+        energy = exitance_within(x[..., None], depth, alpha[..., None], self.setting.n)
+        many = jnp.sum(weight * energy, axis=-1) - self._taken(x, alpha)
+        return once_scattered_within(x, self.setting.n, self.halves) + alpha * many
 
     def source_strength(self, alpha: Array) -> Array:
         return self.entered * alpha * once_scattered(jnp.zeros_like(alpha), self.setting.n, self.halves)
@@ -374,12 +368,6 @@ class BeamDiffusion(DiffusionLaw):
         x, alpha = x[..., None], alpha[..., None]
         light = exitance(x, depth, alpha, self.setting.n)
         return jnp.sum(weight * kappa(depth, jnp.sqrt(x**2 + depth**2)) * light, axis=-1)
-
-    def _beam_within(self, x: Array, alpha: Array) -> Array:
-        """Return the beam's energy within x [-]: in closed form at each depth, less what kappa takes away."""
-        depth, weight = depths(x, self.halves)
-        energy = exitance_within(x[..., None], depth, alpha[..., None], self.setting.n)
-        return jnp.sum(weight * energy, axis=-1) - self._taken(x, alpha)
 
     def _taken(self, x: Array, alpha: Array) -> Array:
         """Energy within x that kappa takes away [-]."""

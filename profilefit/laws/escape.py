@@ -37,15 +37,11 @@ def decay_rate(alpha) -> Array:
 class EscapeLaw(ProfileLaw):
     """A law whose cdf tends to 1 by itself, scaled to A by `albedo`: R_d = A `scaled_density` / (2 pi x)."""
 
-    albedo: eqx.AbstractVar[Normalisation]
+    albedo: Normalisation = eqx.field(static=True)
 
     @abc.abstractmethod
     def scaled_density(self, x: Array, alpha: Array) -> Array:
         """2 pi x R_d / A [1/mfp], finite at x = 0."""
-
-    def reflected(self, alpha: Array) -> Array:
-        """Return A [-]."""
-        return self.albedo.reflectance(alpha)
 
     def text_numbers(self) -> dict[str, float]:
         """Return the strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
@@ -59,9 +55,6 @@ class EscapeLaw(ProfileLaw):
         near = jnp.maximum(x, jnp.finfo(jnp.result_type(x, float)).tiny)
         value = self.reflected(alpha) * self.scaled_density(near, alpha) / (2.0 * jnp.pi * near)
         return jnp.where((x > 0) | (alpha == 0), value, jnp.inf)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.reflected(alpha) * self.scaled_cdf(x, alpha)
 
     def source_strength(self, alpha: Array) -> Array:
         return single_scattering.source_strength(self.setting) * alpha

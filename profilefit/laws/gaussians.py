@@ -19,7 +19,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import CLAMPS, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.rational import Normalisation
@@ -105,9 +104,6 @@ class GaussianSum(ProfileLaw):
         share = -jnp.expm1(-0.5 * jnp.asarray(x)[..., None] ** 2 / self.variances(alpha))
         return jnp.sum(jnp.exp(self.log_weights(alpha)) * share, axis=-1)
 
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.total(alpha) * self.scaled_cdf(x, alpha)
-
     def source_strength(self, alpha: Array) -> Array:
         """0: no Gaussian rises as 1/x, so a limit at the source cannot be fitted."""
         return jnp.zeros_like(alpha)
@@ -125,7 +121,7 @@ class Gaussians(GaussianSum):
     of four Gaussians by 0.4 %.) A is the reflectance at alpha by `albedo` (held fixed). Valid for alpha in [0, 1].
     """
 
-    albedo: eqx.AbstractVar[Normalisation]
+    albedo: Normalisation = eqx.field(static=True)
     f1: eqx.AbstractVar[float]
     f2: eqx.AbstractVar[float]
     v1: eqx.AbstractVar[float]
@@ -178,7 +174,6 @@ class MediumGaussians(GaussianSum):
     It has the medium's own A: arguments alpha are not looked at.
     """
 
-    setting: Setting = eqx.field(static=True)
     total_reflectance: float  # A [-]
     variance: tuple[float, ...]  # v_i [mfp^2], rising
     weight: tuple[float, ...]  # w_i [-]
@@ -223,9 +218,7 @@ def _law_class(count: int) -> type[Gaussians]:
         "__module__": __name__,
         "__qualname__": f"Gaussians{count}",
         "__doc__": f"A sum of {count} Gaussians, `Gaussians`.",
-        "__annotations__": {"setting": Setting, "albedo": Normalisation, **dict.fromkeys(names, float)},
-        "setting": eqx.field(static=True),
-        "albedo": eqx.field(static=True),
+        "__annotations__": dict.fromkeys(names, float),
         "count": classmethod(lambda cls: count),
     }
     made: Any = new_class(f"Gaussians{count}", (Gaussians,), exec_body=lambda namespace: namespace.update(body))

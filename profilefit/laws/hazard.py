@@ -15,10 +15,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLAMPS, Entry, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
-from profilefit.laws.rational import Normalisation
 
 NEAREST = 1e-25  # x [mfp] that stands for 0: every quotient stays finite, x ln x is 0
 FARTHEST = 1e8  # x [mfp]: no light is left, and x^4 is finite in float32
@@ -95,17 +93,13 @@ def radius_at(t: Array, growth: Array, shape: Shape, steps: int) -> Array:
     stretch = (1.0 - white) + p * t + white * growth
     x = t * stretch / (shape.kappa * stretch + rise)
     for _ in range(steps):
-        x = _closer(x, t, shape)
+        near = jnp.clip(x, NEAREST, FARTHEST)
+        here = local(near, shape)
+        flight = 1.0 / here.hazard
+        step = (t - here.exponent + jnp.log(here.ratio)) * flight
+        y = -here.bend * flight * step
+        x = jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
     return x
-
-
-def _closer(x: Array, t: Array, shape: Shape) -> Array:
-    near = jnp.clip(x, NEAREST, FARTHEST)
-    here = local(near, shape)
-    flight = 1.0 / here.hazard
-    step = (t - here.exponent + jnp.log(here.ratio)) * flight
-    y = -here.bend * flight * step
-    return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
 
 
 def local(x: Array, shape: Shape) -> Local:
@@ -218,8 +212,6 @@ class Hazard(EscapeLaw):
     and one logarithm a profile.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
     h0: float
     h1: float
     h2: float

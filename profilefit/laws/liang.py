@@ -7,13 +7,13 @@ Software). Equation numbers are that paper's.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Entry, ProfileLaw, Range, Sampler, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
@@ -63,14 +63,7 @@ class LiangSampler(Sampler):
     def _root(self, x, alpha, low, high) -> Array:
         """Return xi in [low, high], where |g| is monotone, with |g(xi)| = x; an end of it where there is none."""
         rising = self._radius(high, alpha) > self._radius(low, alpha)
-
-        def halve(_, bracket):
-            left, right = bracket
-            middle = 0.5 * (left + right)
-            beyond = (self._radius(middle, alpha) > x) == rising
-            return jnp.where(beyond, left, middle), jnp.where(beyond, middle, right)
-
-        left, right = lax.fori_loop(0, BISECTIONS, halve, (low, high))
+        left, right = _halved(lambda middle: (self._radius(middle, alpha) > x) == rising, low, high)
         return 0.5 * (left + right)
 
     def _branch_density(self, x, alpha, low, high) -> Array:
@@ -89,15 +82,19 @@ class LiangSampler(Sampler):
 
     def _turning_point(self, alpha) -> Array:
         """Return the xi in (0, eps) where g is most negative."""
+        ends = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
+        return _halved(lambda middle: ~(self._slope(middle, alpha) < 0), *ends)[0]
 
-        def halve(_, bracket):
-            left, right = bracket
-            middle = 0.5 * (left + right)
-            falling = self._slope(middle, alpha) < 0
-            return jnp.where(falling, middle, left), jnp.where(falling, right, middle)
 
-        start = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
-        return lax.fori_loop(0, BISECTIONS, halve, start)[0]
+def _halved(is_beyond: Callable[[Array], Array], low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the bracket (low, high) of the place from which `is_beyond` holds, halved to rounding."""
+
+    def halve(_, bracket):
+        middle = 0.5 * (bracket[0] + bracket[1])
+        beyond = is_beyond(middle)
+        return jnp.where(beyond, bracket[0], middle), jnp.where(beyond, middle, bracket[1])
+
+    return lax.fori_loop(0, BISECTIONS, halve, (low, high))
 
 
 class Liang(ProfileLaw):
@@ -115,7 +112,6 @@ class Liang(ProfileLaw):
     eps     the eps of (19) [-], 0.01
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: Normalisation = eqx.field(static=True)
     a1: float
     a2: float

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 
@@ -25,7 +23,6 @@ class LiangAlbedo(AlbedoLaw):
     Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile, equation (8).
     """
 
-    setting: Setting = eqx.field(static=True)
     p: float
     q: float
     w: float
@@ -80,7 +77,6 @@ class VanDeHulst(AlbedoLaw):
     Production Volume Rendering, SIGGRAPH 2017 course.
     """
 
-    setting: Setting = eqx.field(static=True)
     p0: float
     p1: float
     q0: float
@@ -120,7 +116,6 @@ class Chiang(AlbedoLaw):
     tracing, SIGGRAPH 2016 Talks, who fit it to Monte Carlo simulations.
     """
 
-    setting: Setting = eqx.field(static=True)
     e1: float
     e2: float
     e3: float

@@ -12,12 +12,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLAMPS, Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
-from profilefit.laws.rational import Normalisation
 
 # The scales of t of the two fractions in M: of the grid 2, 2.5, 3 and 0.3, 0.5, 0.7, 1 those of the least error that
 # serve both lights.
@@ -80,8 +78,6 @@ class Quantile(EscapeLaw):
     fixed). One logarithm a radius.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
     a0: float
     a1: float
     a2: float

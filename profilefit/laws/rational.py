@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import abc
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 
@@ -40,7 +38,6 @@ class Rational(Normalisation):
     b, c, d  constants [-]
     """
 
-    setting: Setting = eqx.field(static=True)
     b: float
     c: float
     d: float

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLOSED, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
@@ -22,6 +21,8 @@ REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted t
 INDICES, COSINES = Range(1.3, 1.5, open_low=True), Range(0.0, 0.95, open_low=True)  # n and g [-] of those with g
 STEPS = 6  # of Newton's method in the inverse, which starts right to a hundredth, a tenth where g > .9
 COUNTS = {"c": 5, "d": 6, "f": 2}  # constants of each at g = 0, coefficients of powers of q
+TEXT = Text("refracting_rational", (), prefix="rational")
+ENTRY = Entry("rational", "rational map", is_map=True, records=("albedo-rational",), own=True, text=TEXT)  # of each map
 
 
 class Terms(NamedTuple):
@@ -53,7 +54,6 @@ class FoldedRational(Normalisation):
     and alpha(A > t) = 1.
     """
 
-    setting: Setting = eqx.field(static=True)
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
 
     @classmethod
@@ -143,18 +143,13 @@ class RefractingRational(FoldedRational):
     """
 
     __annotations__ = {f"{name}{i}": "float" for name, count in COUNTS.items() for i in range(count)}
-    entry = Entry(
-        "rational",
-        "rational map",
-        is_map=True,
-        records=("albedo-rational",),
+    entry = replace(
+        ENTRY,
         start={  # within a hundredth of the exact map
             **{"c0": 1.6, "c1": 0.1, "c2": 0.1, "c3": 0.1, "c4": 0.1, "f0": 0.03, "f1": 0.01},
             **{"d0": 0.4, "d1": 0.5, "d2": 1.0, "d3": 0.5, "d4": 0.1, "d5": -0.1},
         },
         n=REFRACTING,
-        own=True,
-        text=Text("refracting_rational", (), prefix="rational"),
     )
 
     def folds(self) -> dict[str, dict[str, float]]:
@@ -176,11 +171,8 @@ class ForwardRational(FoldedRational):
     """
 
     __annotations__ = {f"{name}{term}": "float" for name in COUNTS for term in "023n"}
-    entry = Entry(
-        "rational",
-        "rational map",
-        is_map=True,
-        records=("albedo-rational",),
+    entry = replace(
+        ENTRY,
         start={  # within a tenth of the exact map
             **{"c0": -0.2, "c2": 6.7, "c3": -4.6, "cn": -0.1},
             **{"d0": -0.9, "d2": 4.5, "d3": -1.7, "dn": 1.3},
@@ -188,8 +180,6 @@ class ForwardRational(FoldedRational):
         },
         n=INDICES,
         g=COSINES,
-        own=True,
-        text=Text("refracting_rational", (), prefix="rational"),
     )
 
     def folds(self) -> dict[str, dict[str, float]]:

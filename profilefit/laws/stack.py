@@ -8,13 +8,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.laws.base import Constants, ProfileLaw
+from profilefit.laws.base import CLOSED, Constants, ProfileLaw
 from profilefit.laws.escape import decay_rate
 from profilefit.laws.evaluate import evaluated
 
-KNOWN = {"closed": True}  # of a field that is no constant: what the law is a law of
 THICKEST = 1e6  # mean free paths that stand for an infinite first layer
 LEAST_DECAY = 1e-4  # over l: where nothing is absorbed A tends to A_1 all the same, within 1e-4
 LEAST_RATE = 1e-9  # over the image's height: a rate of 0 has no logarithm
@@ -24,10 +22,9 @@ NEWTON_STEPS = 4  # of an image's radius: to rounding
 class LayerLaw(Constants):
     """The half space of one layer, in its unit of length: a law R_d(r / l; alpha) at that layer's alpha [-] and l."""
 
-    setting: Setting = eqx.field(static=True)
-    law: ProfileLaw = eqx.field(metadata=KNOWN)
-    alpha: float = eqx.field(metadata=KNOWN)
-    mfp: float = eqx.field(metadata=KNOWN)
+    law: ProfileLaw = eqx.field(metadata=CLOSED)
+    alpha: float = eqx.field(metadata=CLOSED)
+    mfp: float = eqx.field(metadata=CLOSED)
 
     @evaluated
     def profile(self, r, thickness=None) -> Array:
@@ -109,10 +106,9 @@ class StackLaw(Constants):
     Where layers scatter forward, l, alpha and kappa are those of similar isotropic ones.
     """
 
-    setting: Setting = eqx.field(static=True)
-    top: LayerLaw = eqx.field(metadata=KNOWN)
-    below: LayerLaw | StackLaw = eqx.field(metadata=KNOWN)
-    thickness: float = eqx.field(metadata=KNOWN)
+    top: LayerLaw = eqx.field(metadata=CLOSED)
+    below: LayerLaw | StackLaw = eqx.field(metadata=CLOSED)
+    thickness: float = eqx.field(metadata=CLOSED)
     w: float
     u: float
     g1: float
@@ -181,7 +177,8 @@ class StackLaw(Constants):
         of = self.terms(thickness)
         gone = self.top.within(jnp.hypot(r, of.gone)) - self.top.within(of.gone)
         back = self.below.within(jnp.hypot(r, of.back)) - self.below.within(of.back)
-        image = 1.0 - _beyond(jnp.hypot(r, of.height), of)
+        s = jnp.hypot(r, of.height)
+        image = 1.0 - of.height / s * jnp.exp(-of.rate * (s - of.height))
         return self.top.within(r) - of.c1 * gone + of.c2 * back + of.image * image
 
     def drawn(self, xi: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
@@ -272,13 +269,8 @@ def _image(r: Array, of: StackTerms) -> Array:
     return jnp.where(s < jnp.inf, value, 0.0)
 
 
-def _beyond(s: Array, of: StackTerms) -> Array:
-    """Share of the image's light beyond a distance s from it [-]."""
-    return of.height / s * jnp.exp(-of.rate * (s - of.height))
-
-
 def _image_radius(xi: Array, of: StackTerms) -> Array:
-    """Radius [length] at which `_beyond` is 1 - xi: z + ln z = q for z = k s, by Newton's method."""
+    """Radius [length] beyond which the image has 1 - xi of its light: z + ln z = q, z = k s, by Newton's method."""
     nearest = of.rate * of.height
     q = nearest + jnp.log(nearest) - jnp.log1p(-xi)
     z = jnp.where(q > 1.0, q - jnp.log(jnp.maximum(q, 1.0)), jnp.exp(jnp.minimum(q, 1.0) - 0.5))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from collections import namedtuple
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, NamedTuple, Self
 
 import equinox as eqx
@@ -13,18 +14,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.setting import Setting
 from profilefit.laws.base import CLAMPS, CLOSED, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
-from profilefit.laws.refracting_rational import (
-    COSINES,
-    INDICES,
-    REFRACTING,
-    FoldedRational,
-    ForwardRational,
-    RefractingRational,
-)
+from profilefit.laws.refracting_rational import COSINES, INDICES, REFRACTING, FoldedRational
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there
@@ -33,6 +26,7 @@ LEAST_W = 1e-3  # of -w [1/mfp]: h must be positive
 # kappa. Their error after a step is least, over every alpha, n from 1.001 to 1.6 and both lights.
 ONCE, AGAIN = 0.535, (1.3479, 0.7442, 3.0873, 1.2056, 2.1187, -1.4458, 0.456)
 SOURCE = Text("refracting_hazard", ("rational", "decay", "near_zero", "survival"), prefix="hazard", clamps=CLAMPS)
+ENTRY = Entry("hazard", "hazard", records=("hazard",), own=True, text=SOURCE)  # of each law here that spans indices
 LEAST_STRETCH = 1e-3  # keeps the guess positive
 MOST_WHITE = 16.0  # keeps the guess finite in dark media, where the tail that it is made for is not reached
 
@@ -140,8 +134,7 @@ class TwoPartHazard(EscapeLaw):
     they are made of is each law's own. Two exponentials and two logarithms a profile.
     """
 
-    setting: Setting = eqx.field(static=True)
-    albedo: eqx.AbstractVar[FoldedRational]
+    albedo: FoldedRational = eqx.field(static=True)
     surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
     sampler_class = TwoPartSampler
 
@@ -200,9 +193,6 @@ class TwoPartHazard(EscapeLaw):
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         return self.parts(alpha).cdf(x)
 
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.reflected(alpha) * self.scaled_cdf(x, alpha)
-
     def source_strength(self, alpha: Array) -> Array:
         return self.here().source * alpha
 
@@ -221,12 +211,17 @@ def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int)
     bend = 1.0 + g * jnp.sqrt(t)
     once = 1.0 + ONCE * t
     length = jnp.where(is_once, t * once, jnp.sqrt(t * (t + 2.0 * d)) * stretch)
-    x = length / jnp.where(
-        is_once, first.kappa * once + (first.source - first.kappa), (rest.kappa * stretch + slowest) * bend
-    )
+    again = (rest.kappa * stretch + slowest) * bend
+    x = length / jnp.where(is_once, first.kappa * once + (first.source - first.kappa), again)
     shape = jax.tree.map(lambda one, other: jnp.where(is_once, one, other), first, rest)
     for _ in range(steps):
-        x = _closer(x, t, shape)
+        near = jnp.clip(x, NEAREST, FARTHEST)
+        here = local(near, shape)
+        spent = jnp.maximum(here.exponent - jnp.log(here.ratio), NEAREST)
+        flight, beyond = 1.0 / jnp.maximum(here.hazard, NEAREST), jnp.sqrt(t / spent) - 1.0
+        step = 2.0 * spent * beyond * flight
+        y = beyond - here.bend * flight * step
+        x = jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
     return x
 
 
@@ -241,32 +236,21 @@ def guess(of: Parts) -> tuple[Array, Array]:
     return white, rate * (1.0 + rest.kappa * (e + f * rest.kappa))
 
 
-def _closer(x: Array, t: Array, shape: Shape) -> Array:
-    near = jnp.clip(x, NEAREST, FARTHEST)
-    here = local(near, shape)
-    spent = jnp.maximum(here.exponent - jnp.log(here.ratio), NEAREST)
-    flight, beyond = 1.0 / jnp.maximum(here.hazard, NEAREST), jnp.sqrt(t / spent) - 1.0
-    step = 2.0 * spent * beyond * flight
-    y = beyond - here.bend * flight * step
-    return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
+# What fits under refracting interfaces start from, within a tenth of the exact profile under either light: constants by
+# letter, which of its coefficients, and power of rho.
+IN_RHO = {
+    **{"m00": -1.2, "m01": -0.25, "m02": -0.65, "m10": -0.4, "m21": 1.7, "m22": -2.3},
+    **{"a00": 0.46, "a01": -0.32, "a10": -0.6, "a11": -6.3, "a20": 0.54, "a21": 3.0, "a31": 3.8, "a32": 0.5},
+    **{"b00": 0.11, "b01": -0.11, "b10": -0.2, "b11": 0.3, "b20": 0.07, "b21": -0.33},
+    **{"c00": 0.38, "c01": -0.03, "c10": -0.97, "c12": -2.6, "c20": 0.72, "c21": 0.48, "c22": 2.0},
+}
 
 
 class RefractingHazard(TwoPartHazard):
-    """Law of two hazard curves under a refracting interface.
+    """`TwoPartHazard` under a refracting interface, where g = 0.
 
-    2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r/l
-
-    Under a surface that refracts, light scattered once dies with the critical angle, e^{-k_c x}, and all other light
-    with kappa(alpha); one hazard cannot follow both. A_1, k_c and the strength at the source, lambda_1(0) = s_0 / A_1,
-    are exact. No other light is there at the source: lambda_2(0) = 0, so w = c - kappa - a, and kappa is exact again.
-
-    Next to the source that light grows as 2 pi x R_d -> 2 alpha^2 m x ln(1/x), m = e^{m0 + m1 (1 - alpha) + m2 (1 -
-    alpha)^2} smooth in alpha, which sets h = -w (A - alpha A_1) / (alpha^2 m): A and kappa go with v = sqrt(1 - alpha)
-    next to white, but R_d near the source does not. With rho the share of cosine-weighted light from inside that the
-    surface reflects back (`RefractingSurface`), the shapes of light scattered again are
-
-    a = a0 + a1 v + a2 v^2 + a3 kappa     c = (c0 + c1 v + c2 kappa)^2
-    b = (q + sqrt(q^2 + 1e-4)) / 2, q = b0 + b1 v + b2 v^2, positive and smooth
+    With rho the share of cosine-weighted light from inside that the surface reflects back (`RefractingSurface`), the
+    shapes of light scattered again are those of
 
     m0 = m00 + m01 rho + m02 rho^2     m1 = m10                    m2 = m21 rho + m22 rho^2
     a0 = a00 + a01 rho                 a1 = a10 + a11 rho          a2 = a20 + a21 rho        a3 = a31 rho + a32 rho^2
@@ -281,53 +265,16 @@ class RefractingHazard(TwoPartHazard):
     map to A (held fixed). Two exponentials and two logarithms a profile.
     """
 
-    albedo: RefractingRational = eqx.field(static=True)
-    m00: float
-    m01: float
-    m02: float
-    m10: float
-    m21: float
-    m22: float
-    a00: float
-    a01: float
-    a10: float
-    a11: float
-    a20: float
-    a21: float
-    a31: float
-    a32: float
-    b00: float
-    b01: float
-    b10: float
-    b11: float
-    b20: float
-    b21: float
-    c00: float
-    c01: float
-    c10: float
-    c12: float
-    c20: float
-    c21: float
-    c22: float
+    __annotations__ |= dict.fromkeys(IN_RHO, "float")
     once_h: float
     once_a0: float
     once_a1: float
     once_b0: float
     once_b1: float
-    entry = Entry(
-        "hazard",
-        "hazard",
-        records=("hazard",),
-        start={  # within a tenth of the exact profile, under either light
-            **{"m00": -1.2, "m01": -0.25, "m02": -0.65, "m10": -0.4, "m21": 1.7, "m22": -2.3},
-            **{"a00": 0.46, "a01": -0.32, "a10": -0.6, "a11": -6.3, "a20": 0.54, "a21": 3.0, "a31": 3.8, "a32": 0.5},
-            **{"b00": 0.11, "b01": -0.11, "b10": -0.2, "b11": 0.3, "b20": 0.07, "b21": -0.33},
-            **{"c00": 0.38, "c01": -0.03, "c10": -0.97, "c12": -2.6, "c20": 0.72, "c21": 0.48, "c22": 2.0},
-            **{"once_h": 3.1, "once_a0": 0.79, "once_a1": -1.1, "once_b0": 0.073, "once_b1": -0.17},
-        },
+    entry = replace(
+        ENTRY,
+        start=IN_RHO | {"once_h": 3.1, "once_a0": 0.79, "once_a1": -1.1, "once_b0": 0.073, "once_b1": -0.17},
         n=REFRACTING,
-        own=True,
-        text=SOURCE,
     )
 
     @classmethod
@@ -339,12 +286,12 @@ class RefractingHazard(TwoPartHazard):
         here = self.here()
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength
+        k = SimpleNamespace(**{name: getattr(self, name) for name in IN_RHO})
         return ShapeCoefficients(
-            *(self.m00 + rho * (self.m01 + rho * self.m02), self.m10, rho * (self.m21 + rho * self.m22)),
-            *(self.a00 + self.a01 * rho, self.a10 + self.a11 * rho, self.a20 + self.a21 * rho),
-            rho * (self.a31 + rho * self.a32),
-            *(self.b00 + self.b01 * rho, self.b10 + self.b11 * rho, self.b20 + self.b21 * rho),
-            *(self.c00 + self.c01 * rho, self.c10 + self.c12 * rho**2, self.c20 + rho * (self.c21 + rho * self.c22)),
+            *(k.m00 + rho * (k.m01 + rho * k.m02), k.m10, rho * (k.m21 + rho * k.m22)),
+            *(k.a00 + k.a01 * rho, k.a10 + k.a11 * rho, k.a20 + k.a21 * rho, rho * (k.a31 + rho * k.a32)),
+            *(k.b00 + k.b01 * rho, k.b10 + k.b11 * rho, k.b20 + k.b21 * rho),
+            *(k.c00 + k.c01 * rho, k.c10 + k.c12 * rho**2, k.c20 + rho * (k.c21 + rho * k.c22)),
             self.once_h * y / strength,
             (self.once_a0 + self.once_a1 * y) * strength,
             ((self.once_b0 + self.once_b1 * y) * strength) ** 2,
@@ -355,9 +302,8 @@ class RefractingHazard(TwoPartHazard):
         rho, strength = float(here.trapped), float(here.source / here.once)
         y = float(here.critical) / strength
         by_part: dict[str, dict[str, float]] = {}
-        for name in self.constant_names():
-            if not name.startswith("once"):  # letter, which of its coefficients, power of rho
-                by_part.setdefault(name[:2], {})[name] = rho ** int(name[2])
+        for name in IN_RHO:
+            by_part.setdefault(name[:2], {})[name] = rho ** int(name[2])
         twice = 2.0 * float(self.once_b0 + self.once_b1 * y) * strength**2
         return {
             **by_part,
@@ -392,17 +338,12 @@ class ForwardHazard(TwoPartHazard):
     .95, alpha in [0, 1] and r in [0, inf]; at one n and g they come to 15. kappa is that of isotropic light.
     """
 
-    albedo: ForwardRational = eqx.field(static=True)
-    __annotations__ |= {f"{name}{term}": "float" for name in SHAPES for term in "0gn"}
-    entry = Entry(
-        "hazard",
-        "hazard",
-        records=("hazard",),
+    __annotations__ = {f"{name}{term}": "float" for name in SHAPES for term in "0gn"}
+    entry = replace(
+        ENTRY,
         start={f"{name}{term}": k for name, row in STARTS.items() for term, k in zip("0gn", row, strict=True)},
         n=INDICES,
         g=COSINES,
-        own=True,
-        text=SOURCE,
     )
 
     @classmethod
@@ -452,7 +393,6 @@ class ForwardHalfSpace(ProfileLaw):
     arguments alpha are not looked at.
     """
 
-    setting: Setting = eqx.field(static=True)
     albedo: float  # a
     total_reflectance: float  # A
     once_h: float
@@ -487,9 +427,6 @@ class ForwardHalfSpace(ProfileLaw):
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         return self.parts(alpha).cdf(x)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.total_reflectance * self.scaled_cdf(x, alpha)
 
     def total(self, alpha: Array) -> Array:
         return self.total_reflectance + jnp.zeros_like(alpha)

@@ -5,7 +5,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import equinox as eqx
 import numpy as np
 import pytest
 
@@ -15,26 +14,12 @@ from profilefit.errors import InputError
 from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Covariance, Profiles
-from profilefit.laws.base import AlbedoLaw
+from tests.fixtures import Line, whitened
 
 pytestmark = pytest.mark.slow
 
 # A chain of 50 autocorrelation times and 32 walkers holds 1600 independent points, thinned to 1000; 500 to be safe.
 INDEPENDENT = 500
-
-
-class Line(AlbedoLaw):
-    """A = u + v alpha: its misfit is a quadratic form, and its posteriors are normal."""
-
-    setting: Setting = eqx.field(static=True)
-    u: float = 0.3
-    v: float = 0.5
-
-    def alpha(self, reflectance):
-        return (reflectance - self.u) / self.v
-
-    def reflectance(self, alpha):
-        return self.u + self.v * alpha
 
 
 def fitted_line(seed, law, free=None):
@@ -60,28 +45,20 @@ def test_one_constant_has_a_chain_too():
     assert np.std(found.samples) == pytest.approx(np.sqrt(one.misfit[0, 0]), rel=0.1)
 
 
-def whitened(samples, covariance):
-    """z of the sample covariance about the identity, where `covariance` is 1."""
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    sample = np.cov(samples @ root.T, rowvar=False)
-    return (sample - np.eye(len(sample))) / np.sqrt((1 + np.eye(len(sample))) / INDEPENDENT)
-
-
 @pytest.mark.parametrize("kind", ["statistical", "misfit"])
 def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     found = posterior(line_fit, kind, seed=1, max_steps=4000)
     expected = getattr(line_fit, kind)
     assert found.result == "converged"
     assert found.steps >= 50 * found.tau
-    assert found.kind == kind
-    assert found.names == ("u", "v")
-    assert np.abs(whitened(found.samples, expected)).max() < sidak(3)
+    assert (found.kind, found.names) == (kind, ("u", "v"))
+    assert np.abs(whitened(found.samples, expected, INDEPENDENT)).max() < sidak(3)
     z = (found.samples.mean(axis=0) - line_fit.solution.parameters) / np.sqrt(np.diag(expected) / INDEPENDENT)
     assert np.abs(z).max() < sidak(2)
     # Negative control: the other kind's covariance is not this one.
     other = line_fit.misfit if kind == "statistical" else line_fit.statistical
-    assert np.abs(whitened(found.samples, other)).max() > 3 * sidak(3)
-    assert np.abs(whitened(found.samples, 2 * expected)).max() > 1.5 * sidak(3)
+    assert np.abs(whitened(found.samples, other, INDEPENDENT)).max() > 3 * sidak(3)
+    assert np.abs(whitened(found.samples, 2 * expected, INDEPENDENT)).max() > 1.5 * sidak(3)
 
 
 def test_intervals_and_deviations_are_those_of_a_normal(line_fit):
@@ -94,6 +71,9 @@ def test_intervals_and_deviations_are_those_of_a_normal(line_fit):
     assert np.all(outer[:, 0] < inner[:, 0])
     assert np.all(inner[:, 1] < outer[:, 1])
     assert np.all((inner[:, 0] < line_fit.solution.parameters) & (line_fit.solution.parameters < inner[:, 1]))
+    assert (found.walkers, found.samples.shape[1]) == (32, 2)
+    assert len(found.samples) <= 1000
+    assert 0.1 < found.acceptance < 0.9
 
 
 def test_curvature_adjustment_is_the_identity_it_claims():
@@ -137,14 +117,6 @@ def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
     assert maps < 1000
 
 
-def test_chain_facts(line_fit):
-    found = posterior(line_fit, "statistical", max_steps=1000)
-    assert found.walkers == 32
-    assert found.samples.shape[1] == 2
-    assert len(found.samples) <= 1000
-    assert 0.1 < found.acceptance < 0.9
-
-
 def test_draws_go_to_arviz_and_back(line_fit):
     """A walker a chain, the log density beside it, and the fit's name on it."""
     pytest.importorskip("arviz_base")
@@ -163,16 +135,16 @@ def test_draws_go_to_arviz_and_back(line_fit):
     np.testing.assert_allclose(found.log_density, expected, rtol=1e-6, atol=1e-8)
 
 
-def test_kind_must_be_known(line_fit):
+def test_misuse_is_named(line_fit, tallies, liang):
     with pytest.raises(InputError, match="'misfit', got 'discrepancy', which is called 'misfit' now"):
         posterior(line_fit, "discrepancy")
     with pytest.raises(InputError, match="kind must be 'statistical' or 'misfit', got 'both'"):
         posterior(line_fit, "both")
-
-
-def test_without_photon_noise_only_the_misfit_is_left(line_fit):
     with pytest.raises(InputError, match=r"no photon noise: only kind='misfit' applies, got 'statistical'"):
         posterior(replace(line_fit, statistical=None))
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
+    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
+        posterior(one)
 
 
 def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
@@ -189,9 +161,3 @@ def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
     full, _ = one.second_derivatives
     width = np.sqrt(np.diag(np.linalg.inv(short.T @ full @ short / variance)))
     assert np.max(np.abs(width / expected - 1.0)) > 0.02
-
-
-def test_no_posterior_of_a_fit_that_failed(tallies, liang):
-    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
-    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
-        posterior(one)

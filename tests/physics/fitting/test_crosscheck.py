@@ -1,4 +1,7 @@
-"""The same fit to two truths: agreement within the photons' noise, and what a difference looks like."""
+"""The same fit to two truths: agreement within the photons' noise, and what a difference looks like.
+
+Then errors of finite rings: the square of the width where middles stand for averages, next to none for integrals.
+"""
 
 from dataclasses import replace
 
@@ -8,9 +11,10 @@ from scipy.stats import chi2, kstest
 
 from mcml_sim import Grid, Setting, exact, simulate_orders
 from profilefit import load
-from profilefit.fitting.estimate import fit
+from profilefit.fitting.estimate import fit, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.checks import AGREE, DIFFER, compared, crosscheck, mahalanobis
+from profilefit.recipes import checks
+from profilefit.recipes.checks import AGREE, DIFFER, by_width, compared, crosscheck, mahalanobis, widened
 
 pytestmark = pytest.mark.slow
 
@@ -24,10 +28,7 @@ def test_chi2_by_hand():
     turned = np.array([[2.0, 1.0], [1.0, 2.0]])
     difference = np.array([1.0, -2.0])
     assert mahalanobis(difference, turned)[0] == pytest.approx(difference @ np.linalg.inv(turned) @ difference)
-
-
-def test_chi2_does_not_see_what_the_covariance_does_not_know():
-    """Two constants that photons move together, in any units, are one direction."""
+    # Two constants that photons move together, in any units, are one direction.
     lengths = np.array([1e-3, 1.0, 1e3])
     covariance = np.outer(lengths, lengths) * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]])
     distance, rank = mahalanobis(lengths * np.array([1.0, 1.0, 2.0]), covariance)
@@ -40,37 +41,30 @@ def exactly(toy, tallies):
     """The toy's energies without noise, and a fit to them that is no truth: h alone, k 2 % too large."""
     energy = tallies.energy(tallies.chance.reshape(tallies.edges.size - 1, -1) * tallies.photons)
     none = np.zeros_like(energy)
-    profiles = replace(
-        tallies.profiles(tallies.draw(1, 1)[0]), energy=energy, standard_error=none, source="exact", covariance=None
-    )
+    photons = tallies.profiles(tallies.draw(1, 1)[0])
+    profiles = replace(photons, energy=energy, standard_error=none, source="exact", covariance=None)
     return fit(profiles, replace(toy, q=0.52), free=FREE)
 
 
 def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
     """chi2 of 60 runs of photons is chi2 of two degrees of freedom, for a law that is not the truth too."""
-    counts = tallies.draw(7, 60)
-    checks = [
-        compared(exactly, fit(tallies.profiles(one), exactly.law, free=FREE), tallies.photons, 0, 0) for one in counts
-    ]
-    distances = np.array([check["chi2"] for check in checks])
-    assert {check["rank"] for check in checks} == {2}
+    found = [fit(tallies.profiles(one), exactly.law, free=FREE) for one in tallies.draw(7, 60)]
+    told = [compared(exactly, one, tallies.photons, 0, 0) for one in found]
+    distances = np.array([check["chi2"] for check in told])
+    assert {check["rank"] for check in told} == {2}
     assert kstest(distances, chi2(2).cdf).pvalue > 1e-3
     assert kstest(1.5 * distances, chi2(2).cdf).pvalue < kstest(distances, chi2(2).cdf).pvalue
-    assert sum(check["result"] == AGREE for check in checks) >= 58
-    np.testing.assert_allclose(checks[0]["chance"], chi2.sf(distances[0], 2))
+    assert sum(check["result"] == AGREE for check in told) >= 58
+    np.testing.assert_allclose(told[0]["chance"], chi2.sf(distances[0], 2))
 
 
-def test_photons_of_another_truth_differ(toy, tallies, exactly):
+def test_photons_of_another_truth_differ_and_a_failed_fit_is_told(toy, tallies, exactly):
     profiles = tallies.profiles(tallies.draw(7, 1)[0])
     louder = replace(profiles, energy=1.02 * profiles.energy)  # the tally's error of A is 0.2 %
     check = compared(exactly, fit(louder, exactly.law, free=FREE), tallies.photons, 0, 0)
-    assert check["result"] == DIFFER
-    assert list(check["constants"]) == ["k", "h"]
+    assert (check["result"], list(check["constants"])) == (DIFFER, ["k", "h"])
     assert check["constants"]["k"]["z"] > 5
     assert check["photons"] == tallies.photons
-
-
-def test_a_failed_fit_is_told(tallies, exactly):
     good = fit(tallies.profiles(tallies.draw(7, 1)[0]), exactly.law, free=FREE)
     failed = replace(good, solution=replace(good.solution, result="no convergence"))
     for pair, which in (((failed, good), "exact"), ((exactly, failed), "photon")):
@@ -90,23 +84,17 @@ ALPHA = np.array([0.2, 0.5, 0.8, 0.9, 0.97, 0.99999])
 def map_pair(normalisation):
     """A fit of the map to the exact reflectance, and that reflectance."""
     none, total = np.zeros((ALPHA.size, 1)), np.asarray(exact.reflectance(ALPHA))
-    profiles = Profiles(
-        ALPHA, np.array([0.0, 30.0]), total[:, None], none, none + np.inf, none[:, 0], "exact", Setting()
-    )
+    edges, noise = np.array([0.0, 30.0]), (none, none + np.inf)
+    profiles = Profiles(ALPHA, edges, total[:, None], *noise, none[:, 0], "exact", Setting())
     return fit(profiles, normalisation, "reflectance", free=("b", "c")), profiles
 
 
-def test_exact_light_and_a_million_photons_agree(map_pair, white_run):
+def test_exact_light_and_a_million_photons_agree_and_not_a_wrong_count(map_pair, white_run):
     check = crosscheck(*map_pair, white_run)
-    assert check["result"] == AGREE
-    assert check["rank"] == 2
-    assert list(check["constants"]) == ["b", "c"]
+    assert (check["result"], check["rank"], list(check["constants"])) == (AGREE, 2, ["b", "c"])
     assert check["photons"] == white_run.photons
     # At .99999 light is lost after 8192 scatterings.
     assert (check["albedos_left_out"], check["rings_left_out"]) == (1, 0)
-
-
-def test_a_tally_that_counts_one_photon_in_fifty_twice_is_caught(map_pair, white_run):
     wrong = replace(white_run, photons=int(white_run.photons / 1.02))
     assert crosscheck(*map_pair, wrong)["result"] == DIFFER
 
@@ -120,9 +108,68 @@ def test_profiles_agree_ring_by_ring(setting):
     free = ("s0", "s1", "s2")  # a square in A has no fourth
     own = fit(profiles, law, free=free)
     check = crosscheck(own, profiles, light)
-    assert check["result"] == AGREE
-    assert check["rank"] == 3
-    assert check["albedos_left_out"] == 1
+    assert (check["result"], check["rank"], check["albedos_left_out"]) == (AGREE, 3, 1)
     assert check["rings_left_out"] > 0
     doubled = replace(light, photons=int(light.photons / 1.02))
     assert crosscheck(own, profiles, doubled)["result"] == DIFFER
+
+
+# Finite rings
+
+FEW = 1.0 - np.linspace(0.9, 0.3, 7) ** 2
+TWO = ("b1", "c3")
+
+
+def profiles_of(law, edges):
+    """Energies of (7) itself, integrated over rings: a truth that its own middles miss by the square of the width."""
+    inside = np.asarray(law.unscaled_energy(edges, FEW[:, None]))
+    energy = np.diff(inside, axis=1)
+    zero, many = np.zeros_like(energy), np.full_like(energy, np.inf)
+    return Profiles(FEW, edges, energy, zero, many, np.zeros(FEW.size), "exact", law.setting)
+
+
+@pytest.fixture(scope="module")
+def fits(liang):
+    """The same law fitted by ring middles and by ring integrals, rings of 0.05."""
+    edges = np.linspace(0.0, 1.8, 37)
+    truth = profiles_of(liang, edges)
+    return {objective: fit(truth, liang, objective, TWO, jackknife=False) for objective in ("radial", "energy")}
+
+
+def test_middles_are_wrong_by_the_square_of_the_width_and_integrals_by_next_to_nothing(fits, liang):
+    one = fits["radial"]
+    true, moved = liang.vector(TWO), by_width(one)
+    off = one.solution.parameters - true
+    by_square = [(moved[k] - moved[1]) / (k**2 - 1) for k in (2, 3)]
+    np.testing.assert_allclose(by_square[0], by_square[1], rtol=0.2)
+    # What it says is what it is, to a fourth: terms beyond the square, of the rings next to the source.
+    np.testing.assert_allclose(checks.discretisation_error(one), np.abs(off), rtol=0.25)
+    assert np.all(np.abs(off / true) > 1e-6)
+    one = fits["energy"]
+    np.testing.assert_allclose(one.solution.parameters, liang.vector(TWO), rtol=1e-6)
+    assert np.all(checks.discretisation_error(one) < 1e-3 * checks.discretisation_error(fits["radial"]))
+
+
+def test_wide_rings_are_the_sums_of_narrow_ones(fits, white_run, normalisation):
+    rings = fits["radial"].rings
+    wide = widened(rings, 5)
+    assert wide.energy.shape == rings.energy.shape
+    holds = wide.energy[0] > 0
+    assert holds.sum() == 8  # seven of five, and the one that is left over
+    np.testing.assert_allclose(wide.energy[:, holds][:, 0], rings.energy[:, :5].sum(axis=1), rtol=1e-13)
+    np.testing.assert_allclose(wide.energy.sum(axis=1), rings.energy.sum(axis=1), rtol=1e-13)
+    place = np.flatnonzero(holds)
+    np.testing.assert_allclose(wide.r_edges[place], rings.r_edges[[0, 5, 10, 15, 20, 25, 30, 35]], atol=1e-9)
+    np.testing.assert_array_equal(wide.r_edges[place + 1], rings.r_edges[[5, 10, 15, 20, 25, 30, 35, 36]])
+    assert np.all(np.diff(wide.r_edges) > 0)
+    np.testing.assert_array_equal(widened(rings, 1).energy, rings.energy)
+    # A wide ring counts only with all its parts.
+    used = np.ones((FEW.size, 36))
+    used[2, 7] = 0.0
+    rings = rings_of(profiles_of(fits["radial"].law, np.asarray(rings.r_edges)), used > 0)
+    wide = widened(rings, 3)
+    kept = wide.used[:, wide.energy[0] > 0]
+    assert kept.sum() == 12 * 7 - 1
+    assert kept[2, 2] == 0.0
+    one = fit(Profiles.from_orders(white_run.merged([0.0, white_run.grid.r_edges[-1]]), FEW), normalisation)
+    np.testing.assert_array_equal(checks.discretisation_error(one), np.zeros(3))

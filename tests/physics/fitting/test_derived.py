@@ -33,28 +33,26 @@ def known(truth, burley):
     return LawWithErrors(one.law, one.free, "energy", noise, discrepancy(one, truth))
 
 
-def test_radius_is_the_law_s_own(known):
+def test_radius_is_the_law_s_own_and_statistical_errors_are_of_moved_constants(known):
     for alpha in (0.3, 0.9):
         for share in (0.3, 0.995):
             found = derived.radius(known, alpha, share)
             # Straight lines between edges 2.3 % apart, of a share that levels off.
             assert found.value[0] == pytest.approx(float(known.law.sampler.sample(share, alpha)), rel=1e-3)
-
-
-def test_statistical_errors_are_those_of_moved_constants(known):
-    """Central differences, a constant at a time."""
+    with pytest.raises(InputError, match=r"share must be in \(0, 1\), of a profile law, got 1.5 of Burley"):
+        derived.radius(known, 0.5, 1.5)
+    with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
+        derived.reflectance(known, 0.5)
+    assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
+    # Central differences, a constant at a time.
     theta, alpha, r = known.law.vector(FREE), 0.8, np.array([0.1, 1.0, 4.0])
     slopes = {"radius": [], "profile": []}
     for i in range(4):
         step = np.zeros(4)
         step[i] = 1e-4 * theta[i]
         up, down = (known.law.with_vector(FREE, theta + sign * step) for sign in (1, -1))
-        slopes["radius"].append(
-            (float(up.sampler.sample(0.9, alpha)) - float(down.sampler.sample(0.9, alpha))) / (2 * step[i])
-        )
-        slopes["profile"].append(
-            (np.asarray(up.profile(r, alpha)) - np.asarray(down.profile(r, alpha))) / (2 * step[i])
-        )
+        slopes["radius"].append((up.sampler.sample(0.9, alpha) - down.sampler.sample(0.9, alpha)) / (2 * step[i]))
+        slopes["profile"].append((up.profile(r, alpha) - down.profile(r, alpha)) / (2 * step[i]))
     sigma = np.sqrt(np.diag(known.statistical))
     radius = np.linalg.norm(np.array(slopes["radius"]) * sigma)
     assert derived.radius(known, alpha, 0.9).statistical[0] == pytest.approx(radius, rel=3e-2)
@@ -98,7 +96,7 @@ def test_reflectance_of_a_map(normalisation):
         derived.radius(known, 0.5)
 
 
-def test_a_record_says_it_again(known, truth):
+def test_a_record_says_it_again_and_a_summary_how_far_radii_are_off(known, truth):
     content = {
         "protocol": {"weighting": {"objective": "energy"}},
         "covariance": {"names": FREE, "statistical": known.statistical, "model": known.discrepancy.covariance},
@@ -110,10 +108,7 @@ def test_a_record_says_it_again(known, truth):
     silent = LawWithErrors.of_record(known.law, plain(old), {})
     assert silent.discrepancy is None
     assert np.isnan(derived.radius(silent, 0.8).model[0])
-
-
-def test_a_summary_knows_how_far_radii_are_off(known, truth):
-    """The far radius rests on light that the discrepancy does not look at: its error is that of the fitted albedos."""
+    # The far radius rests on light that the discrepancy does not look at: its error is that of the fitted albedos.
     found = derived.summary(known, truth)
     assert found["quantity"] == "radius"
     expected = np.array([float(exact.quantile(0.995, alpha)) for alpha in found["alpha"]])
@@ -122,14 +117,6 @@ def test_a_summary_knows_how_far_radii_are_off(known, truth):
     off = [float(known.law.sampler.sample(0.995, a)) / float(exact.quantile(0.995, a)) - 1 for a in ALPHA]
     # The data's own radius is read off straight lines between edges a third apart.
     assert derived.tail_error(known, truth) == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=0.3)
-
-
-def test_misuse_is_named(known):
-    with pytest.raises(InputError, match=r"share must be in \(0, 1\), of a profile law, got 1.5 of Burley"):
-        derived.radius(known, 0.5, 1.5)
-    with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
-        derived.reflectance(known, 0.5)
-    assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
 
 
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])

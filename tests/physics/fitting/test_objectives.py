@@ -38,7 +38,7 @@ def test_energy_vanishes_on_the_laws_own(name, request, x64):
     np.testing.assert_allclose(table[:, :-1], 0.0, atol=1e-13)
 
 
-def test_energy_rows_are_weighted_by_the_share(burley, x64):
+def test_energy_rows_are_weighted_and_rings_that_do_not_count_add_nothing(burley, x64):
     """A ring of energy E that is off by the fraction f has the residual f sqrt(E / A): f^2, weighted by energy."""
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond)
@@ -47,11 +47,7 @@ def test_energy_rows_are_weighted_by_the_share(burley, x64):
     np.testing.assert_allclose(table, expected, rtol=1e-10)
     # So a law that is off by f everywhere has the sum of squares f^2 (its rings' share of A).
     np.testing.assert_allclose(np.sum(table**2, axis=1), 0.01 * off.energy.sum(axis=1) / off.reflectance, rtol=1e-10)
-
-
-def test_limit_rows_of_energy(burley, x64):
-    """Weight times (law / limit - 1): the unscaled energy over A, and twice the source strength over alpha."""
-    rings = of_law(burley)
+    # Rows of limits, weight times (law / limit - 1): the unscaled energy over A, twice the source strength over alpha.
     doubled = made(2 * rings.energy, 2 * rings.beyond, limits=np.array([3.0, 5.0]))
     table = np.hstack(objectives.energy(burley, doubled))
     np.testing.assert_allclose(table[:, -2], 3.0 * (0.5 - 1), rtol=1e-12)
@@ -59,10 +55,6 @@ def test_limit_rows_of_energy(burley, x64):
     reflectance = np.asarray(burley.albedo.reflectance(jnp.asarray(ALPHAS)))
     scale = 1.85 - reflectance + 7 * np.abs(reflectance - 0.8) ** 3
     np.testing.assert_allclose(table[:, -1], 5.0 * (reflectance * scale / ALPHAS - 1), rtol=1e-12)
-
-
-def test_rings_that_do_not_count_add_nothing(burley, x64):
-    rings = of_law(burley)
     used = np.ones_like(rings.energy)
     used[1, 4] = 0
     energy = rings.energy * 1.3
@@ -72,7 +64,7 @@ def test_rings_that_do_not_count_add_nothing(burley, x64):
     assert np.flatnonzero(table[1, :-2] == 0).tolist() == [4]
 
 
-def test_radial_vanishes_on_the_formula_itself(liang, x64):
+def test_radial_vanishes_on_the_formula_and_share_knows_the_negative_branch(liang, x64):
     """r R_d at the ring centre, from energies E = 2 pi dr r R_d."""
     centre, width = 0.5 * (EDGES[1:] + EDGES[:-1]), np.diff(EDGES)
     a, b, c = (np.asarray(value) for value in liang.coefficients(jnp.asarray(ALPHAS)[:, None]))
@@ -84,6 +76,12 @@ def test_radial_vanishes_on_the_formula_itself(liang, x64):
     used[:, 15:] = 0
     raised = made(2 * np.pi * width * (curve + 0.01), np.zeros(3), used=used)
     np.testing.assert_allclose(np.hstack(objectives.radial(liang, raised)), -0.01 * used, atol=1e-15)
+    # g(xi) < 0 for xi < eps: its share is minus the cdf of |g|, so the fit is told of the sign.
+    xi, edges = np.array([0.004]), np.array([0, 1.0, 2.0])
+    rings = made(np.full((1, 2), 0.5), np.zeros(1), edges=edges, alpha=ALPHAS[:1], xi=xi)
+    g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
+    assert g < 0
+    assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
 
 
 def test_albedo_and_reflectance_vanish_on_the_map_itself(normalisation, x64):
@@ -99,20 +97,15 @@ def test_albedo_and_reflectance_vanish_on_the_map_itself(normalisation, x64):
 
 
 @pytest.mark.slow
-def test_radius_and_share_vanish_on_the_samplers_own_cdf(liang, x64):
+def test_radius_and_share_vanish_on_the_samplers_own_cdf_and_have_their_units(liang, x64):
     """Data whose cdf at the edges g(xi_j) is xi_j exactly: then linear interpolation hits the nodes."""
-    xi = np.linspace(0.05, 0.95, 10)
-    alpha = ALPHAS[1:2]
+    xi, alpha = np.linspace(0.05, 0.95, 10), ALPHAS[1:2]
     edges = np.concatenate([[0.0], np.asarray(liang.sampler.unclipped(jnp.asarray(xi), jnp.asarray(0.6)))])
     energy = np.diff(np.concatenate([[0.0], xi]))[None, :]
     rings = made(energy, np.array([0.05]), edges=edges, alpha=alpha, xi=xi)
     for name in ("radius", "relative_radius", "share"):
         np.testing.assert_allclose(np.hstack(OBJECTIVES[name](liang, rings)), 0.0, atol=1e-13)
-
-
-@pytest.mark.slow
-def test_radius_share_and_relative_radius_measure_in_their_own_units(liang, x64):
-    """All light of the data spread evenly over [0, 2]: quantile 2 xi, cdf r/2."""
+    # All light of the data spread evenly over [0, 2]: quantile 2 xi, cdf r/2.
     xi, alpha = np.array([0.25, 0.5]), ALPHAS[:1]
     rings = made(np.full((1, 4), 0.25), np.zeros(1), edges=np.linspace(0, 2, 5), alpha=alpha, xi=xi)
     g = np.asarray(liang.sampler.unclipped(jnp.asarray(xi), jnp.asarray(alpha[0])))
@@ -121,23 +114,10 @@ def test_radius_share_and_relative_radius_measure_in_their_own_units(liang, x64)
     np.testing.assert_allclose(np.hstack(objectives.share(liang, rings))[0], g / 2 - xi, rtol=1e-12)
 
 
-def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
-    """g(xi) < 0 for xi < eps: its share is minus the cdf of |g|, so the fit is told of the sign."""
-    rings = made(
-        np.full((1, 2), 0.5), np.zeros(1), edges=np.array([0, 1.0, 2.0]), alpha=ALPHAS[:1], xi=np.array([0.004])
-    )
-    g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
-    assert g < 0
-    assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
-
-
-@pytest.mark.slow
 def _law(name, liang, normalisation):
     """One that the objective is of."""
-    maps = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84)} | dict.fromkeys(
-        ("reflectance", "relative_reflectance"), normalisation
-    )
-    return maps.get(name, liang)
+    maps = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}
+    return maps.get(name.removeprefix("relative_"), liang)
 
 
 @pytest.mark.parametrize("name", OBJECTIVES)
@@ -188,16 +168,13 @@ def test_rings_of_leaves_out_what_is_not_trusted():
     # The albedo is as precise as .3^2 / (.01^2 + .015^2 + .015^2) = 164 photons make it; a tenth is too few.
     with pytest.raises(InputError, match="no albedo rests on 500 effective ones"):
         rings_of(profiles, xi=(0.1, 0.2))
-
-
-def test_rings_know_reflectance_and_cdf():
     rings = made(np.array([[0.1, 0.2]]), np.array([0.1]), edges=np.arange(3.0), alpha=ALPHAS[:1])
     np.testing.assert_allclose(np.asarray(rings.reflectance), [0.4], rtol=1e-6)
     np.testing.assert_allclose(np.asarray(rings.cdf), [[0.0, 0.25, 0.75]], rtol=1e-6)
 
 
 @pytest.mark.slow
-def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
+def test_relative_is_a_mean_square_error_and_resists_a_fall_next_to_white(burley, x64):
     """A law that is 10 % off in every ring has rows of 0.1 whose squares add up to 0.01, however the rings are cut."""
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond / 1.1)
@@ -208,14 +185,9 @@ def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
     assert np.all(misfit[:, 0] == 0)  # from 0 to the first edge: no stretch of ln r
     np.testing.assert_allclose(shares, 0.0, atol=1e-12)  # the energy is where it should be
     assert np.all(table[:, 2 * n + 1 :] == 0)
-
-
-@pytest.mark.slow
-def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, x64):
-    rings = of_law(burley)
+    # It counts misplaced energy, and stops at the last percent.
     moved = made(np.roll(rings.energy, 1, axis=1), rings.beyond)
     table = np.hstack(objectives.relative(burley, moved))
-    n = EDGES.size - 1
     cdf = np.asarray(moved.cdf)
     expected = objectives.SHARE_WEIGHT / np.sqrt(EDGES.size) * (np.asarray(rings.cdf) - cdf)
     np.testing.assert_allclose(table[:, n : 2 * n + 1], expected, atol=1e-12)
@@ -223,11 +195,7 @@ def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, 
     assert np.any(beyond)
     assert np.all(table[:, :n][beyond] == 0)
 
-
-@pytest.mark.slow
-def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
-    """A law whose energy is 1 + v times another's, v = sqrt(1 - alpha), falls with the slope 1 in v at white."""
-
+    # A law whose energy is 1 + v times another's, v = sqrt(1 - alpha), falls with the slope 1 in v at white.
     class Falling:
         def under(self, surfaces):
             return self

@@ -38,14 +38,9 @@ def test_exact_rings_are_differences_of_the_cdf(truth):
         np.testing.assert_allclose(truth.energy[row], np.diff(inside), rtol=1e-12, atol=1e-16)
         assert truth.reflectance[row] == pytest.approx(exact.reflectance(alpha), rel=1e-14)
         np.testing.assert_allclose(truth.cdf[row], exact.cdf(truth.r_edges, alpha), atol=1e-14)
-    assert truth.source == "exact"
-    assert truth.covariance is None
-    assert truth.photons is None
+    assert (truth.source, truth.covariance, truth.photons) == ("exact", None, None)
     assert np.all(truth.standard_error == 0)
     assert np.all(truth.trusted)
-
-
-def test_the_setting_comes_along():
     found = Profiles.from_exact([0.5], [0.0, 1.0], Setting("diffuse"))
     assert found.setting == Setting("diffuse")
     assert found.reflectance[0] == pytest.approx(exact.reflectance(0.5, Setting("diffuse")))
@@ -53,26 +48,28 @@ def test_the_setting_comes_along():
         Profiles.from_exact([0.5], [0.0, 1.0], Setting(n=0.9))
 
 
-def test_energy_is_value_times_area(photons, white_run):
+def test_energy_light_beyond_trust_and_covariance_of_photons(photons, white_run):
     np.testing.assert_allclose(photons.value * photons.r_areas, photons.energy, rtol=1e-14)
     np.testing.assert_allclose(photons.value, white_run.profile(ALPHAS).value, rtol=1e-12)
     np.testing.assert_allclose(photons.r_areas, white_run.grid.r_areas, rtol=1e-12)
     np.testing.assert_allclose(photons.r, 0.5 * (photons.r_edges[1:] + photons.r_edges[:-1]))
-
-
-def test_light_beyond_the_last_ring_is_kept(photons, white_run):
     np.testing.assert_allclose(photons.reflectance, white_run.reflectance(ALPHAS).value, rtol=1e-12)
     assert np.all(photons.cdf[:, 0] == 0)
     np.testing.assert_allclose(1 - photons.cdf[:, -1], photons.beyond / photons.reflectance, atol=1e-14)
-
-
-def test_rings_with_few_photons_are_not_trusted(photons):
     np.testing.assert_array_equal(photons.trusted, photons.effective_samples >= 50)
     assert FEWEST_EFFECTIVE_SAMPLES == 50
     assert not photons.trusted[0, -1]  # alpha = .3 beyond 20 mfp
+    variance = np.sum(photons.covariance.factor**2, axis=2).T
+    # Rank 4 holds it all, and both divide by N (N - 1); what is left of a photon with weight .3^40 is rounding.
+    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-9, atol=1e-18)
+    assert photons.covariance.rank == len(ALPHAS)
+    many = Profiles.from_orders(white_run, np.linspace(0.1, 0.99, 20)).covariance
+    assert many.rank == COVARIANCE_RANK == 8
+    assert 0 < many.dropped < 1e-3
+    assert Profiles.from_orders(white_run, ALPHAS, correlated=False).covariance is None
 
 
-def test_merged_rings_hold_the_same_energy(white_run, photons):
+def test_merged_rings_hold_the_same_energy_and_covariance(white_run, photons):
     edges = white_run.grid.r_edges[[0, 3, 4, 12, 25]]
     merged = Profiles.from_orders(white_run.merged(edges), ALPHAS)
     sums = np.add.reduceat(photons.energy, [0, 3, 4, 12], axis=1)
@@ -83,40 +80,18 @@ def test_merged_rings_hold_the_same_energy(white_run, photons):
     np.testing.assert_allclose(inner.reflectance, photons.reflectance, rtol=1e-12)
     with pytest.raises(InputError, match="r_edges must be edges of the run's own grid"):
         white_run.merged([0.0, 0.0123, 1.0])
-
-
-def test_merged_covariance_is_the_merge_of_the_covariance(white_run, photons):
-    """Two routes to the error of a sum of rings: tally the sum, or add the parts with their negative covariance."""
+    # Two routes to the error of a sum of rings: tally the sum, or add the parts with their negative covariance.
     groups = [(0, 3), (3, 4), (4, 12), (12, 25)]
-    merged = Profiles.from_orders(white_run.merged(white_run.grid.r_edges[[0, 3, 4, 12, 25]]), ALPHAS)
     parts = np.zeros((len(ALPHAS) * 4, len(ALPHAS), 25))
     whole = np.zeros((len(ALPHAS) * 4, len(ALPHAS), 4))
     for row, (a, g) in enumerate(np.ndindex(len(ALPHAS), 4)):
         parts[row, a, slice(*groups[g])] = 1.0
         whole[row, a, g] = 1.0
-    np.testing.assert_allclose(
-        photons.covariance.sandwich(parts), merged.covariance.sandwich(whole), rtol=1e-9, atol=1e-20
-    )
+    added = photons.covariance.sandwich(parts)
+    np.testing.assert_allclose(added, merged.covariance.sandwich(whole), rtol=1e-9, atol=1e-20)
 
 
-def test_covariance_without_a_request_is_not_made(white_run):
-    assert Profiles.from_orders(white_run, ALPHAS, correlated=False).covariance is None
-
-
-def test_rank_is_that_of_the_albedos_or_eight(white_run, photons):
-    assert photons.covariance.rank == len(ALPHAS)
-    many = Profiles.from_orders(white_run, np.linspace(0.1, 0.99, 20)).covariance
-    assert many.rank == COVARIANCE_RANK == 8
-    assert 0 < many.dropped < 1e-3
-
-
-def test_the_diagonal_is_the_standard_error(photons):
-    variance = np.sum(photons.covariance.factor**2, axis=2).T
-    # Rank 4 holds it all, and both divide by N (N - 1); what is left of a photon with weight .3^40 is rounding.
-    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-9, atol=1e-18)
-
-
-def test_sandwich_is_the_dense_closed_form():
+def test_sandwich_and_draws_have_the_dense_closed_form(sidak):
     """(delta_ij sum_n (ab)^n H_in / N - E_i(a) E_j(b)) / (N - 1), every pair of rings and albedos written out."""
     one, dense = dense_covariance()
     factor, energy, photons = one.factor, one.energy, one.photons
@@ -127,6 +102,16 @@ def test_sandwich_is_the_dense_closed_form():
     # Negative control: without what is between rings it is another matrix.
     within = np.einsum("pai,iak,ibk,qbi->pq", gain, factor, factor, gain)
     assert np.max(np.abs(within - expected)) > 1e-2 * np.max(np.abs(expected))
+    # Ten thousand draws against the closed form, pair by pair (Wishart).
+    one, dense = dense_covariance()
+    number, closed = 10_000, dense.reshape(6, 6)
+    drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
+    error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
+    assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
+    assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
+    # Negative control: rings that do not share out their photons.
+    alone = np.where(np.eye(3, dtype=bool)[None, :, None, :], dense, 0.0).reshape(6, 6)
+    assert np.abs((np.cov(drawn, rowvar=False) - alone) / error).max() > 2 * sidak(21)
 
 
 def dense_covariance():
@@ -140,21 +125,8 @@ def dense_covariance():
     for a, i, b, j in np.ndindex(2, 3, 2, 3):
         same = np.sum(weights[a] * weights[b] * counts[i]) / photons if i == j else 0.0
         dense[a, i, b, j] = (same - energy[a, i] * energy[b, j]) / (photons - 1)
-    factor = np.stack([_root(dense[:, i, :, i]) for i in range(3)])
-    return Covariance(factor, energy, photons, 0.0), dense
-
-
-def test_draws_have_the_covariance_between_rings_too(sidak):
-    """Ten thousand draws against the closed form, pair by pair (Wishart)."""
-    one, dense = dense_covariance()
-    number, closed = 10_000, dense.reshape(6, 6)
-    drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
-    error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
-    assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
-    assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
-    # Negative control: rings that do not share out their photons.
-    alone = np.where(np.eye(3, dtype=bool)[None, :, None, :], dense, 0.0).reshape(6, 6)
-    assert np.abs((np.cov(drawn, rowvar=False) - alone) / error).max() > 2 * sidak(21)
+    value, vector = np.linalg.eigh(np.stack([dense[:, i, :, i] for i in range(3)]))
+    return Covariance(vector * np.sqrt(np.maximum(value, 0.0))[:, None], energy, photons, 0.0), dense
 
 
 def test_draws_scatter_as_the_sandwich_where_many_rings_hold_few_photons(white_run):
@@ -183,11 +155,6 @@ def test_rank_eight_loses_nothing_of_a_sum_and_rank_four_does(white_run):
     assert np.max(np.abs(errors[4] / errors[20] - 1.0)) > 1e-3
 
 
-def _root(matrix):
-    value, vector = np.linalg.eigh(matrix)
-    return vector * np.sqrt(np.maximum(value, 0.0))
-
-
 def test_sandwich_is_the_scatter_of_synthetic_tallies(tallies, sidak):
     """Sums over many rings of 2000 tallies: the negative terms between rings make up much of their variance."""
     number = 2000
@@ -207,11 +174,6 @@ def test_sandwich_is_the_scatter_of_synthetic_tallies(tallies, sidak):
     assert np.abs((scatter - alone) / error).max() > 2 * sidak(6)
 
 
-def test_one_albedo_may_be_a_number(white_run):
-    assert Profiles.from_orders(white_run, 0.5).energy.shape == (1, 25)
-    assert Profiles.from_exact(0.5, [0.0, 1.0]).energy.shape == (1, 1)
-
-
 @pytest.mark.parametrize("alpha", [0.0, -0.1, 1.1, [0.5, np.nan], [[0.5]]])
 def test_albedos_must_be_a_list_above_zero(alpha, white_run):
     for make in (lambda: Profiles.from_orders(white_run, alpha), lambda: Profiles.from_exact(alpha, [0.0, 1.0])):
@@ -219,13 +181,12 @@ def test_albedos_must_be_a_list_above_zero(alpha, white_run):
             make()
 
 
-def test_orders_that_scatter_forwards_are_refused():
-    """Their rings are in mean free paths, which are other shares of l* for each albedo."""
+def test_forward_orders_are_refused_and_white_media_and_numbers_allowed(white_run):
+    # Rings of forward orders are in mean free paths, which are other shares of l* for each albedo.
     run = simulate_orders(Grid(1.0, 3), 100, seed=1, setting=Setting(g=0.5))
     with pytest.raises(InputError, match=r"orders must be of light that scatters isotropically, got g = 0\.5"):
         Profiles.from_orders(run, [0.5])
-
-
-def test_a_white_medium_is_allowed():
     run = simulate_orders(Grid(1.0, 3), 1000, seed=1)
     assert Profiles.from_orders(run, [0.5, 1.0]).reflectance[1] > 0.9
+    assert Profiles.from_orders(white_run, 0.5).energy.shape == (1, 25)
+    assert Profiles.from_exact(0.5, [0.0, 1.0]).energy.shape == (1, 1)

@@ -1,13 +1,17 @@
-"""The measures: zero for the truth itself, by hand where a hand can, and sensitive to what they are named after."""
+"""The measures: zero for the truth itself, by hand where a hand can, sensitive to what they are named after."""
 
-import equinox as eqx
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.fitting.quality import albedo_quality, profile_quality, r_squared
+from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality, r_squared
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.printed_maps import LiangAlbedo
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.record import Records
 
 ALPHAS = [0.3, 0.9]
 
@@ -29,8 +33,6 @@ class Truth:
 class ExactMap(AlbedoLaw):
     """The exact A(alpha), its inverse by interpolation on a fine table."""
 
-    setting: Setting = eqx.field(static=True)
-
     def reflectance(self, alpha):
         return exact.reflectance(alpha, self.setting)
 
@@ -48,33 +50,24 @@ def test_the_truth_has_no_error(setting):
     np.testing.assert_array_equal(found.alpha, ALPHAS)
 
 
-def test_a_law_is_measured_against_its_own_light():
-    """Negative control: the searchlight's profile called diffuse."""
+def test_measures_of_brighter_mistaken_and_stretched_light():
+    found = profile_quality(Truth(brighter=1.07), ALPHAS)
+    np.testing.assert_allclose(found.rel, 0.07, rtol=1e-12)
+    np.testing.assert_array_equal(found.ks, 0.0)  # a cdf is normalised
 
+    # Negative control: the searchlight's profile called diffuse.
     class Mistaken(Truth):
         def profile(self, r, alpha, mfp=1.0):
             return exact.profile(r, alpha, mfp)
 
     assert np.all(profile_quality(Mistaken(setting=Setting("diffuse")), ALPHAS).rel > 0.02)
-
-
-def test_rel_is_the_mean_relative_error():
-    found = profile_quality(Truth(brighter=1.07), ALPHAS)
-    np.testing.assert_allclose(found.rel, 0.07, rtol=1e-12)
-    np.testing.assert_array_equal(found.ks, 0.0)  # a cdf is normalised
-
-
-def test_ks_is_the_largest_shift_of_a_stretched_cdf():
-    """By brute force over a grid of its own, six times finer."""
+    # By brute force over a grid of its own, six times finer.
     for alpha in ALPHAS:
         r = np.geomspace(0.05, 30, 6000)
         brute = np.max(np.abs(exact.cdf(r / 1.05, alpha) - exact.cdf(r, alpha)))
         # The measure's own 1600 radii are 0.9 % apart: near a maximum that costs the square of it.
         assert profile_quality(Truth(stretch=1.05), alpha).ks[0] == pytest.approx(brute, rel=1e-3)
-
-
-def test_l1_of_a_stretch_is_its_ks():
-    """Stretched light moves outward through one radius only: what is lost inside is all the misplaced energy."""
+    # Stretched light moves outward through one radius only: what is lost inside is all the misplaced energy.
     found = profile_quality(Truth(stretch=1.05), ALPHAS)
     np.testing.assert_allclose(found.l1, found.ks, rtol=2e-3)
 
@@ -115,7 +108,7 @@ def test_r_squared_by_hand():
     assert r_squared(np.array([1.0, 3]), np.array([2.0, 2])) == 0.0
 
 
-def test_the_exact_map_has_no_error():
+def test_maps_are_measured_against_the_exact_one_and_folds_are_told(normalisation):
     found = albedo_quality(ExactMap(Setting()))
     assert found.delta_A == 0.0
     assert found.delta_alpha < 1e-5  # the table's linear interpolation
@@ -123,19 +116,20 @@ def test_the_exact_map_has_no_error():
     assert found.fold == 1.0
     assert found.at_one == pytest.approx(1.0)
 
-
-def test_maps_are_measured_under_their_own_light():
     class Mistaken(ExactMap):
         def reflectance(self, alpha):
             return exact.reflectance(alpha)
 
-    expected = np.max(
-        exact.reflectance(np.linspace(0, 1, 400), Setting("diffuse")) - exact.reflectance(np.linspace(0, 1, 400))
-    )
+    even = np.linspace(0, 1, 400)
+    expected = np.max(exact.reflectance(even, Setting("diffuse")) - exact.reflectance(even))
     assert albedo_quality(Mistaken(Setting("diffuse"))).delta_A == pytest.approx(expected, rel=1e-3)
 
+    # A map that is NaN everywhere errs by 1 - A, not by nothing.
+    class Nothing(ExactMap):
+        def reflectance(self, alpha):
+            return np.full(np.shape(alpha), np.nan)
 
-def test_a_map_that_folds_is_told():
+    assert albedo_quality(Nothing(Setting())).delta_A == pytest.approx(1.0, abs=1e-3)
     found = albedo_quality(LiangAlbedo(Setting(), 5.67, 3.84, 0.84))
     assert not found.monotone
     assert found.fold == pytest.approx(np.sqrt(0.84), abs=1e-4)  # a grid of 5e-5
@@ -143,9 +137,6 @@ def test_a_map_that_folds_is_told():
     # Where alpha > .99947 the map has no A at all, and 1 - alpha is wrong by more than its own size.
     assert 0.05 < found.delta_A < 0.2
     assert found.largest_s > 1.0
-
-
-def test_a_map_that_rises_is_told(normalisation):
     found = albedo_quality(normalisation)
     assert found.monotone
     assert found.delta_A < 4e-6
@@ -153,11 +144,18 @@ def test_a_map_that_rises_is_told(normalisation):
     assert found.at_one == 1.0
 
 
-def test_no_reflectance_counts_as_one():
-    """A map that is NaN everywhere errs by 1 - A, not by nothing."""
-
-    class Nothing(ExactMap):
-        def reflectance(self, alpha):
-            return np.full(np.shape(alpha), np.nan)
-
-    assert albedo_quality(Nothing(Setting())).delta_A == pytest.approx(1.0, abs=1e-3)
+def test_words_and_worst_values_of_measures():
+    assert [MEASURES[name].worst([0.1, 0.3, 0.2]) for name in ("rel", "r2")] == [0.3, 0.1]
+    assert MEASURES["delta_A"].worst(0.5) == 0.5
+    assert MEASURES["mse"].meaning == "of r R_d [1/mfp²]"
+    assert MEASURES["ks"].meaning == MEASURES["ks"].formula
+    assert (MEASURES["inversion_error"].header, MEASURES["rel"].header) == ("error", "rel")
+    told = [
+        content["quality"]["regenerated"]
+        for content in Records(fits_folder()).contents().values()
+        if "quality" in content
+    ]
+    for name in (*OF_PROFILE, *OF_MAP):
+        assert any(name in one for one in told)
+    for kind in (Quality, AlbedoQuality):
+        assert {field.name for field in fields(kind)} - {"alpha", "mse_halves", "r2_halves"} <= set(MEASURES)

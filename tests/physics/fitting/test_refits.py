@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from benchmarks.refits import (
-    LEVELS,
-    Bootstrap,
-    binomial_band,
-    bootstrap,
-    counted,
-    coverage,
-    drawn_noise,
-    energies,
-    refits,
-)
+from benchmarks import refits as module
+from benchmarks.refits import LEVELS, Bootstrap, binomial_band, bootstrap, counted, coverage, drawn_noise, refits
 from mcml_sim import Grid, InputError, Setting, simulate_orders
 from profilefit.fitting.chains import posterior
 from profilefit.fitting.estimate import fit
@@ -49,33 +40,20 @@ def known(tallies, toy):
 
 
 @pytest.mark.slow
-def test_intervals_of_the_true_law_cover(known):
+def test_intervals_of_the_true_law_cover_and_wrong_ones_do_not(known):
     one, covariance, again = known
     assert again.failed == 0
     np.testing.assert_allclose(again.truth, [1.0, 0.5, 0.5], rtol=1e-6)
-    found = coverage(one.free, again.found - again.truth, again.sandwich_errors(covariance))
+    off, error = again.found - again.truth, again.sandwich_errors(covariance)
+    found = coverage(one.free, off, error)
     assert found.share.shape == (2, 3)
     assert found.honest
     # Its own gain is that of the one fit that `estimate` made, near enough.
-    np.testing.assert_allclose(
-        again.sandwich_errors(covariance).mean(axis=0), one.statistical.diagonal() ** 0.5, rtol=0.05
-    )
-
-
-@pytest.mark.slow
-def test_noise_taken_for_independent_does_not_cover(known):
-    """Negative control: albedos share their photons."""
-    one, covariance, again = known
-    found = coverage(one.free, again.found - again.truth, again.independent_errors(covariance))
+    np.testing.assert_allclose(error.mean(axis=0), one.statistical.diagonal() ** 0.5, rtol=0.05)
+    # Negative controls: albedos share their photons; and what the band can see.
+    found = coverage(one.free, off, again.independent_errors(covariance))
     assert not np.any(found.inside)
     assert np.all(found.share[0] < 0.5)
-
-
-@pytest.mark.slow
-def test_errors_a_tenth_off_do_not_cover(known):
-    """Negative control: what the band can see."""
-    one, covariance, again = known
-    off, error = again.found - again.truth, again.sandwich_errors(covariance)
     assert not coverage(one.free, off, 0.9 * error).honest
     assert not coverage(one.free, off, 1.12 * error).honest
 
@@ -89,6 +67,9 @@ def test_whole_photons_are_covered_too(tallies, toy):
     covariances = [tallies.profiles(one).covariance for one in counts]
     errors = [np.sqrt(np.diag(c.sandwich(g))) for c, g in zip(covariances, again.gain, strict=True)]
     assert coverage(one.free, again.found - again.truth, np.array(errors)).honest
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), toy, "energy", jackknife=False)
+    with pytest.raises(InputError, match=r"energy must let Toy converge without noise, got one where it does not"):
+        refits(one, np.full((5, 15), np.nan), np.zeros((1, 5, 15)))
 
 
 @pytest.mark.slow
@@ -128,30 +109,24 @@ def test_posteriors_cover_too(tallies, toy):
     assert not counted(one.free, np.stack(narrow, axis=1)).honest
 
 
-def test_the_band_is_binomial():
-    """Ends of Clopper and Pearson turned round: all but 1 % of honest tables of six shares lie within."""
-    low, high = binomial_band(0.68, 2000, 6)
-    inside = binom.cdf(round(high * 2000), 2000, 0.68) - binom.cdf(round(low * 2000) - 1, 2000, 0.68)
-    assert 0.99 <= inside**6 < 0.994
-    width = norm.isf((1 - 0.99 ** (1 / 6)) / 2) * np.sqrt(0.68 * 0.32 / 2000)
-    assert high - 0.68 == pytest.approx(width, rel=0.05)
-    assert binomial_band(0.5, 4, 1) == (0.0, 1.0)
-
-
-def test_shares_are_counted():
+def test_shares_bands_and_scatter_by_hand():
     off = np.array([[0.5, -3.0], [1.5, 0.0], [-0.9, 1.0], [2.5, 0.1]])
     found = coverage(("a", "b"), off, np.array([1.0, 1.0]))
     # Within .994 of zero: 0.5 and -0.9 of a; 0, 0.1 of b. Within 1.96: one more of each.
     np.testing.assert_array_equal(found.share, [[0.5, 0.5], [0.75, 0.75]])
     assert found.replicates == 4
     assert counted(("a",), np.ones((2, 2000, 1), bool)).honest is False
-
-
-@pytest.mark.slow
-def test_a_truth_that_cannot_be_fitted_is_named(tallies, toy):
-    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), toy, "energy", jackknife=False)
-    with pytest.raises(InputError, match=r"energy must let Toy converge without noise, got one where it does not"):
-        refits(one, np.full((5, 15), np.nan), np.zeros((1, 5, 15)))
+    # Ends of Clopper and Pearson turned round: all but 1 % of honest tables of six shares lie within.
+    low, high = binomial_band(0.68, 2000, 6)
+    inside = binom.cdf(round(high * 2000), 2000, 0.68) - binom.cdf(round(low * 2000) - 1, 2000, 0.68)
+    assert 0.99 <= inside**6 < 0.994
+    width = norm.isf((1 - 0.99 ** (1 / 6)) / 2) * np.sqrt(0.68 * 0.32 / 2000)
+    assert high - 0.68 == pytest.approx(width, rel=0.05)
+    assert binomial_band(0.5, 4, 1) == (0.0, 1.0)
+    # B of B drawn with replacement have (B - 1)/B of the variance.
+    values = np.random.default_rng(3).standard_normal((500, 2))
+    plain = np.cov(values, rowvar=False)
+    np.testing.assert_allclose(Bootstrap(("a", "b"), values, 0, 10).covariance, plain * 10 / 9, rtol=1e-12)
 
 
 BATCHES, PHOTONS = 48, 2**14
@@ -171,35 +146,19 @@ def one(batches, normalisation):
 
 
 @pytest.mark.slow
-def test_the_scatter_of_batches_is_the_closed_form(batches, one):
+def test_the_scatter_of_batches_is_the_closed_form_and_batches_must_be_alike(batches, one):
     """A run of all batches has the error of one over sqrt(48); 48 batches know it to a tenth."""
     found = bootstrap(batches, one, number=400, seed=1)
-    assert found.failed == 0
-    assert found.constants.shape == (400, 2)
+    assert (found.failed, found.constants.shape) == (0, (400, 2))
     ratio = found.standard_error * np.sqrt(BATCHES) / np.sqrt(np.diag(one.statistical))
     # Four of 1/sqrt(2 * 48), and 3.5 % for each of the 400 resamples' own scatter and the one batch's covariance.
     np.testing.assert_allclose(ratio, 1.0, atol=0.45)
     # Negative control: the misfit taken for noise is another number.
     wrong = np.sqrt(np.diag(one.misfit) / BATCHES)
     assert np.all(np.abs(found.standard_error / wrong - 1.0) > 0.45)
-
-
-@pytest.mark.slow
-def test_energies_are_those_of_the_batches(batches, one):
-    found = energies(batches, one)
+    found = module.energies(batches, one)
     assert found.shape == (BATCHES, ALPHA.size, 2)
     np.testing.assert_allclose(found[3].sum(axis=1), batches[3].reflectance(ALPHA).value, rtol=1e-12)
-
-
-def test_too_little_scatter_of_few_batches_is_put_right():
-    """B of B drawn with replacement have (B - 1)/B of the variance."""
-    values = np.random.default_rng(3).standard_normal((500, 2))
-    plain = np.cov(values, rowvar=False)
-    np.testing.assert_allclose(Bootstrap(("a", "b"), values, 0, 10).covariance, plain * 10 / 9, rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_batches_must_be_alike(batches, one):
     with pytest.raises(InputError, match="batches must be at least 10, got 3"):
         bootstrap(batches[:3], one)
     with pytest.raises(InputError, match="batches must be of different seeds, got one twice"):

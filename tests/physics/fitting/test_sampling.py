@@ -10,15 +10,8 @@ from scipy.optimize import brentq
 import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.fitting.sampling import (
-    BATCH,
-    LAST,
-    ExactTarget,
-    LawTarget,
-    edge_light,
-    lit_beyond_edge,
-    sampler_quality,
-)
+from profilefit.fitting import sampling
+from profilefit.fitting.sampling import BATCH, ExactTarget, LawTarget, edge_light, lit_beyond_edge, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.two_parts import TwoPartSampler
 
@@ -90,7 +83,7 @@ def test_a_mixture_is_judged_part_by_part():
     assert lit > 1e-3
 
 
-def test_an_exact_inverse_has_no_error(burley):
+def test_an_exact_inverse_has_no_error_and_a_circle_by_hand(burley):
     found = sampler_quality(burley.sampler, [0.3, ALPHA])
     np.testing.assert_array_equal(found.alpha, [0.3, ALPHA])
     assert np.all(found.inversion_error < 1e-14)
@@ -99,23 +92,26 @@ def test_an_exact_inverse_has_no_error(burley):
         assert np.max(np.abs(measure)) < 1.01 * STEP
     for measure in (found.edge_bias, found.edge_bias_by_law_pdf):
         assert np.max(np.abs(measure)) < 20 * STEP  # the last step is all beyond the edge
+    # A circle of twice the distance shows the edge 120 degrees of its 360.
+    np.testing.assert_allclose(lit_beyond_edge(np.array([0.0, 0.5, 1.0, 2.0, 1e12]), 1.0), [0, 0, 0, 1 / 3, 0.5])
 
 
 @TARGETS
-def test_light_beyond_an_edge(which, burley):
+def test_light_beyond_an_edge_and_variance_are_plain_integrals(which, burley):
     """Against the plain integral of the density, of a law and of the exact profile."""
     target = ExactTarget() if which == "exact" else LawTarget(burley)
     light = integral(lambda x: target.density(x, ALPHA) * lit_beyond_edge(x, 0.7), 0.7, 90.0)
     assert edge_light(target, ALPHA, 0.7) == pytest.approx(light, abs=1e-7)  # a root at the edge
     assert edge_light(target, ALPHA, 1e-9) == pytest.approx(0.5, abs=1e-6)
+    # int f^2 / pdf dr - 1, by another quadrature in another variable.
+    target = ExactTarget() if which == "exact" else LawTarget(burley)
+    sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
+    square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
+    found = sampler_quality(sampler, ALPHA, target)
+    assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
 
 
-def test_a_circle_beyond_an_edge_by_hand():
-    """A circle of twice the distance shows the edge 120 degrees of its 360."""
-    np.testing.assert_allclose(lit_beyond_edge(np.array([0.0, 0.5, 1.0, 2.0, 1e12]), 1.0), [0, 0, 0, 1 / 3, 0.5])
-
-
-def test_a_stretch_costs_nothing_with_its_own_density(burley):
+def test_a_stretch_costs_nothing_and_a_clip_is_an_atom(burley):
     """With the law's it moves the light: what lies beyond the edge is what was beyond edge / 1.1."""
     found = sampler_quality(Stretched(burley, 1.1), ALPHA)
     assert abs(found.bias[0]) < 1e-6
@@ -125,31 +121,11 @@ def test_a_stretch_costs_nothing_with_its_own_density(burley):
     assert moved > 0.05
     assert found.edge_bias_by_law_pdf[0] == pytest.approx(moved, abs=1e-5)
     x = np.geomspace(0.01, 20, 20_000)
-    assert found.inversion_error[0] == pytest.approx(
-        np.max(np.abs(burley.cdf(1.1 * x, ALPHA) - burley.cdf(x, ALPHA))), rel=1e-4
-    )
-
-
-@TARGETS
-def test_variance_is_the_chi_square_divergence(which, burley):
-    """int f^2 / pdf dr - 1, by another quadrature in another variable."""
-    target = ExactTarget() if which == "exact" else LawTarget(burley)
-    sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
-    square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
-    found = sampler_quality(sampler, ALPHA, target)
-    assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
-
-
-def test_a_density_that_is_not_the_sampler_s_is_seen(burley):
-    """Negative control: 1.1 times too dense, so 1/1.1 of the light."""
+    off = np.max(np.abs(burley.cdf(1.1 * x, ALPHA) - burley.cdf(x, ALPHA)))
+    assert found.inversion_error[0] == pytest.approx(off, rel=1e-4)
+    # Negative control: 1.1 times too dense, so 1/1.1 of the light.
     found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
     assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
-
-
-# Clips
-
-
-def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
     found = sampler_quality(Clipped(burley, 2.0), ALPHA)
     beyond = 1 - burley.cdf(2.0, ALPHA)
     assert found.atom[0] == pytest.approx(beyond, rel=1e-10)
@@ -163,8 +139,11 @@ def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
     assert found.edge_bias_by_law_pdf[0] == pytest.approx((within + beyond / 3) / light - 1, abs=1e-6)
 
 
+# Clips
+
+
 @pytest.mark.slow
-def test_the_paper_s_clip_is_an_atom(liang):
+def test_the_paper_s_clip_is_an_atom_and_loses_light(liang):
     """r = min(|g|, r_max) of (21), found from its radii alone; at 0.5 the law ends beyond the sampler's reach."""
     found = sampler_quality(liang.sampler, [0.1, 0.5, ALPHA])
     for alpha, share in zip(found.alpha[[0, 2]], found.atom[[0, 2]], strict=True):
@@ -178,29 +157,14 @@ def test_the_paper_s_clip_is_an_atom(liang):
     np.testing.assert_allclose(found.bias, [0.0, liang.cdf(reach, 0.5) - 1, 0.0], atol=1e-6)
     assert found.bias[1] < -0.01
     assert np.all(np.abs(found.edge_bias_by_law_pdf) > 0.1), "an approximate inverse is no sampler of its law"
-
-
-@pytest.mark.slow
-def test_light_that_the_paper_s_clip_loses(liang):
-    """Of the exact profile: what lies beyond r_max, and a division by zero where the law's density is used."""
+    # Of the exact profile: what lies beyond r_max, and a division by zero where the law's density is used.
     found = sampler_quality(liang.sampler, ALPHA, ExactTarget())
     beyond = 1 - exact.cdf(float(liang.largest_radius(ALPHA)), ALPHA)
     assert found.bias[0] == pytest.approx(-beyond, abs=1e-6)
-    assert found.bias_by_law_pdf[0] == np.inf
-    assert found.edge_bias_by_law_pdf[0] == np.inf
+    assert found.bias_by_law_pdf[0] == found.edge_bias_by_law_pdf[0] == np.inf
 
 
 # By random numbers
-
-
-def weights(sampler, target, number, seed):
-    """Weights by the sampler's own density and by the law's, and the share of each circle beyond the edge."""
-    xi = np.random.default_rng(seed).random(number) * -np.expm1(-LAST)
-    x = in_batches(lambda part: sampler.sample(part, ALPHA), xi)
-    light, density = target.density(x, ALPHA), in_batches(lambda part: sampler.pdf(part, ALPHA), x)
-    own = np.divide(light, density, out=np.zeros_like(x), where=density > 0)  # an atom has no density
-    law = LawTarget(sampler.law).density(x, ALPHA)
-    return own, np.divide(light, law, out=np.ones_like(x), where=density > 0), lit_beyond_edge(x, 1.0)
 
 
 @pytest.mark.parametrize("name", ["approximate", pytest.param("paper", marks=pytest.mark.slow)])
@@ -209,8 +173,12 @@ def test_means_and_variance_against_random_numbers(name, burley, liang, sidak):
     sampler = Stretched(burley, 1.1) if name == "approximate" else liang.sampler
     target = LawTarget(sampler.law)
     found = sampler_quality(sampler, ALPHA)
-    own, by_law, lit = weights(sampler, target, 40 * BATCH, 5)
-    light = edge_light(target, ALPHA, 1.0)
+    xi = np.random.default_rng(5).random(40 * BATCH) * -np.expm1(-sampling.LAST)
+    x = in_batches(lambda part: sampler.sample(part, ALPHA), xi)
+    light, density = target.density(x, ALPHA), in_batches(lambda part: sampler.pdf(part, ALPHA), x)
+    own = np.divide(light, density, out=np.zeros_like(x), where=density > 0)  # an atom has no density
+    by_law = np.divide(light, LawTarget(sampler.law).density(x, ALPHA), out=np.ones_like(x), where=density > 0)
+    lit, light = lit_beyond_edge(x, 1.0), edge_light(target, ALPHA, 1.0)
     squares = (own - own.mean()) ** 2
     pairs = [
         (own, 1 + found.bias[0]),
@@ -238,10 +206,14 @@ def test_targets_are_of_their_setting(burley):
     np.testing.assert_allclose(density, step, rtol=1e-5)
 
 
-def test_bad_numbers_are_named(burley):
-    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got 0"):
-        sampler_quality(burley.sampler, [0.5, 0.0])
-    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got nan"):
-        sampler_quality(burley.sampler, np.nan)
-    with pytest.raises(InputError, match="edge must be a distance > 0, got 0"):
-        sampler_quality(burley.sampler, 0.5, edge=0.0)
+@pytest.mark.parametrize(
+    ("alpha", "edge", "said"),
+    [
+        ([0.5, 0.0], 1.0, r"alpha must be in \(0, 1\], got 0"),
+        (np.nan, 1.0, r"alpha must be in \(0, 1\], got nan"),
+        (0.5, 0.0, "edge must be a distance > 0, got 0"),
+    ],
+)
+def test_bad_numbers_are_named(burley, alpha, edge, said):
+    with pytest.raises(InputError, match=said):
+        sampler_quality(burley.sampler, alpha, edge=edge)

@@ -5,18 +5,8 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from profilefit.fitting.solver import (
-    CONVERGED,
-    MAX_STEPS,
-    NOT_FINITE,
-    Solution,
-    covariance,
-    differences,
-    least_squares,
-    minimise,
-    solve,
-    solve_batch,
-)
+from profilefit.fitting import solver
+from profilefit.fitting.solver import Solution, covariance, differences, least_squares, minimise, solve, solve_batch
 
 X = np.linspace(0, 3, 20)
 
@@ -30,25 +20,22 @@ def problem(amplitude, rate, noise=0.0, seed=0):
     return {"x": X, "y": y}
 
 
-def test_known_parameters_come_back():
+def test_known_parameters_come_back_whatever_scale_start_and_precision():
     found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-9)  # the solver's own tolerance is 1e-10
     assert found.converged
-    assert found.result == CONVERGED == "converged"
+    assert found.result == solver.CONVERGED == "converged"
     assert found.cost < 1e-18
     assert 0 < found.steps < 50
-
-
-def test_scaling_does_not_matter():
-    """Constants that differ by ten decades are found as well as equal ones: they are scaled by their start."""
+    # Constants that differ by ten decades are found as well as equal ones: they are scaled by their start.
     data = {"x": X * 1e5, "y": 2e-5 * np.exp(-1.7 * X)}
     found = least_squares(decay, [1e-5, 1e-5], data)
     np.testing.assert_allclose(found.parameters, [2e-5, 1.7e-5], rtol=1e-6)
-
-
-def test_a_start_at_zero_can_move():
     found = least_squares(decay, [0.0, 0.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-8)
+    found = least_squares(decay, np.ones(2, np.float32), problem(2.0, 1.7, 1e-10))
+    assert found.parameters.dtype == found.residuals.dtype == np.float64
+    assert 1e-11 < np.sqrt(found.cost / X.size) < 1e-9  # float32 residuals would stop at 1e-8
 
 
 @pytest.mark.slow
@@ -62,10 +49,6 @@ def test_a_linear_problem_is_lstsq():
     assert found.cost == pytest.approx(cost[0], rel=1e-12)
     np.testing.assert_allclose(found.jacobian, design, rtol=1e-12)
     np.testing.assert_allclose(found.jacobian.T @ found.residuals, 0.0, atol=1e-7)  # stationary
-
-
-@pytest.mark.slow
-def test_a_batch_is_its_singles():
     cases = [problem(2.0, 1.7, 0.01, 1), problem(0.5, 0.3, 0.01, 2), problem(9.0, 4.0, 0.01, 3)]
     starts = [[1.0, 1.0], [1.0, 0.5], [5.0, 2.0]]
     stacked = {key: np.stack([case[key] for case in cases]) for key in ("x", "y")}
@@ -77,44 +60,38 @@ def test_a_batch_is_its_singles():
         assert one.converged
 
 
-def test_double_precision_whatever_the_caller_set():
-    found = least_squares(decay, np.ones(2, np.float32), problem(2.0, 1.7, 1e-10))
-    assert found.parameters.dtype == found.residuals.dtype == np.float64
-    assert 1e-11 < np.sqrt(found.cost / X.size) < 1e-9  # float32 residuals would stop at 1e-8
-
-
-def test_no_minimum_is_a_result():
-    """exp(-p) falls for ever."""
-    found = least_squares(lambda p, _: jnp.exp(-p), [1.0], None)
+def test_failures_are_results():
+    found = least_squares(lambda p, _: jnp.exp(-p), [1.0], None)  # falls for ever
     assert not found.converged
-    assert (
-        found.result
-        == f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
-    )
-    assert found.steps == MAX_STEPS
-
-
-def test_one_bad_problem_leaves_the_others_of_its_batch_alone():
+    most = solver.MAX_STEPS
+    expected = f"no convergence in {most} steps: constants trade against each other; fix one or widen the range"
+    assert (found.result, found.steps) == (expected, most)
     good, bad = solve_batch(lambda p, d: jnp.log(p) - d, [[1.0], [-1.0]], np.array([[0.5], [0.5]]))
     assert good.converged
     assert good.parameters[0] == pytest.approx(np.exp(0.5), rel=1e-8)
     assert "not finite" in bad.result
+    found = solve(lambda p: (np.full(3, np.nan), np.ones((3, 1))), np.ones(1))
+    assert (found.result, found.steps) == (solver.NOT_FINITE, 1)
 
 
 def solution(jacobian):
-    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
+    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, solver.CONVERGED)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e8])
-def test_condition_number_of_a_known_jacobian(scale):
+def test_condition_number_and_covariance_of_known_jacobians():
     """Unit columns with cosine c have singular values sqrt(1 + c), sqrt(1 - c), however long the columns are."""
-    c = 0.6
-    jacobian = np.array([[1.0, scale * c], [0.0, scale * np.sqrt(1 - c**2)]])
-    assert solution(jacobian).condition_number == pytest.approx(2.0, rel=1e-12)
-
-
-def test_condition_number_of_a_blind_constant_is_infinite():
-    assert solution([[1.0, 0.0], [1.0, 0.0]]).condition_number > 1e15
+    for scale in (1.0, 1e8):
+        jacobian = np.array([[1.0, scale * 0.6], [0.0, scale * np.sqrt(1 - 0.6**2)]])
+        assert solution(jacobian).condition_number == pytest.approx(2.0, rel=1e-12)
+    assert solution([[1.0, 0.0], [1.0, 0.0]]).condition_number > 1e15, "a blind constant"
+    jacobian = np.random.default_rng(2).standard_normal((20, 3)) * [1.0, 1e4, 1e-4]
+    np.testing.assert_allclose(covariance(jacobian), np.linalg.inv(jacobian.T @ jacobian), rtol=1e-7)
+    assert np.all(np.isinf(covariance(np.array([[np.nan, 1.0], [1.0, 1.0]]))))
+    # Two nearly parallel columns, 1e12 apart in size: variances 1 / (size sin)^2.
+    sizes, angle = np.array([1e8, 1e-4]), 1e-6
+    slopes = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]]) * sizes
+    np.testing.assert_allclose(np.diag(covariance(slopes)), 1.0 / (sizes * np.sin(angle)) ** 2, rtol=1e-6)
+    assert covariance(slopes * [1.0, 0.0])[1, 1] > 1e30, "what nothing tells has no small error"
 
 
 @pytest.mark.slow
@@ -125,15 +102,21 @@ def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
         return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
 
     assert "stalled beside an optimum" in least_squares(residual, [1.0], np.zeros(2)).result
+    data = problem(2.0, 1.7, 0.05, seed=4)
+    for residual, of_numpy, start, more in (
+        (decay, noisy, [1.0, 1.0], data),
+        (lambda p, data: valley(p, jnp) + 0.0 * data, valley, [-1.2, 1.0], np.zeros(2)),
+    ):
+        twin = optimize.least_squares(of_numpy, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        found = least_squares(residual, start, more)
+        assert found.converged
+        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-6)
+        np.testing.assert_allclose(covariance(twin.jac), found.covariance, rtol=1e-4)
 
 
-def valley(p):
+def valley(p, xp=np):
     """Rosenbrock's, whose optimum is at (1, 1)."""
-    return np.array([10.0 * (p[1] - p[0] ** 2), 1.0 - p[0]])
-
-
-def valley_of(p, data):
-    return jnp.array([10.0 * (p[1] - p[0] ** 2), 1.0 - p[0]]) + 0.0 * data
+    return xp.array([10.0 * (p[1] - p[0] ** 2), 1.0 - p[0]])
 
 
 def noisy(p):
@@ -141,22 +124,16 @@ def noisy(p):
     return p[0] * np.exp(-p[1] * data["x"]) - data["y"]
 
 
-def test_an_optimum_at_a_bound():
+def test_bounds_hold_an_optimum_release_a_start_and_fix_a_parameter():
     found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7), ([0.0, 0.0], [1.5, 5.0]))
     assert found.converged
     assert found.parameters[0] == 1.5
     np.testing.assert_array_equal(found.at_bound, [True, False])
     assert found.jacobian[:, 1] @ found.residuals == pytest.approx(0.0, abs=1e-8)
     assert found.jacobian[:, 0] @ found.residuals < 0, "a larger one would fit better"
-
-
-def test_a_start_at_a_bound_leaves_it():
     found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7), (1.0, 3.0))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-9)
     assert not np.any(found.at_bound)
-
-
-def test_a_bound_on_both_sides_holds_a_parameter():
     found = solve(differences(noisy, 1e-6), np.array([2.5, 1.0]), ([2.5, 0.0], [2.5, 9.0]))
     alone = solve(differences(lambda p: noisy(np.append(2.5, p)), 1e-6), np.array([1.0]))
     assert found.parameters[0] == 2.5
@@ -191,22 +168,12 @@ def test_steps_are_no_longer_than_the_longest():
     assert np.max(np.abs(np.diff(seen, axis=0))[:, 0]) == pytest.approx(0.5)
     assert np.max(seen, axis=0)[1] > 0.9
     assert solve(lambda p: (p - [5.0, 1.0], np.eye(2)), np.zeros(2)).steps < found.steps - 4, "a control"
-
-
-def test_what_gains_little_ends_the_search():
     start = np.array([1.0, 1.0])
     early, late = (solve(differences(noisy, 1e-6), start, gain=gain) for gain in (1e-3, 0.0))
     assert early.converged
     assert early.steps < late.steps
     assert early.cost - late.cost < 1e-3
 
-
-def test_a_start_that_is_not_finite_is_a_result():
-    found = solve(lambda p: (np.full(3, np.nan), np.ones((3, 1))), np.ones(1))
-    assert (found.result, found.steps) == (NOT_FINITE, 1)
-
-
-def test_differences_are_derivatives_within_the_bound():
     def residual(x):
         assert np.all(x <= 1.0)
         return np.array([np.exp(x[0]), x[0] * x[1], x[1] ** 2])
@@ -217,28 +184,13 @@ def test_differences_are_derivatives_within_the_bound():
         np.testing.assert_allclose(slopes, [[np.exp(x[0]), 0.0], [x[1], x[0]], [0.0, 2.0 * x[1]]], atol=1e-5)
 
 
-def test_covariance_is_the_inverse_of_products():
-    jacobian = np.random.default_rng(2).standard_normal((20, 3)) * [1.0, 1e4, 1e-4]
-    np.testing.assert_allclose(covariance(jacobian), np.linalg.inv(jacobian.T @ jacobian), rtol=1e-7)
-    assert np.all(np.isinf(covariance(np.array([[np.nan, 1.0], [1.0, 1.0]]))))
-
-
-def test_errors_of_what_is_hardly_told_are_not_lost():
-    """Two nearly parallel columns, 1e12 apart in size: variances 1 / (size sin)^2."""
-    sizes, angle = np.array([1e8, 1e-4]), 1e-6
-    slopes = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]]) * sizes
-    np.testing.assert_allclose(np.diag(covariance(slopes)), 1.0 / (sizes * np.sin(angle)) ** 2, rtol=1e-6)
-    assert covariance(slopes * [1.0, 0.0])[1, 1] > 1e30, "what nothing tells has no small error"
-
-
 @pytest.mark.parametrize(("high", "expected"), [(3.0, [1.0, -0.5]), (0.5, [0.5, -0.25])])
 def test_a_quadratic_is_minimised_inside_and_at_a_bound(high, expected):
     """x^2 + xy + y^2 - 1.5 x: y follows x by -x / 2."""
 
     def at(x):
-        return float(x[0] ** 2 + x[0] * x[1] + x[1] ** 2 - 1.5 * x[0]), np.array(
-            [2 * x[0] + x[1] - 1.5, x[0] + 2 * x[1]]
-        )
+        gradient = np.array([2 * x[0] + x[1] - 1.5, x[0] + 2 * x[1]])
+        return float(x[0] ** 2 + x[0] * x[1] + x[1] ** 2 - 1.5 * x[0]), gradient
 
     bounds = np.array([-2.0, -3.0]), np.array([high, 3.0])
     x, value, converged = minimise(at, np.array([-1.0, 2.0]), bounds, 1e-6, 100)
@@ -270,17 +222,3 @@ def test_the_optimum_is_that_of_a_trust_region(residual, start, bounds):
     assert found.converged
     assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
     np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
-
-
-@pytest.mark.slow
-def test_a_traced_problem_has_the_optimum_of_a_trust_region():
-    data = problem(2.0, 1.7, 0.05, seed=4)
-    for residual, of_numpy, start, more in (
-        (decay, noisy, [1.0, 1.0], data),
-        (valley_of, valley, [-1.2, 1.0], np.zeros(2)),
-    ):
-        twin = optimize.least_squares(of_numpy, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-        found = least_squares(residual, start, more)
-        assert found.converged
-        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-6)
-        np.testing.assert_allclose(covariance(twin.jac), found.covariance, rtol=1e-4)

@@ -31,25 +31,15 @@ def integral(function, edges, nodes=40):
 
 @LAWS
 @pytest.mark.parametrize("alpha", ALPHAS)
-def test_profile_integrates_to_the_reflectance(law, alpha):
+def test_profile_and_cdf_have_the_energy_of_the_reflectance(law, alpha):
     edges = np.concatenate([[0.0], np.geomspace(1e-3, reach(law, alpha), 40)])
     total = integral(lambda r: 2 * np.pi * r * law.profile(r, alpha), edges).sum()
     assert total == pytest.approx(law.albedo.reflectance(alpha), rel=1e-10)  # rounding of 1600 nodes
-
-
-@LAWS
-@pytest.mark.parametrize("alpha", ALPHAS)
-def test_cdf_is_the_integral_of_the_profile(law, alpha):
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 1.2 * reach(law, alpha), 30)])
     if hasattr(law, "largest_radius"):
         edges = np.sort(np.append(edges, law.largest_radius(alpha)))  # the profile has a corner there
     rings = integral(lambda r: 2 * np.pi * r * law.profile(r, alpha), edges) / law.albedo.reflectance(alpha)
     np.testing.assert_allclose(np.diff(law.cdf(edges, alpha)), rings, rtol=1e-9, atol=1e-13)
-
-
-@LAWS
-@pytest.mark.parametrize("alpha", ALPHAS)
-def test_cdf_rises_from_0_to_1(law, alpha):
     shares = law.cdf(np.concatenate([[0.0], np.geomspace(1e-6, 1e3, 2000), [np.inf]]), alpha)
     assert shares[0] == 0.0
     assert np.all(np.diff(shares) >= -1e-15)
@@ -85,17 +75,23 @@ def test_numbers_give_numbers_and_arrays_broadcast(law):
     for value in (law.profile(1, 0.5), law.cdf(1, 0.5), law.sampler.sample(0.5, 0.5), law.sampler.pdf(1.0, 0.5)):
         assert type(value) is float
     table = law.profile([0.1, 1.0, 2.0], np.array([[0.5], [0.9]]), mfp=[1.0, 2.0, 3.0])
-    assert table.shape == (2, 3)
-    assert table.dtype == np.float64
+    assert (table.shape, table.dtype) == ((2, 3), np.float64)
     assert table[1, 2] == pytest.approx(law.profile(2.0, 0.9, 3.0), rel=1e-14)  # vector code may round otherwise
     assert law.sampler.pdf([0.1, 1.0, 2.0], [[0.5], [0.9]]).shape == (2, 3)
-
-
-@LAWS
-def test_double_precision_whatever_the_caller_set(law):
     outside = law.cdf([0.3, 1.0], 0.9)
     with jax.enable_x64(True):
         np.testing.assert_array_equal(law.cdf([0.3, 1.0], 0.9), outside)
+    alphas = jnp.linspace(0.2, 0.9, 8)
+    mapped = jax.vmap(lambda a: law.cdf(jnp.float32(0.5), a))(alphas)
+    np.testing.assert_allclose(mapped, law.cdf(0.5, np.asarray(alphas, float)), rtol=2e-6)
+    names = law.constant_names()
+    assert jax.tree.leaves(law) == [law.constants()[name] for name in names]
+    moved = law.with_vector(names[:2], [7.0, 8.0])
+    assert moved.constants() == {**law.constants(), names[0]: 7.0, names[1]: 8.0}
+    np.testing.assert_array_equal(moved.vector(names[:2]), [7.0, 8.0])
+    assert moved.setting == law.setting
+    with pytest.raises(AttributeError, match="cannot assign"):
+        law.setting = None
 
 
 @pytest.mark.slow
@@ -114,17 +110,10 @@ def test_traced_arguments_keep_their_precision(law):
     np.testing.assert_allclose(drawn, law.sampler.sample(xi, alpha), rtol=1e-5)
 
 
-@LAWS
-def test_a_law_can_be_mapped(law):
-    alphas = jnp.linspace(0.2, 0.9, 8)
-    mapped = jax.vmap(lambda a: law.cdf(jnp.float32(0.5), a))(alphas)
-    np.testing.assert_allclose(mapped, law.cdf(0.5, np.asarray(alphas, float)), rtol=2e-6)
-
-
 @pytest.mark.slow
 @LAWS
 @pytest.mark.parametrize("alpha", [0.3, 0.9])
-def test_derivatives_are_finite_differences(law, alpha, x64):
+def test_derivatives_are_finite_differences_and_finite_at_both_ends(law, alpha, x64):
     step = 1e-5
     for method in (law.profile, law.cdf):
         for argument in (0, 1):
@@ -134,26 +123,9 @@ def test_derivatives_are_finite_differences(law, alpha, x64):
             down[argument] -= step
             found = jax.grad(method, argnums=argument)(jnp.asarray(at[0]), jnp.asarray(at[1]))
             assert float(found) == pytest.approx((method(*up) - method(*down)) / (2 * step), rel=1e-6)
-
-
-@pytest.mark.slow
-@LAWS
-def test_derivatives_stay_finite_at_both_ends(law, x64):
-    """A gradient at r = 0 or beyond all light must not turn a fit into NaN."""
+    # A gradient at r = 0 or beyond all light must not turn a fit into NaN.
     for r in (0.0, 1e9):
         assert np.isfinite(jax.grad(lambda a, r=r: law.cdf(jnp.asarray(r), a))(jnp.asarray(0.7)))
-
-
-@LAWS
-def test_a_law_is_its_constants(law):
-    names = law.constant_names()
-    assert jax.tree.leaves(law) == [law.constants()[name] for name in names]
-    moved = law.with_vector(names[:2], [7.0, 8.0])
-    assert moved.constants() == {**law.constants(), names[0]: 7.0, names[1]: 8.0}
-    np.testing.assert_array_equal(moved.vector(names[:2]), [7.0, 8.0])
-    assert moved.setting == law.setting
-    with pytest.raises(AttributeError, match="cannot assign"):
-        law.setting = None
 
 
 # Samplers

@@ -12,22 +12,13 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from profilefit.errors import SettingError
 from profilefit.fitting.quality import profile_quality
-from profilefit.laws.diffusion import (
-    BeamDiffusion,
-    BetterDipole,
-    Dipole,
-    diffuse_fresnel,
-    exitance_factors,
-    fresnel_moments,
-    grosjean,
-    once_scattered_within,
-)
+from profilefit.laws import diffusion as laws
+from profilefit.laws.diffusion import BeamDiffusion, BetterDipole, Dipole, diffuse_fresnel, fresnel_moments
 from profilefit.materials import BY_NAME
 
 # Shares are closed in the dipoles; the beam's are quadrature, to 5e-9.
 LAWS = [(Dipole(Setting()), 1e-12), (BetterDipole(Setting(n=0.8)), 1e-12), (BeamDiffusion(Setting(n=1.4)), 1e-8)]
 NAMES = ["dipole", "better", "beam"]
-EVERY = pytest.mark.parametrize("law", [law for law, _ in LAWS], ids=NAMES)
 # The sampler is one loop over the law's own formulas: the dipole tests it, the others take seconds to compile.
 SAMPLED = pytest.mark.parametrize(
     "law", [LAWS[0][0], *(pytest.param(law, marks=pytest.mark.slow) for law, _ in LAWS[1:])], ids=NAMES
@@ -49,15 +40,20 @@ def printed_moments(n):
     )
 
 
-@pytest.mark.parametrize("n", [0.5, 0.7, 0.9, 1.0, 1.1, 1.3, 1.4, 1.5, 2.0, 2.5])
-def test_moments_are_the_printed_fits(n):
-    """The fits themselves are 0.007 off at n = 1, where nothing is reflected, and 0.0077 at n = 2.5."""
-    np.testing.assert_allclose(fresnel_moments(n), printed_moments(n), rtol=0, atol=0.008)
-
-
-def test_a_surface_that_does_not_refract():
+def test_moments_are_the_printed_fits_and_right_at_their_ends():
     assert fresnel_moments(1.0) == pytest.approx((0.0, 0.0), abs=1e-14)
-    assert exitance_factors(1.0) == pytest.approx((0.25, 0.5, 1.0), abs=1e-14)
+    assert laws.exitance_factors(1.0) == pytest.approx((0.25, 0.5, 1.0), abs=1e-14)
+    # D = 2/3 and sigma = sqrt(3/2) where all is absorbed, 1/3 and 0 where nothing is.
+    with jax.enable_x64(True):
+        diffusion, sigma = laws.grosjean(jnp.array([0.0, 1.0]))
+    np.testing.assert_allclose(diffusion, [2 / 3, 1 / 3])
+    np.testing.assert_allclose(sigma, [1.5**0.5, 0.0])
+    # The fits themselves are 0.007 off at n = 1, where nothing is reflected, and 0.0077 at n = 2.5.
+    for n in (0.5, 0.7, 0.9, 1.0, 1.1, 1.3, 1.4, 1.5, 2.0, 2.5):
+        np.testing.assert_allclose(fresnel_moments(n), printed_moments(n), rtol=0, atol=0.008, err_msg=f"n = {n}")
+    # 2 int mu F dmu; a sign or digit lost in the dipole's fit would show.
+    for n in (0.6, 0.8, 0.95, 1.0, 1.2, 1.3, 1.5, 2.0):
+        assert diffuse_fresnel(n) == pytest.approx(fresnel_moments(n)[0], abs=0.002), n
 
 
 @pytest.mark.parametrize("n", [0.8, 1.4])
@@ -68,14 +64,6 @@ def test_moments_by_plain_sums(n):
     reflected = 0.5 * (((n * mu - out) / (n * mu + out)) ** 2 + ((mu - n * out) / (mu + n * out)) ** 2)
     expected = 2 * np.mean(mu * reflected), 3 * np.mean(mu**2 * reflected)
     assert fresnel_moments(n) == pytest.approx(expected, abs=2e-8)  # midpoints meet a root at the critical angle
-
-
-def test_grosjeans_diffusion_at_both_ends():
-    """D = 2/3 and sigma = sqrt(3/2) where all is absorbed, 1/3 and 0 where nothing is."""
-    with jax.enable_x64(True):
-        diffusion, sigma = grosjean(jnp.array([0.0, 1.0]))
-    np.testing.assert_allclose(diffusion, [2 / 3, 1 / 3])
-    np.testing.assert_allclose(sigma, [1.5**0.5, 0.0])
 
 
 @pytest.mark.parametrize("setting", [Setting("diffuse"), Setting(g=0.5)])
@@ -89,26 +77,20 @@ ALPHA = np.array([[0.0], [0.5], [1.0]])
 RADII = np.concatenate([[0.0], np.geomspace(1e-9, 1e9, 30), [np.inf]])
 
 
-def nodes(low, high, power):
-    """Gauss's rule on r = low + (high - low) u^power: 32 radii and weights."""
-    x, w = np.polynomial.legendre.leggauss(32)
-    u = 0.5 * (x + 1)
-    return low + (high - low) * u**power, 0.5 * w * (high - low) * power * u ** (power - 1)
-
-
 @pytest.mark.parametrize(("law", "tolerance"), [*LAWS[:2], pytest.param(*LAWS[2], marks=pytest.mark.slow)], ids=NAMES)
 def test_share_is_the_integral_of_the_profile(law, tolerance):
     edges = np.array([0.0, 0.05, 0.7, 0.999, 1.001, 2.5, 7.0, 15.0])
-    total, inside = law.reflectance(ALPHA), np.zeros((3, 1))
+    total, inside, (x, w) = law.reflectance(ALPHA), np.zeros((3, 1)), np.polynomial.legendre.leggauss(32)
     shares = law.cdf(np.resize(edges, 32), ALPHA)
     for i, (low, high) in enumerate(itertools.pairwise(edges)):
-        r, dr = nodes(low, high, 1 if low else 3)  # r ln r at the source is smooth in u
+        power, width, u = 1 if low else 3, high - low, 0.5 * (x + 1)  # r ln r at the source is smooth in u
+        r, dr = low + width * u**power, 0.5 * w * width * power * u ** (power - 1)
         inside = inside + np.sum(2 * np.pi * r * law.profile(r, ALPHA) * dr, axis=1, keepdims=True)
         np.testing.assert_allclose((shares * total)[:, i + 1], inside[:, 0], rtol=0, atol=tolerance)
 
 
 @pytest.mark.slow
-@EVERY
+@pytest.mark.parametrize("law", [law for law, _ in LAWS], ids=NAMES)
 def test_both_ends(law):
     """Shares rise from 0 to 1, and profiles are finite, from alpha = 0 to 1 and from the source to infinity."""
     shares, values = law.cdf(RADII, ALPHA), law.profile(RADII, ALPHA)
@@ -121,16 +103,12 @@ def test_both_ends(law):
 
 
 @SAMPLED
-def test_sampler_inverts_the_cdf(law):
+def test_sampler_inverts_the_cdf_and_has_the_laws_density(law):
     xi = np.concatenate([[0.0], np.geomspace(1e-6, 0.5, 15), 1 - np.geomspace(0.49, 1e-9, 15), [1.0]])
     r = law.sampler.sample(xi, ALPHA)
     found = [law.cdf(row, ALPHA)[i] for i, row in enumerate(r)]
     np.testing.assert_allclose(found, [xi] * 3, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(r[:, [0, -1]], [[0.0, np.inf]] * 3)
-
-
-@SAMPLED
-def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     density = law.sampler.pdf(RADII, ALPHA) * law.reflectance(ALPHA)
     near = (RADII > 0) & (RADII < 1e3)
     expected = 2 * np.pi * RADII[near] * law.profile(RADII, ALPHA)[:, near]
@@ -138,10 +116,6 @@ def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     source = law.source_strength(jnp.asarray(ALPHA, jnp.float32))
     np.testing.assert_allclose(density[:, [0]], source, rtol=1e-6, atol=1e-12)
     np.testing.assert_array_equal(density[:, -1], 0.0)
-
-
-@SAMPLED
-def test_single_precision(law):
     single = law.cdf(jnp.float32(0.7), jnp.float32(0.5))
     assert single.dtype == jnp.float32
     assert float(single) == pytest.approx(law.cdf(np.full(32, 0.7), ALPHA)[1, 0], rel=1e-5)
@@ -197,21 +171,11 @@ def test_total_reflectance_in_closed_form(n, alpha):
     assert BetterDipole(Setting(n=n)).reflectance(alpha) == pytest.approx(expected * entered, rel=1e-12)
 
 
-@pytest.mark.parametrize("n", [0.7, 1.0, 1.3, 1.5])
-def test_a_white_half_space_gives_all_light_back(n):
-    """The better dipole's factors of fluence and flux are such that no surface loses light."""
-    law = BetterDipole(Setting(n=n))
-    assert law.reflectance(1.0) == pytest.approx(law.entered, rel=1e-12)
-
-
-def test_dipole_by_hand():
+def test_dipoles_by_hand_and_as_they_are_written():
     """At alpha = 1 and r = 0: (1 + 1 / z_v^2) / 4 pi, z_v = 1 + 4/3 (1.0016 / 0.9984)."""
     image = 1 + 4 / 3 * 1.0016 / 0.9984
     assert Dipole(Setting()).profile(0.0, 1.0) == pytest.approx((1 + image**-2) / (4 * math.pi), rel=1e-12)
-
-
-def test_dipole_as_the_authors_write_it():
-    """alpha'/4 pi (z_r (sigma d_r + 1) e^(-sigma d_r) / d_r^3 + z_v (sigma d_v + 1) e^(-sigma d_v) / d_v^3)."""
+    # alpha'/4 pi (z_r (sigma d_r + 1) e^(-sigma d_r) / d_r^3 + z_v (sigma d_v + 1) e^(-sigma d_v) / d_v^3).
     sigma, boundary = math.sqrt(3 * 0.05), (1 + diffuse_fresnel(1.3)) / (1 - diffuse_fresnel(1.3))
     terms = []
     for z in (1.0, 1.0 + 4 * boundary / 3):
@@ -219,10 +183,7 @@ def test_dipole_as_the_authors_write_it():
         terms.append(z * (sigma * d + 1) * np.exp(-sigma * d) / d**3)
     expected = 0.95 / (4 * np.pi) * sum(terms) * 5.2 / 5.29  # 4 n / (n + 1)^2 enters
     np.testing.assert_allclose(Dipole(Setting(n=1.3)).profile(R, 0.95), expected, rtol=1e-12)
-
-
-def test_better_dipole_as_implementations_write_it():
-    """a^2/4 pi (e_r (C_E z_r (1 + sigma d_r) / d_r^2 + C_phi / D) - e_v (C_E z_v ... + C_phi / D)), z_v below 0."""
+    # a^2/4 pi (e_r (C_E z_r (1 + sigma d_r) / d_r^2 + C_phi / D) - e_v (C_E z_v ... + C_phi / D)), z_v below 0.
     alpha, n = 0.9, 1.4
     first, second = fresnel_moments(n)
     c_phi, c_e, boundary = (1 - first) / 4, (1 - second) / 2, (1 + second) / (1 - first)
@@ -234,12 +195,10 @@ def test_better_dipole_as_implementations_write_it():
         total = total + sign * weight * np.exp(-sigma * d) / d
     expected = alpha**2 / (4 * np.pi) * total * 4 * n / (n + 1) ** 2
     np.testing.assert_allclose(BetterDipole(Setting(n=n)).profile(R, alpha), expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("n", [0.6, 0.8, 0.95, 1.0, 1.2, 1.3, 1.5, 2.0])
-def test_diffuse_fresnel_is_a_fit_of_the_mean_reflectance(n):
-    """2 int mu F dmu; a sign or digit lost in the fit would show."""
-    assert diffuse_fresnel(n) == pytest.approx(fresnel_moments(n)[0], abs=0.002)
+    # A white half space gives all light back: factors of fluence and flux are such that no surface loses light.
+    for n in (0.7, 1.0, 1.3, 1.5):
+        law = BetterDipole(Setting(n=n))
+        assert law.reflectance(1.0) == pytest.approx(law.entered, rel=1e-12)
 
 
 # Photon beam diffusion
@@ -288,9 +247,10 @@ def test_single_scattering_is_the_simulators(n):
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 20, 30)])
     within = np.cumsum(single_scattering.ring_shares(edges, Setting(n=n))[:-1])
     with jax.enable_x64(True):
-        np.testing.assert_allclose(once_scattered_within(jnp.asarray(edges[1:]), n), within, rtol=1e-12)
+        np.testing.assert_allclose(laws.once_scattered_within(jnp.asarray(edges[1:]), n), within, rtol=1e-12)
         if n == 1.0:  # all of it, by hand: int mu / (1 + mu) dmu / 2
-            assert float(once_scattered_within(jnp.asarray(1e12), n)) == pytest.approx((1 - math.log(2)) / 2, rel=1e-10)
+            whole = float(laws.once_scattered_within(jnp.asarray(1e12), n))
+            assert whole == pytest.approx((1 - math.log(2)) / 2, rel=1e-10)
 
 
 def test_source_and_total():
@@ -302,7 +262,7 @@ def test_source_and_total():
 
 
 @pytest.mark.slow
-def test_more_nodes_change_nothing():
+def test_more_nodes_change_nothing_and_quality_is_a_tenth():
     """Profiles to 1e-9, shares to 1e-8; and what half of the nodes change is seen: a negative control."""
     law, r, alpha = BeamDiffusion(Setting()), np.array([0.01, 1.0, 10.0]), np.array([[0.3], [0.9], [1.0]])
     finer = BeamDiffusion(law.setting, law.albedo, 3)  # halves of the nodes: none in common
@@ -311,11 +271,7 @@ def test_more_nodes_change_nothing():
     np.testing.assert_allclose(law.cdf(r, alpha), shares, atol=1e-8)
     coarse = BeamDiffusion(law.setting, law.albedo, 1)
     assert np.max(np.abs(coarse.cdf(r, alpha) - shares)) > 10.0 * np.max(np.abs(law.cdf(r, alpha) - shares))
-
-
-@pytest.mark.slow
-def test_quality_is_a_tenth():
-    """Christensen and Burley judge it the best of the physically based profiles; a dipole is off by a half."""
+    # Christensen and Burley judge it the best of the physically based profiles; a dipole is off by a half.
     quality = profile_quality(BeamDiffusion(Setting()), [0.5, 0.95])
     assert np.all(quality.rel < 0.12)
     assert np.all(quality.ks < 0.04)

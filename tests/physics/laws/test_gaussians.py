@@ -1,4 +1,6 @@
-"""Sums of Gaussians with coefficient laws."""
+"""Sums of Gaussians: with coefficient laws; skin by printed sets, typed again, and what their authors say of them."""
+
+import math
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +13,8 @@ from profilefit.fitting.estimate import ResidualFunction, rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import least_squares
 from profilefit.laws.gaussians import Gaussians, law_class
+from profilefit.materials import CHANNELS
+from profilefit.scenes.skin.law import D_EON, separable
 
 # Four Gaussians fitted to the exact profile, rounded.
 FOUR = {
@@ -24,7 +28,7 @@ def four(normalisation):
     return law_class(4)(Setting(), normalisation, **FOUR)
 
 
-def test_parts_by_hand(four):
+def test_parts_and_profile_by_hand_and_at_both_ends(four):
     """At alpha = 3/4 s = 1/2: ln v_1 = -4.18 - 2.98 + 0.56; one ratio is 1 + e^3.17; weights e^(1.09 + 0.02) : 1."""
     with jax.enable_x64(True):
         variances = np.asarray(four.variances(jnp.asarray(0.75)))
@@ -33,9 +37,6 @@ def test_parts_by_hand(four):
     assert variances[1] / variances[0] == pytest.approx(1 + np.exp(3.17), rel=1e-13)
     assert weights[1] / weights[0] == pytest.approx(np.exp(1.11), rel=1e-13)
     assert weights.sum() == pytest.approx(1, rel=1e-14)
-
-
-def test_profile_is_the_plain_sum(four):
     alpha, r = 0.6, np.geomspace(0.01, 5, 3)
     with jax.enable_x64(True):
         variances, weights = np.asarray(four.variances(alpha)), np.exp(four.log_weights(jnp.asarray(alpha)))
@@ -43,9 +44,6 @@ def test_profile_is_the_plain_sum(four):
     np.testing.assert_allclose(four.profile(r, alpha), four.albedo.reflectance(alpha) * sum(gaussians), rtol=1e-12)
     share = sum(w * (1 - np.exp(-(r**2) / (2 * v))) for w, v in zip(weights, variances, strict=True))
     np.testing.assert_allclose(four.cdf(r, alpha), share, rtol=1e-11)
-
-
-def test_variances_rise_and_ends_are_finite(four):
     r, alpha = np.array([0.0, 1.0, np.inf]), np.array([[0.0], [0.5], [1.0]])
     with jax.enable_x64(True):
         assert np.all(np.diff(four.variances(jnp.asarray(alpha))) > 0)
@@ -110,3 +108,44 @@ def test_a_fit_from_the_start_converges(normalisation):
     solution = least_squares(ResidualFunction("energy", names), law.vector(names), data)
     assert solution.converged
     assert np.sqrt(np.mean(solution.residuals**2)) < 0.12
+
+
+# d'Eon and Luebke, GPU Gems 3, ch. 14: variance [mm^2], weights of red, green, blue.
+PRINTED = """
+0.0064  0.233  0.455  0.649
+0.0484  0.100  0.336  0.344
+0.187   0.118  0.198  0
+0.567   0.113  0.007  0.007
+1.99    0.358  0.004  0
+7.41    0.078  0      0
+"""
+
+
+def test_printed_skin_its_weights_and_its_energy():
+    table = np.array([[float(word) for word in line.split()] for line in PRINTED.strip().splitlines()])
+    np.testing.assert_array_equal(D_EON.variances, table[:, 0])
+    np.testing.assert_array_equal(D_EON.weights, table[:, 1:])
+    assert len(CHANNELS) == 3
+    # "The Gaussian weights for each profile sum to 1.0": white light stays white.
+    np.testing.assert_allclose(energy(D_EON), 1.0, rtol=1e-12)
+    # At the origin sum w / (2 pi v).
+    weights, variances = (0.233, 0.1, 0.118, 0.113, 0.358, 0.078), (0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41)
+    expected = sum(w / (2 * math.pi * v) for w, v in zip(weights, variances, strict=True))
+    assert D_EON.profile(0.0)[0] == pytest.approx(expected, rel=1e-14)
+    assert D_EON.profile(np.ones((2, 5))).shape == (2, 5, 3)
+    # In every channel, stretched by 0.001 + falloff, by default 1, 0.37, 0.3.
+    skin, r = separable(), 0.8
+    for channel, falloff in enumerate((1.0, 0.37, 0.3)):
+        scaled = r / (0.001 + falloff)
+        narrowest = 0.233 * math.exp(-(scaled**2) / (2 * 0.0064)) / (2 * math.pi * 0.0064)
+        assert skin.profile(r)[channel] == pytest.approx(D_EON.profile(scaled)[0] - narrowest, rel=1e-12)
+    assert energy(skin)[0] == pytest.approx(0.767 * 1.001**2, rel=1e-12)
+    r = np.geomspace(1e-5, 30, 4001)
+    for skin in (D_EON, separable()):
+        total = np.trapezoid(2 * np.pi * r[:, None] ** 2 * skin.profile(r), np.log(r), axis=0)
+        np.testing.assert_allclose(total, energy(skin), rtol=1e-5)
+
+
+def energy(skin):
+    """Integral of 2 pi r R over all r, of red, green, blue [-]."""
+    return np.sum(skin.weights, axis=0) * np.square(skin.stretches)

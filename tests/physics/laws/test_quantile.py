@@ -36,16 +36,13 @@ def mapped(law, t, alpha):
         return tuple(np.asarray(v) for v in radius(jnp.asarray(t, float), law.curve(jnp.asarray(alpha, float))))
 
 
-def test_map_by_hand_at_white(law):
+def test_map_by_hand(law):
     """kappa = 0, lambda_0 = 1/2, w = 1, y = 2: a = .12 + .56 - .64, b = .89 - .62 + 1.6, c = 8 (.051 - .012) - .016."""
     t = np.log(2.0)
     m = 1 + 0.04 * t + 1.87 * t / (1 + 2.5 * t) + 0.296 * t**2
     assert law.sampler.sample(0.5, 1.0) == pytest.approx(2 * t * m, rel=1e-12)
     assert law.seen_by("share") == law.seen_by("radius") == law.seen_by("relative_radius") == law.constant_names()
     assert law.seen_by("energy") == ()
-
-
-def test_map_by_hand_in_between(law):
     alpha, xi = 0.8, 0.9
     kappa = float(decay_rate(jnp.float32(alpha)))
     y = 2 / float(law.albedo.albedo_over_reflectance(alpha))
@@ -55,6 +52,11 @@ def test_map_by_hand_in_between(law):
     c = y**3 * (0.051 - 0.012 * w) - 0.004 * w**3 * y**2
     m = 1 + a * t + b * t / (1 + 2.5 * t) + c * t**2 / (1 + 0.7 * kappa * t)
     assert law.sampler.sample(xi, alpha) == pytest.approx(t * m / (kappa * m + 1 / y - kappa), rel=1e-6)
+    xi = np.linspace(0, 0.999, 200, dtype=np.float32)
+    alpha = ALBEDOS[:, None].astype(np.float32)
+    drawn = jax.jit(law.sampler.sample)(jnp.asarray(xi), jnp.asarray(alpha))
+    assert drawn.dtype == jnp.float32
+    np.testing.assert_allclose(drawn, law.sampler.sample(xi, alpha), rtol=2e-4, atol=1e-7)
 
 
 @pytest.mark.slow
@@ -89,9 +91,13 @@ def test_ends_are_finite_and_the_map_rises_with_xi_and_alpha(shipped):
     within = shipped.sampler.sample(np.linspace(0, 0.999, 101)[1:], alpha)
     assert np.all(np.diff(within, axis=0) > 0)
     assert np.all(np.isfinite(within) & (within > 0))
+    x = np.geomspace(1e-20, FARTHEST, 500)
+    with jax.enable_x64(True):
+        t = np.asarray(depth(jnp.asarray(x), shipped.curve(jnp.asarray(ALBEDOS)[:, None])))
+    np.testing.assert_allclose(mapped(shipped, t, ALBEDOS[:, None])[0], np.tile(x, (ALBEDOS.size, 1)), rtol=1e-13)
 
 
-def test_cdf_is_the_inverse_of_the_map(law):
+def test_cdf_is_the_inverse_of_the_map_and_pdf_its_slope(law):
     """The slow twin: a bracketed root of the map itself."""
     x, alpha = np.array([[1e-6, 0.1, 1.0, 30.0]]), np.array([[0.0], [0.97], [1.0]])
     low, high = np.zeros((3, 4)), 10 * x + 0 * alpha
@@ -103,21 +109,9 @@ def test_cdf_is_the_inverse_of_the_map(law):
     xi = np.concatenate([[0.0], np.geomspace(1e-9, 0.5, 50), 1 - np.geomspace(0.49, 1e-9, 50)])
     alpha = ALBEDOS[:, None]
     np.testing.assert_allclose(law.cdf(law.sampler.sample(xi, alpha), alpha), xi + 0 * alpha, rtol=0, atol=2e-14)
-
-
-@pytest.mark.slow
-def test_newton_reaches_rounding_at_every_radius(shipped):
-    x = np.geomspace(1e-20, FARTHEST, 500)
-    with jax.enable_x64(True):
-        t = np.asarray(depth(jnp.asarray(x), shipped.curve(jnp.asarray(ALBEDOS)[:, None])))
-    np.testing.assert_allclose(mapped(shipped, t, ALBEDOS[:, None])[0], np.tile(x, (ALBEDOS.size, 1)), rtol=1e-13)
-
-
-def test_pdf_is_the_slope_of_the_map_and_integrates_to_one(law):
     xi, step, alpha = np.linspace(0.01, 0.99, 25), 1e-5, np.array([[0.0], [0.5], [0.95], [1.0]])
-    low, here, high, end = np.split(
-        law.sampler.sample([*(xi - step), *xi, *(xi + step), 0.999], alpha), [25, 50, 75], 1
-    )
+    radii = law.sampler.sample([*(xi - step), *xi, *(xi + step), 0.999], alpha)
+    low, here, high, end = np.split(radii, [25, 50, 75], 1)
     nodes, weights = np.polynomial.legendre.leggauss(200)
     u = 0.5 * (nodes + 1)  # x = end u^3: dense at the source
     x = np.concatenate([here, end * u**3], axis=1)
@@ -129,14 +123,6 @@ def test_pdf_is_the_slope_of_the_map_and_integrates_to_one(law):
     np.testing.assert_allclose(law.sampler.pdf(r, 0.7), 2 * np.pi * r * law.profile(r, 0.7) / whole, rtol=1e-12)
     with jax.enable_x64(True):
         assert float(law.unscaled_energy(jnp.asarray(1e9), jnp.asarray(0.7))) == pytest.approx(whole, rel=1e-14)
-
-
-def test_single_precision_draws_the_same_radii(law):
-    xi = np.linspace(0, 0.999, 200, dtype=np.float32)
-    alpha = ALBEDOS[:, None].astype(np.float32)
-    drawn = jax.jit(law.sampler.sample)(jnp.asarray(xi), jnp.asarray(alpha))
-    assert drawn.dtype == jnp.float32
-    np.testing.assert_allclose(drawn, law.sampler.sample(xi, alpha), rtol=2e-4, atol=1e-7)
 
 
 def test_error_at_albedos_that_were_not_fitted(shipped):
