@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.shader.check.bounds import ULP, Bound, ModelError
+from profilefit.shader.check.bounds import ULP, Bound, Mask, ModelError
 from profilefit.shader.check.shader_law import Values
-
-Mask = NDArray[np.bool_]
 
 SMALLEST = 2.0**-126  # below it a float32 loses digits, or is 0 on many GPUs
 DIMMEST = 1e-30  # R_d l^2 below which products of small factors leave float32
@@ -116,6 +113,9 @@ def spread(error: Floats, used: Mask, at: Arguments, of_share: bool = False) -> 
     return Spread(float(half), float(most), float(judged.flat[worst]), at.place(worst, of_share))
 
 
+KINDS = {"nan": "NaN", "infinite": "Inf", "negative": "negative", "wrong_way": "not monotone"}
+
+
 @dataclass(frozen=True)
 class Count:
     """Count results that are no number, infinite, negative, or go the wrong way; and name the first place."""
@@ -128,23 +128,32 @@ class Count:
 
     @property
     def total(self) -> int:
-        return self.nan + self.infinite + self.negative + self.wrong_way
+        return sum(getattr(self, name) for name in KINDS)
 
     def less(self, other: Count) -> Count:
         """Return what is counted here and not in another."""
-        names = ("nan", "infinite", "negative", "wrong_way")
-        return Count(*(getattr(self, name) - getattr(other, name) for name in names))
+        return Count(*(getattr(self, name) - getattr(other, name) for name in KINDS))
 
     @property
     def kinds(self) -> str:
         """Counts in words."""
-        kinds = {"NaN": self.nan, "Inf": self.infinite, "negative": self.negative, "not monotone": self.wrong_way}
-        return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
+        return ", ".join(f"{count} {kind}" for name, kind in KINDS.items() if (count := getattr(self, name))) or "none"
 
 
 def bad_numbers(count: Count) -> Bound:
     """Return the bound that allows none of the counted results."""
     return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
+
+
+def summed(faults: Iterable[tuple[list[Mask], Callable[[int], str]]]) -> Count:
+    """Count the faults of each result: a mask for each of `KINDS`, and the place of an index in words."""
+    numbers, first = np.zeros(len(KINDS), int), ""
+    for masks, place in faults:
+        numbers += [int(np.sum(mask)) for mask in masks]
+        bad = np.any(masks, axis=0)
+        if np.any(bad) and not first:
+            first = place(int(np.argmax(bad)))
+    return Count(**dict(zip(KINDS, numbers.tolist(), strict=True)), where=first)
 
 
 def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Floats | float = 1.0) -> Count:
@@ -153,22 +162,19 @@ def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Fl
     profiled  where profile and cdf count, drawn where radii and their pdf do; both as `Arguments.shape`
     jump      xi (alphas, 1, 1) at which radii begin at 0 anew, 1 where none does
     """
-    numbers, first = np.zeros(4, int), ""
-    for name in ("profile", "cdf", "sample", "pdf"):
-        kinds = _faults(name, getattr(values, name), at)
+
+    def faults(name: str) -> tuple[list[Mask], Callable[[int], str]]:
+        *bad, wrong = _faults(name, getattr(values, name))
         if name == "sample":
-            kinds[3][:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
+            wrong[:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
         among = drawn if name in ("sample", "pdf") else profiled
-        kinds[3][:, 1:] &= among[:, :-1]  # of two neighbours both count
-        numbers += [int(np.sum(kind & among)) for kind in kinds]
-        bad = np.any(kinds, axis=0) & among
-        if np.any(bad) and not first:
-            first = f"{name}, {at.place(int(np.argmax(bad)), name == 'sample')}"
-    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
-    return Count(nan, infinite, negative, wrong_way, first)
+        wrong[:, 1:] &= among[:, :-1]  # of two neighbours both count
+        return [mask & among for mask in (*bad, wrong)], lambda index: f"{name}, {at.place(index, name == 'sample')}"
+
+    return summed(map(faults, ("profile", "cdf", "sample", "pdf")))
 
 
-def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
+def _faults(name: str, value: Floats) -> list[Mask]:
     """Return a mask of values that are no number, infinite, negative, or go the wrong way."""
     wrong = np.zeros(value.shape, bool)
     with np.errstate(invalid="ignore"):

@@ -11,7 +11,6 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -151,8 +150,8 @@ class _Pass:
         self._triangle = full_screen(context, self._program)
         self._given = context.texture((WIDTH, ROWS), 4, dtype="f4")
         self._board = Board(context, (WIDTH, ROWS), results)
-        held = (self._triangle, self._program, self._given, self._board)
-        weakref.finalize(self, _free, held).atexit = False  # then the context is gone, and all with it
+        for held in (self._triangle, self._program, self._given, self._board):
+            weakref.finalize(self, held.release).atexit = False  # then the context is gone, and all with it
 
     def __call__(self, *arguments: ArrayLike) -> list[Floats]:
         """Four results of four arguments that broadcast."""
@@ -175,11 +174,6 @@ class _Pass:
         raw = self._board.frame.read(viewport=(0, 0, WIDTH, rows), components=4, dtype=self._results)
         check_errors(self._context, f"shader {self._name!r}")
         return np.frombuffer(raw, NUMPY_TYPES[self._results]).reshape(-1, 4)[:count]
-
-
-def _free(held: tuple[Any, ...]) -> None:
-    for one in held:
-        one.release()
 
 
 def half_extension(context: moderngl.Context) -> str:
