@@ -27,7 +27,6 @@ from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
-MARKS = {"python": "#"}
 JOINING = re.compile(r"(?:\\|\?\?/|\s)+$")
 TARGETS = {
     "glsl": "GLSL, for after #version 330 or later",
@@ -52,11 +51,7 @@ PROFILE_NAMES = (
     ("density, _cumulated, _radius, _radius_density (x or xi, shape)", ""),
     ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
 )
-MAP_NAMES = (
-    ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
-    ("map_reflectance(alpha)", "and back"),
-)
-DOMAIN = "domain, which nothing checks: alpha in [0, 1]"
+MAP_NAMES = (PROFILE_NAMES[-1], ("map_reflectance(alpha)", "and back"))
 CONVENTIONS = """\
 alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
@@ -153,7 +148,8 @@ def text_file(head: Sequence[str], lang: str, text: str) -> str:
     The first two hold nothing from outside: there, a word of a comment can change how Python reads it (PEP 263).
     """
     lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
-    return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text
+    head_text = commented(lines, "#" if lang == "python" else "//")
+    return f"{head_text}\n{ES_HEAD if lang == 'glsl-es' else ''}{text}"
 
 
 def commented(lines: Iterable[str], mark: str) -> str:
@@ -208,7 +204,7 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     surface += ", other media by reduced lengths" if setting.is_isotropic else ""
     lines += ["", f"light: {LIGHT[setting.illumination]}", surface, *CONVENTIONS.splitlines(), ""]
     most = f"{start}_{emit.HIGHEST}"
-    lines.append(DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"))
+    lines.append(f"domain, which nothing checks: alpha in [0, 1]{'' if is_map else ', r >= 0, mfp > 0, xi in [0, 1)'}")
     lines.append(f"{most} = {emit.max_reflectance(named.law):.3g}: no half space of this n reflects more")
     clamps = [f"A to [0, {most}]", *filter(None, [emit.text_of(named.law).clamps])]
     lines += [f"clamps: {'; '.join(clamps)}", ""]

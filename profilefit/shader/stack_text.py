@@ -17,6 +17,7 @@ from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes.kinds.stack import StackRecord
 from profilefit.shader import emit
+from profilefit.shader.emit import Numbers
 from profilefit.shader.law_file import LIGHT, TRANSLATED, error_remark, json_file, require_language, text_file
 
 NAME = "stack"
@@ -32,7 +33,6 @@ NAMES = (
     ("density, _cumulated, _radius, _radius_density (x or xi, shape)", ""),
     ("once_radiance(channel, thickness, cos_in, cos_out, turned)", "light scattered once [1/sr], exactly"),
 )
-Numbers = dict[str, float]
 
 
 def stack_text(
@@ -66,10 +66,8 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
             constants |= {f"{channel}_alpha{i}": layer.alpha, f"{channel}_g{i}": layer.g}
             if 1 < i < count:
                 constants[f"{channel}_depth{i}"] = layer.mu_t * layer.thickness
-    return emit.filled(
-        [emit.read_text(part) for part in ("common", "channel", "single_scattering")],
-        *(name, constants, count, lang, {}),
-    )
+    texts = [emit.read_text(part) for part in ("common", "channel", "single_scattering")]
+    return emit.filled(texts, name, constants, count, lang, {})
 
 
 def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: str = "gaussians") -> str:
@@ -159,16 +157,14 @@ def channel_numbers(law: StackLaw) -> Numbers:
             "open": 1.0 - law.w,
             **law.constants(),
         }
-        one: StackLaw | LayerLaw = law
+        layer: LayerLaw | StackLaw = law
         number = 1
-        while True:
-            half_space = one.top if isinstance(one, StackLaw) else one
-            found[f"scale{number}"] = unit / half_space.mfp
-            if not isinstance(one, StackLaw):
-                return found
+        while isinstance(layer, StackLaw):
+            found[f"scale{number}"] = unit / layer.top.mfp
             if number > 1:
-                found |= {f"{key}{number}": value for key, value in _edge(one, unit).items()}
-            one, number = one.below, number + 1
+                found |= {f"{key}{number}": value for key, value in _edge(layer, unit).items()}
+            layer, number = layer.below, number + 1
+        return {**found, f"scale{number}": unit / layer.mfp}
 
 
 def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:

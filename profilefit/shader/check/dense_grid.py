@@ -78,14 +78,10 @@ def reference(law: ProfileLaw, at: Arguments) -> Values:
     r = np.maximum(at.r, LEAST_X * at.mfp)
     xi = np.minimum(at.xi, 1.0 - ULP)
     sampler = drawn_by(law)
+    functions = ((law.profile, r), (law.cdf, at.r), (sampler.sample, xi), (sampler.pdf, r))
     with np.errstate(all="ignore"):
-        found = (
-            law.profile(r, at.alpha, at.mfp),
-            law.cdf(at.r, at.alpha, at.mfp),
-            sampler.sample(xi, at.alpha, at.mfp),
-            sampler.pdf(r, at.alpha, at.mfp),
-        )
-    return Values(*(np.broadcast_to(np.asarray(value, float), at.shape) for value in found))
+        found = [np.asarray(function(given, at.alpha, at.mfp), float) for function, given in functions]
+    return Values(*(np.broadcast_to(value, at.shape) for value in found))
 
 
 def drawn_by(law: ProfileLaw) -> Sampler:
@@ -164,29 +160,24 @@ def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Fl
     """
 
     def faults(name: str) -> tuple[list[Mask], Callable[[int], str]]:
-        *bad, wrong = _faults(name, getattr(values, name))
-        if name == "sample":
-            wrong[:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
+        value: Floats = getattr(values, name)
         among = drawn if name in ("sample", "pdf") else profiled
-        wrong[:, 1:] &= among[:, :-1]  # of two neighbours both count
-        return [mask & among for mask in (*bad, wrong)], lambda index: f"{name}, {at.place(index, name == 'sample')}"
+        wrong = np.zeros(value.shape, bool)
+        with np.errstate(invalid="ignore"):
+            step, before = np.diff(value, axis=1), np.abs(value[:, :-1])
+            if name == "profile":
+                wrong[:, 1:] = step > STEPS_OF_PROFILE * ULP * before + SMALLEST
+            elif name == "cdf":
+                wrong[:, 1:] = step < -STEPS_OF_CDF * ULP
+            elif name == "sample":
+                median = np.abs(value[:, value.shape[1] // 2, None])
+                wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (before + median)
+                wrong[:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
+            wrong[:, 1:] &= among[:, :-1]  # of two neighbours both count
+            masks = [mask & among for mask in (np.isnan(value), np.isinf(value), value < 0, wrong)]
+        return masks, lambda index: f"{name}, {at.place(index, name == 'sample')}"
 
     return summed(map(faults, ("profile", "cdf", "sample", "pdf")))
-
-
-def _faults(name: str, value: Floats) -> list[Mask]:
-    """Return a mask of values that are no number, infinite, negative, or go the wrong way."""
-    wrong = np.zeros(value.shape, bool)
-    with np.errstate(invalid="ignore"):
-        step, before = np.diff(value, axis=1), value[:, :-1]
-        if name == "profile":
-            wrong[:, 1:] = step > STEPS_OF_PROFILE * ULP * np.abs(before) + SMALLEST
-        elif name == "cdf":
-            wrong[:, 1:] = step < -STEPS_OF_CDF * ULP
-        elif name == "sample":
-            median = np.abs(value[:, value.shape[1] // 2, None])
-            wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (np.abs(before) + median)
-        return [np.isnan(value), np.isinf(value), value < 0, wrong]
 
 
 @dataclass(frozen=True)

@@ -129,9 +129,8 @@ class LawCheck(ShaderCheck):
 def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        references = pool.map(
-            lambda loaded: dense_grid.reference(loaded.law.in_reduced(), dense_grid.arguments()), laws
-        )
+        at = dense_grid.arguments()
+        references = pool.map(lambda loaded: dense_grid.reference(loaded.law.in_reduced(), at), laws)
         for loaded, known in zip(laws, references, strict=True):
             yield check_law(context, loaded, folder, exact=known)
 

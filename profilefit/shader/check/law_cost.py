@@ -120,8 +120,7 @@ class _Loop:
     """One work of one text."""
 
     def __init__(self, context: moderngl.Context, name: str, timed: TimedText, work: str) -> None:
-        text, prefix, shape = timed
-        source = LOOP.format(text=text, prefix=prefix, shape=shape, work=WORKS[work].replace("P_", f"{prefix}_"))
+        source = LOOP.format(**timed._asdict(), work=WORKS[work].replace("P_", f"{timed.prefix}_"))
         self._context = context
         self._program = program(context, f"{name}: {work}", source)
         self._triangle = full_screen(context, self._program)
