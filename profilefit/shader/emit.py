@@ -73,28 +73,24 @@ def law_text(
     InputError for a law that has no text.
     """
     text = text_of(law, ProfileLaw)
-    files = [*parts(law), *map(read_text, text.ends)]
-    return filled(files, name or prefix(law), numbers(law), text.count, lang, remarks or {})
-
-
-def numbers(law: ProfileLaw) -> Numbers:
-    """Return every number of a law's source, by its name less the prefix."""
-    albedo = _normalisation(law) if NORMALISED in text_of(law, ProfileLaw).parts else None
-    own = {**law.text_numbers(), **law.text_constants()}
-    return {HIGHEST: max_reflectance(law), **(_prefixed(albedo) if albedo else {}), **own}
+    own, of_map = dict[str, str](), Numbers()
+    if NORMALISED in text.parts:
+        albedo = getattr(law, "albedo", None)
+        if not isinstance(albedo, Normalisation):
+            raise InputError(
+                f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}"
+            )
+        own, of_map = {NORMALISED: text_of(albedo).file}, _prefixed(albedo)
+    files = [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
+    files += map(read_text, text.ends)
+    constants = {HIGHEST: max_reflectance(law), **of_map, **law.text_numbers(), **law.text_constants()}
+    return filled(files, name or prefix(law), constants, text.count, lang, remarks or {})
 
 
 def max_reflectance(law: Constants) -> float:
     """Return the largest total reflectance A [-] that a law's source gives an albedo to, which clamps a larger A."""
     albedo = law if isinstance(law, AlbedoLaw) else getattr(law, "albedo", None)
     return albedo.reflectances.high if isinstance(albedo, AlbedoLaw) else float(law.total(1.0))  # type: ignore[attr-defined]
-
-
-def parts(law: ProfileLaw) -> list[str]:
-    """Return the files of a law's source in order, without those that complete it."""
-    text = text_of(law, ProfileLaw)
-    own = {NORMALISED: text_of(_normalisation(law)).file} if NORMALISED in text.parts else {}
-    return [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
 
 
 def shapeless(law: ProfileLaw) -> list[str]:
@@ -151,13 +147,6 @@ def text_of(law: Constants, kind: type[Constants] = Constants) -> Text:
     known = [*profile_classes().items(), *map_classes().items()]
     has = ", ".join(name for name, one in known if issubclass(one, kind) and one.entry.has_text and ":" not in name)
     raise InputError(f"law must be one that has a shader source ({has}), got {type(law).__name__}")
-
-
-def _normalisation(law: Any) -> Normalisation:
-    albedo = getattr(law, "albedo", None)
-    if not isinstance(albedo, Normalisation):
-        raise InputError(f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}")
-    return albedo
 
 
 def _prefixed(albedo: AlbedoLaw) -> Numbers:

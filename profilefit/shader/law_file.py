@@ -79,13 +79,11 @@ def export_subject(
     for kind in kinds.KINDS:
         module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module
         if hasattr(module, "source") and (found := kind.find(subject, fits, **options)) is not None:
-            text: str = module.source(found, lang, name)
-            return text
+            return module.source(found, lang, name)
     for ending, (words, home) in (scenes or {}).items():
         if subject == ending or (ending.startswith(".") and subject.endswith(ending)):
             kinds.require_none(options, words, subject)
-            text = import_module(home).source(subject, lang, name)
-            return text
+            return import_module(home).source(subject, lang, name)
     raise not_found(subject, known_folder(fits), options.get("constants"))
 
 

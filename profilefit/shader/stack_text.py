@@ -79,8 +79,8 @@ def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: st
         got = ", ".join(str(one.count()) for one in sums) or "none"
         raise InputError(f"sums must be three of one number of Gaussians, of red, green and blue, got {got}")
     shapes = [_rounded(one.text_shape()) for one in sums]
-    prefix = emit.PLACEHOLDER.removesuffix("_")
-    texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), _of_channel(prefix, "_shape", shapes)]
+    shape = _of_channel(emit.PLACEHOLDER.removesuffix("_"), "_shape", shapes)
+    texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), shape]
     return emit.filled(texts, name, {}, sums[0].count(), lang, {})
 
 
@@ -116,11 +116,8 @@ def _head(record: StackRecord, start: str) -> list[str]:
         lines += [f"layer {number} {layer['name']}: {coefficients}, g {layer['g']:g}, {thick}", f"  source: {source}"]
     worst = content["quality"]["regenerated"]
     lines += ["", "domain, which nothing checks: r >= 0, thickness >= 0, xi in [0, 1), cosines in (0, 1]"]
-    lines += [content["equations"], content["note"]]
-    lines += [
-        f"at thicknesses that were not fitted: rel at most {max(worst['rel']):.2g}, "
-        f"ks {max(worst['ks']):.2g}, A {worst['delta_A']:.2g}"
-    ]
+    errors = f"rel at most {max(worst['rel']):.2g}, ks {max(worst['ks']):.2g}, A {worst['delta_A']:.2g}"
+    lines += [content["equations"], content["note"], f"at thicknesses that were not fitted: {errors}"]
     return [*lines, f"sha256 of the data {content['data_digest']}", f"sha256 of the record {record.digest}"]
 
 

@@ -21,17 +21,13 @@ LEAST_X = 1e-6  # R_d is taken here where x = r/l is less: at the source itself 
 STEPS_OF_PROFILE, STEPS_OF_CDF, STEPS_OF_SAMPLE = 16, 4, 16
 
 
-def _rounded(values: Sequence[float] | Floats) -> Floats:
-    return np.unique(np.asarray(values, np.float32)).astype(np.float64)
+def _rounded(*pieces: Sequence[float] | Floats) -> Floats:
+    return np.unique(np.concatenate(pieces).astype(np.float32)).astype(np.float64)
 
 
-ALPHA = _rounded(
-    np.concatenate([1.0 - np.linspace(0.0, 1.0, 56) ** 2, [1e-6, 1e-4], 1.0 - np.geomspace(2.0 * ULP, 1e-4, 6)])
-)
-X = _rounded(np.concatenate([[0.0, 1e-8], np.geomspace(LEAST_X, 1e4, 251), [1e6, 1e9, 1e30]]))
-XI = _rounded(
-    np.concatenate([[0.0], np.geomspace(ULP, 0.02, 40), np.linspace(0.03, 0.97, 175), 1 - np.geomspace(0.02, ULP, 40)])
-)
+ALPHA = _rounded(1.0 - np.linspace(0.0, 1.0, 56) ** 2, [1e-6, 1e-4], 1.0 - np.geomspace(2.0 * ULP, 1e-4, 6))
+X = _rounded([0.0, 1e-8], np.geomspace(LEAST_X, 1e4, 251), [1e6, 1e9, 1e30])
+XI = _rounded([0.0], np.geomspace(ULP, 0.02, 40), np.linspace(0.03, 0.97, 175), 1 - np.geomspace(0.02, ULP, 40))
 XI = np.append(XI, 1.0)
 MFP = np.array([1.0, 1e-3, 1e3], np.float32).astype(np.float64)
 
@@ -57,8 +53,7 @@ class Arguments:
     def place(self, index: int, of_share: bool = False) -> str:
         """Return the place of a flat index in words."""
         at = np.unravel_index(index, self.shape)
-        alpha, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.mfp))
-        xi = float(np.broadcast_to(self.xi, self.shape)[at])
+        alpha, xi, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.xi, self.mfp))
         first = f"ξ {_shown(xi)}" if of_share else f"r/l {float(self.x[at]):.3g}"
         return f"{first}, α {_shown(alpha)}" + (f", l {mfp:g}" if mfp != 1.0 else "")
 

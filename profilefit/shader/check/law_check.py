@@ -34,7 +34,7 @@ from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, ULP, Bound, Mask, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, Count, ShaderCheck, Spread, bad_numbers
 from profilefit.shader.check.shader_law import ShaderLaw, ShaderMap, Values, half_extension
-from profilefit.shader.emit import translated
+from profilefit.shader.emit import Numbers, translated
 
 # Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
 STEP = 1e-4
@@ -167,7 +167,7 @@ def check_law(
 
 def _rounding(
     law: ProfileLaw, found: Values, right: Values, at: Arguments, profiled: Mask, drawn: Mask
-) -> tuple[dict[str, Spread], dict[str, float]]:
+) -> tuple[dict[str, Spread], Numbers]:
     """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
     seen = (at.x >= NEAREST) & (right.cdf <= ENERGY_WITHIN)  # where `rel` looks
     tells = profiled & (right.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(right.profile)
@@ -192,9 +192,9 @@ def _rounding(
     return {name: spread for name, spread in spreads.items() if spread is not None}, rounding
 
 
-def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[str, float]:
+def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> Numbers:
     """Return the errors of the GPU's numbers against the exact half space, for the measures with a model error."""
-    found: dict[str, float] = {}
+    found = Numbers()
     if not loaded.setting.is_solved:
         return found
     if model.get("rel") is not None:
@@ -205,9 +205,7 @@ def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[s
     return found
 
 
-def _of_model(
-    model: ModelError, rounding: dict[str, float], measured: dict[str, float], places: dict[str, str]
-) -> list[Bound]:
+def _of_model(model: ModelError, rounding: Numbers, measured: Numbers, places: dict[str, str]) -> list[Bound]:
     found = []
     for name, value in model.values.items():
         found.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places.get(name, "")))
@@ -216,9 +214,7 @@ def _of_model(
     return found
 
 
-def _limits(
-    model: ModelError, rounding: dict[str, float], measured: dict[str, float], spreads: dict[str, Spread]
-) -> list[Bound]:
+def _limits(model: ModelError, rounding: Numbers, measured: Numbers, spreads: dict[str, Spread]) -> list[Bound]:
     places = {name: spreads[of].where for name, of in JUDGED.items() if of in spreads}
     found = _of_model(model, rounding, measured, places)
     rel, ks = model.get("rel"), model.get("ks")
@@ -265,7 +261,7 @@ def check_map(context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text
     return MapCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), places)
 
 
-def _map_measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
+def _map_measured(shader: ShaderMap, of_alpha: Range) -> Numbers:
     """Largest errors against the exact half space, for albedos below 1 where the map holds [-]."""
     if not shader.setting.is_solved:
         return {}
@@ -302,8 +298,8 @@ class HalfCheck:
     """`rel` and `ks` [-] of what float16 alone changes, worst over the records' albedos, for l = 1."""
 
     of: LoadedLaw
-    rel: dict[str, float]
-    ks: dict[str, float]
+    rel: Numbers
+    ks: Numbers
 
 
 def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
@@ -320,7 +316,7 @@ def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
     found[HALVES[3]] = ShaderLaw(context, law, results="f2").values(r, 0.5, alpha)
     if half_extension(context):
         found[HALVES[4]] = ShaderLaw(context, law, half=True).values(r, 0.5, alpha)
-    rel, ks = dict[str, float](), dict[str, float]()
+    rel, ks = Numbers(), Numbers()
     for name, values in found.items():
         with np.errstate(all="ignore"):
             error = np.where(used, np.abs(values.profile / profile - 1.0), 0.0)
