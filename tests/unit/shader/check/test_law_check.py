@@ -1,6 +1,7 @@
 """Right texts pass; a wrong constant, sign or density, or a number that is none, does not."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,25 +15,27 @@ from profilefit.shader.check.chosen import COSINES, INDICES, chosen, printed, re
 from profilefit.shader.check.law_check import HALVES, OWN, check_half, check_law, check_laws, check_map
 from profilefit.shader.check.law_cost import WORKS, costs
 from profilefit.shader.check.shader_law import Values
+from tests.fixtures import slow
 
 FITS = catalogue.fits_folder()
 HAZARD = catalogue.find("hazard", FITS)
 REFRACTING = catalogue.find("hazard-refracting", FITS, n=1.2)
+NAMED = {"hazard": HAZARD, "two parts": REFRACTING}
 RATIONAL = catalogue.find("albedo-rational-refracting", FITS)
 
 
-@pytest.fixture(scope="module")
-def exact():
+@cache
+def exact(name):
     """The law in float64 on the whole grid."""
-    return dense_grid.reference(HAZARD.law, dense_grid.arguments())
+    return dense_grid.reference(NAMED[name].law, dense_grid.arguments())
 
 
 def names(found):
     return [bound.name for bound in found.broken]
 
 
-def test_a_regenerated_law_passes_with_room(context, exact):
-    found = check_law(context, HAZARD, FITS, exact=exact)
+def test_a_regenerated_law_passes_with_room(context):
+    found = check_law(context, HAZARD, FITS, exact=exact("hazard"))
     assert names(found) == []
     assert found.model.source == "hazard"
     assert found.inside.total == found.outside.total == 0
@@ -50,34 +53,10 @@ def test_the_gpus_numbers_have_the_records_errors(context):
     assert found.measured["ks"] == pytest.approx(found.model.values["ks"], rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "broken"),
-    [
-        ("s.h = exp(hazard_h0", "s.h = exp(1.02 * hazard_h0", "float32 rel"),
-        ("s.w = s.source - s.kappa", "s.w = s.source + s.kappa", "float32 ks"),
-        ("float t = -pf_log1p(-share);", "float t = -log(share - 1.0);", "float32 inversion_error"),
-        ("return exp(-here.exponent) * here.ratio * here.hazard;", "return sqrt(-1.0 - x);", "bad numbers"),
-        ("here.exponent + pf_log_near_one(", "here.exponent + 0.0 * pf_log_near_one(", "float32 inversion_error"),
-        ("return hazard_density(x, s);", "return 1.01 * hazard_density(x, s);", f"{OWN}, 99 % of it"),
-    ],
-)
-def test_an_error_in_the_text_breaks_its_bound(context, exact, old, new, broken):
-    text = emit.law_text(HAZARD.law)
-    assert text.count(old) == 1
-    found = check_law(context, HAZARD, FITS, text.replace(old, new), exact)
-    assert broken in names(found)
-
-
-@pytest.fixture(scope="module")
-def refracting():
-    """The law of two parts in float64 on the whole grid."""
-    return dense_grid.reference(REFRACTING.law, dense_grid.arguments())
-
-
 @pytest.mark.slow
-def test_a_law_of_two_parts_passes_with_room(context, refracting):
+def test_a_law_of_two_parts_passes_with_room(context):
     """Its radii begin anew where the other part does, and its density is that of both."""
-    found = check_law(context, REFRACTING, FITS, exact=refracting)
+    found = check_law(context, REFRACTING, FITS, exact=exact("two parts"))
     assert names(found) == []
     assert found.inside.total == found.outside.total == 0
     assert max(found.rounding.values()) < 1e-6  # float32
@@ -85,22 +64,32 @@ def test_a_law_of_two_parts_passes_with_room(context, refracting):
     assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-4)
 
 
-@pytest.mark.slow
+DENSITY, OWN_DENSITY = "return hazard_density(x, s);", f"{OWN}, 99 % of it"
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "broken"),
+    ("name", "old", "new", "broken"),
     [
-        ("s.w = min(s.c", "s.w = min(1.02 * s.c", "float32 rel"),
-        ("shape.rest = alpha", "shape.rest = 1.01 * alpha", "float32 ks"),
-        ("float inner = PF_SELECT(share", "float inner = PF_SELECT(share + 0.01", "bad numbers"),
-        ("max(s.rest, PF_NEAREST)", "max(1.01 * s.rest, PF_NEAREST)", "float32 inversion_error"),
-        ("return hazard_density(x, s);", "return 1.01 * hazard_density(x, s);", f"{OWN}, 99 % of it"),
-        ("return hazard_density(x, s);", "return s.rest * hazard_density(x, s);", f"{OWN}, 99 % of it"),
+        ("hazard", "s.h = exp(hazard_h0", "s.h = exp(1.02 * hazard_h0", "float32 rel"),
+        ("hazard", "s.w = s.source - s.kappa", "s.w = s.source + s.kappa", "float32 ks"),
+        ("hazard", "float t = -pf_log1p(-share);", "float t = -log(share - 1.0);", "float32 inversion_error"),
+        ("hazard", "return exp(-here.exponent) * here.ratio * here.hazard;", "return sqrt(-1.0 - x);", "bad numbers"),
+        ("hazard", "exponent + pf_log_near_one(", "exponent + 0.0 * pf_log_near_one(", "float32 inversion_error"),
+        ("hazard", DENSITY, "return 1.01 * hazard_density(x, s);", OWN_DENSITY),
+        *slow(
+            ("two parts", "s.w = min(s.c", "s.w = min(1.02 * s.c", "float32 rel"),
+            ("two parts", "shape.rest = alpha", "shape.rest = 1.01 * alpha", "float32 ks"),
+            ("two parts", "float inner = PF_SELECT(share", "float inner = PF_SELECT(share + 0.01", "bad numbers"),
+            ("two parts", "max(s.rest, PF_NEAREST)", "max(1.01 * s.rest, PF_NEAREST)", "float32 inversion_error"),
+            ("two parts", DENSITY, "return 1.01 * hazard_density(x, s);", OWN_DENSITY),
+            ("two parts", DENSITY, "return s.rest * hazard_density(x, s);", OWN_DENSITY),
+        ),
     ],
 )
-def test_an_error_in_a_text_of_two_parts_breaks_its_bound(context, refracting, old, new, broken):
-    text = emit.law_text(REFRACTING.law)
+def test_an_error_in_the_text_breaks_its_bound(context, name, old, new, broken):
+    text = emit.law_text(NAMED[name].law)
     assert text.count(old) == 1
-    assert broken in names(check_law(context, REFRACTING, FITS, text.replace(old, new), refracting))
+    assert broken in names(check_law(context, NAMED[name], FITS, text.replace(old, new), exact(name)))
 
 
 def test_an_index_between_has_the_worse_of_its_neighbours_errors():
@@ -139,9 +128,8 @@ def test_what_the_paper_promises_is_judged_of_its_constants_alone():
 @pytest.mark.slow
 def test_names_choose_laws_and_maps():
     laws, maps = regenerated(FITS)
-    assert {"hazard", "hazard-diffuse-refracting", "liang-whole", "liang-inverse-as-published"} <= {
-        o.label for o in laws
-    }
+    labels = {"hazard", "hazard-diffuse-refracting", "liang-whole", "liang-inverse-as-published"}
+    assert labels <= {one.label for one in laws}
     assert len({(one.label, one.setting.n, one.setting.g) for one in (*laws, *maps)}) == len(laws) + len(maps)
     assert {one.setting.n for one in chosen(["hazard"], "regenerated", FITS)[0]} == {1.0, *INDICES}
     assert [one.setting.n for one in chosen(["hazard-refracting"], None, FITS)[0]] == list(INDICES)
@@ -160,15 +148,10 @@ def test_names_choose_laws_and_maps():
 
 def test_bad_numbers_are_counted_by_kind():
     """On a grid of two albedos, four radii and shares, one length."""
-    at = dense_grid.Arguments(
-        np.array([0.2, 0.8])[:, None, None],
-        np.array([0.0, 1.0, 2.0, 3.0])[None, :, None],
-        np.array([0.0, 0.2, 0.4, 0.6])[None, :, None],
-        np.array([1.0]),
-    )
-    falling = np.broadcast_to(np.array([4.0, 3.0, 2.0, 1.0])[None, :, None], (2, 4, 1)).copy()
-    rising = falling[:, ::-1].copy()
-    profile, cdf, sample = falling.copy(), rising / 4.0, rising.copy()
+    r = np.arange(4.0)[None, :, None]
+    at = dense_grid.Arguments(np.array([0.2, 0.8])[:, None, None], r, 0.2 * r, np.array([1.0]))
+    rising = np.broadcast_to(1.0 + r, (2, 4, 1)).copy()
+    profile, cdf, sample = 5.0 - rising, rising / 4.0, rising.copy()
     profile[0, 2, 0] = 3.5  # up by a half
     profile[1, 3, 0] = np.inf  # not a step up besides
     cdf[0, 1, 0] = cdf[0, 0, 0] - 2.0 * dense_grid.ULP  # rounding
