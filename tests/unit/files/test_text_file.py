@@ -142,12 +142,8 @@ def test_what_is_not_finite_is_null(nothing):
 
 
 def test_every_kind_of_number_text_and_container():
-    given = {
-        1: (np.int64(3), np.bool_(True), np.float64(0.25)),
-        "path": Path("a/b"),
-        "kind": enum.Enum("Kind", "ONE").ONE,
-    }
-    given["found"] = Found(0.5, np.array([1.0, np.nan]))
+    numbers, kind = (np.int64(3), np.bool_(True), np.float64(0.25)), enum.Enum("Kind", "ONE").ONE
+    given = {1: numbers, "path": Path("a/b"), "kind": kind, "found": Found(0.5, np.array([1.0, np.nan]))}
     told = {"1": [3, True, 0.25], "path": "a/b", "kind": "Kind.ONE", "found": {"value": 0.5, "rings": [1.0, None]}}
     assert json.loads(as_json(given)) == told
 
