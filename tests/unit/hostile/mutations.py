@@ -432,11 +432,9 @@ def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
 @cache
 def records() -> dict[str, Any]:
     """Shipped records of every kind, the one of readings cut to a few."""
-    names = (
-        *("albedo-rational", "albedo-liang", "albedo-rational-diffuse-refracting", "burley-whole", "gaussians-2"),
-        *("quantile", "hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
-    )  # fmt: skip
-    found = {name: json.loads((ROOT / "fits" / f"{name}.json").read_text(encoding="utf-8")) for name in names}
+    names = "albedo-rational albedo-liang albedo-rational-diffuse-refracting burley-whole gaussians-2 quantile hazard"
+    names += " hazard-diffuse liang-inverse-whole liang-as-published reproduction"
+    found = {name: json.loads(_text(f"fits/{name}.json")) for name in names.split()}
     for key in ("readings", "table1"):
         found["reproduction"][key] = found["reproduction"][key][:12]
     return found
