@@ -183,7 +183,7 @@ class Tree:
         for mark, literal in self.literal.items():
             text = text.replace(f'"{mark}"', literal)
         if self.rng.random() < 0.05:  # a key twice: the last one counts
-            text = text.replace("{", '{"title": "one\\nimport os", ', 1) + rng_tail(self.rng)
+            text = text.replace("{", '{"title": "one\\nimport os", ', 1) + self.rng.choice(("", "\n", " ", "{}", "\0"))
         return text.encode("utf-8", "surrogatepass")
 
     def _somewhere(self) -> tuple[Any, Any]:
@@ -219,11 +219,6 @@ class Tree:
         return mark
 
 
-def rng_tail(rng: random.Random) -> str:
-    """What may stand behind the end of a file."""
-    return rng.choice(("", "\n", " ", "{}", "\0"))
-
-
 def _texts(content: Any) -> Iterator[tuple[Any, Any]]:
     """Every place that holds a text."""
     for key, value in content.items() if isinstance(content, dict) else enumerate(content):
@@ -249,8 +244,8 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
         at, other = rng.randrange(len(found)), rng.randrange(len(found))
         way = rng.random()
         if way < 0.55:
-            places = [place for line, one in enumerate(found) for place in _words(line, one, comment)]
-            if places:
+            codes = [one.partition(comment)[0] if comment else one for one in found]
+            if places := [(line, *word.span()) for line, code in enumerate(codes) for word in TOKEN.finditer(code)]:
                 line, begin, end = rng.choice(places)
                 word = rng.choice((rng.choice(words), rng.choice(words), _scaled(rng, found[line][begin:end])))
                 found[line] = found[line][:begin] + word + found[line][end:]
@@ -264,10 +259,6 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
             found.insert(at, rng.choice(lines))
     data = "\n".join(found).encode("utf-8", "surrogatepass")
     return damaged(rng, data) if rng.random() < 0.1 else data
-
-
-def _words(line: int, text: str, comment: str) -> Iterator[tuple[int, int, int]]:
-    return ((line, *found.span()) for found in TOKEN.finditer(text.partition(comment)[0] if comment else text))
 
 
 def _scaled(rng: random.Random, word: str) -> str:

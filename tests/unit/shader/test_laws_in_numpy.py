@@ -69,14 +69,9 @@ def truth(law, alpha):
     return profile, cdf, law.sampler.pdf(X, alpha), law.sampler.sample(XI, alpha)
 
 
-def albedos(law):
-    """Without what the law says that it does not have."""
-    return ALPHA[:-1] if isinstance(law, BurleyDiffuseMfp) else ALPHA
-
-
 def mismatch(names, law):
     """The largest differences, relative but for that of the cdf, which is a share."""
-    alpha = albedos(law)
+    alpha = ALPHA[:-1] if isinstance(law, BurleyDiffuseMfp) else ALPHA  # the law says that it does not have 1
     given = {"profile": X, "cdf": X, "pdf": X, "sample": XI}
     least = 1e-15, 1.0, 1e-12, 1e-9  # [1/mfp^2], [-], [1/mfp], [mfp]: nothing that a picture shows
     found = {}

@@ -212,11 +212,8 @@ ALL = " + ".join(
 
 def whole(label, lang="glsl", name="stack"):
     """Both texts of a stack."""
-    return stack_text(LAWS[label], lang, name) + single_text(media(layers_of(label)), lang, f"{name}_once")
-
-
-def layers_of(label):
-    return 3 if label.startswith("three") else 2
+    count = 3 if label.startswith("three") else 2
+    return stack_text(LAWS[label], lang, name) + single_text(media(count), lang, f"{name}_once")
 
 
 @pytest.mark.parametrize("head", HEADS)
