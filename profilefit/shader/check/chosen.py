@@ -62,12 +62,12 @@ def regenerated(folder: Folder) -> Chosen:
     """List all laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
 
-    def spread(one: LoadedLaw) -> list[LoadedLaw]:
-        content = records.content(one.label)
+    def spread(loaded: LoadedLaw) -> list[LoadedLaw]:
+        content = records.content(loaded.label)
         low, high = content.get("indices") or (0.0, 0.0)
-        cosines = COSINES if "cosines" in content else (one.setting.g,)
+        cosines = COSINES if "cosines" in content else (loaded.setting.g,)
         places = product((n for n in INDICES if low < n <= high), cosines)
-        return [catalogue.find(one.label, records, n=n, g=g) for n, g in places] or [one]
+        return [catalogue.find(loaded.label, records, n=n, g=g) for n, g in places] or [loaded]
 
     profiles, maps = catalogue.all_profiles(records), catalogue.albedo_laws(records, matched=False)
     laws, of_maps = ([each for one in group if one.records for each in spread(one)] for group in (profiles, maps))
