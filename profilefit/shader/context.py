@@ -108,12 +108,9 @@ def renderer(context: moderngl.Context) -> str:
 
 
 def _located(name: str, source: str, message: str) -> str:
-    located = [line.strip() for line in message.splitlines() if PLACE.search(line)] or [
-        message.strip().splitlines()[-1]
-    ]
-    number = PLACE.search(located[0])
-    lines = source.splitlines()
-    if number is None or not 0 < int(number.group(1)) <= len(lines):
-        return f"shader {name!r} does not compile: {located[0]}"
-    line = int(number.group(1))
-    return f"shader {name!r} does not compile, line {line}, `{lines[line - 1].strip()}`: {located[0]}"
+    said = message.strip().splitlines()
+    located = next((line.strip() for line in said if PLACE.search(line)), said[-1])
+    lines, number = source.splitlines(), PLACE.search(located)
+    if number is None or not 0 < (line := int(number.group(1))) <= len(lines):
+        return f"shader {name!r} does not compile: {located}"
+    return f"shader {name!r} does not compile, line {line}, `{lines[line - 1].strip()}`: {located}"

@@ -52,19 +52,14 @@ DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them,
 
 def prefix(law: Constants) -> str:
     """Return what the names of a law's source begin with, less the underscore."""
-    text = _text(law)
+    text = text_of(law)
     return f"{text.prefix or text.file}{text.count or ''}"
 
 
 def source(law: Constants) -> str:
     """Return the name of a law's source: of one prefix there may be several, as where the surface refracts."""
-    text = _text(law)
+    text = text_of(law)
     return f"{text.file}{text.count or ''}"
-
-
-def clamps(law: Constants) -> str:
-    """Return what a law's source clamps, in words."""
-    return _text(law).clamps
 
 
 def law_text(
@@ -77,16 +72,19 @@ def law_text(
     remarks  a remark for each constant, which stands behind it
     InputError for a law that has no text.
     """
-    text = _text(law, ProfileLaw)
-    files = [*parts(law), *map(read_text, text.ends)]
-    return filled(files, name or prefix(law), numbers(law), text.count, lang, remarks or {})
-
-
-def numbers(law: ProfileLaw) -> Numbers:
-    """Return every number of a law's source, by its name less the prefix."""
-    albedo = _normalisation(law) if NORMALISED in _text(law, ProfileLaw).parts else None
-    own = {**law.text_numbers(), **law.text_constants()}
-    return {HIGHEST: max_reflectance(law), **(_prefixed(albedo) if albedo else {}), **own}
+    text = text_of(law, ProfileLaw)
+    own, of_map = dict[str, str](), Numbers()
+    if NORMALISED in text.parts:
+        albedo = getattr(law, "albedo", None)
+        if not isinstance(albedo, Normalisation):
+            raise InputError(
+                f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}"
+            )
+        own, of_map = {NORMALISED: text_of(albedo).file}, _prefixed(albedo)
+    files = [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
+    files += map(read_text, text.ends)
+    constants = {HIGHEST: max_reflectance(law), **of_map, **law.text_numbers(), **law.text_constants()}
+    return filled(files, name or prefix(law), constants, text.count, lang, remarks or {})
 
 
 def max_reflectance(law: Constants) -> float:
@@ -95,16 +93,9 @@ def max_reflectance(law: Constants) -> float:
     return albedo.reflectances.high if isinstance(albedo, AlbedoLaw) else float(law.total(1.0))  # type: ignore[attr-defined]
 
 
-def parts(law: ProfileLaw) -> list[str]:
-    """Return the files of a law's source in order, without those that complete it."""
-    text = _text(law, ProfileLaw)
-    own = {NORMALISED: _text(_normalisation(law)).file} if NORMALISED in text.parts else {}
-    return [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
-
-
 def shapeless(law: ProfileLaw) -> list[str]:
     """Return the part of a law's source that works on shapes made elsewhere."""
-    text = _text(law, ProfileLaw)
+    text = text_of(law, ProfileLaw)
     needed = [part for part in text.parts if part in ON_SHAPES]
     return [SHAPE.sub("", read_text(part)) for part in ("common", *needed, text.file)]
 
@@ -130,7 +121,7 @@ def map_text(
     law: AlbedoLaw, lang: str = "glsl", name: str | None = None, remarks: Mapping[str, str] | None = None
 ) -> str:
     """Return the map between alpha and A: NAME_alpha(A), NAME_map_reflectance(alpha); arguments as for `law_text`."""
-    text = _text(law, AlbedoLaw)
+    text = text_of(law, AlbedoLaw)
     constants = {HIGHEST: max_reflectance(law), **_prefixed(law)}
     remarks = {f"map_{key}": value for key, value in (remarks or {}).items()}
     files = [read_text(part) for part in ("common", *text.parts, text.file)]
@@ -146,8 +137,8 @@ def text_beside(module: str, file: str) -> str:
     return (resources.files(module.rpartition(".")[0]) / file).read_text(encoding="utf-8")
 
 
-def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
-    """Return the source of a law of this class, a profile law or a map."""
+def text_of(law: Constants, kind: type[Constants] = Constants) -> Text:
+    """Return the source of a law of this class, a profile law or a map; InputError where it has none."""
     text = law.entry.text
     if isinstance(law, kind) and isinstance(text, Text):
         return text
@@ -156,13 +147,6 @@ def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
     known = [*profile_classes().items(), *map_classes().items()]
     has = ", ".join(name for name, one in known if issubclass(one, kind) and one.entry.has_text and ":" not in name)
     raise InputError(f"law must be one that has a shader source ({has}), got {type(law).__name__}")
-
-
-def _normalisation(law: Any) -> Normalisation:
-    albedo = getattr(law, "albedo", None)
-    if not isinstance(albedo, Normalisation):
-        raise InputError(f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}")
-    return albedo
 
 
 def _prefixed(albedo: AlbedoLaw) -> Numbers:
@@ -181,12 +165,15 @@ def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: st
     if not PREFIX.fullmatch(name):
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
-    lines = []
-    for key, value in constants.items():
-        lines.append(
-            f"const float {name}_{key} = {literal(value)};" + (f" // {remarks[key]}" if remarks.get(key) else "")
-        )
-    own = _repeated("\n".join(["\n".join(lines) + "\n", *rest]), count).replace(PLACEHOLDER, f"{name}_")
+
+    def repeated(block: re.Match[str]) -> str:
+        first, body = int(block.group(1)), block.group(2)
+        return "".join(body.replace("@i", str(i)).replace("@h", str(i - 1)) for i in range(first, count + 1))
+
+    behind = {key: f" // {remark}" for key, remark in remarks.items() if remark}
+    lines = [f"const float {name}_{key} = {literal(value)};{behind.get(key, '')}" for key, value in constants.items()]
+    own = BLOCK.sub(repeated, "\n".join(["\n".join(lines) + "\n", *rest]))
+    own = own.replace("@n", str(count)).replace(PLACEHOLDER, f"{name}_")
     digest = f"0x{hashlib.sha256(own.encode()).hexdigest()[:7]}"  # a positive int in every language
     guarded = own if lang == "python" else GUARD.format(name=name, digest=digest, text=own)
     return translated(f"{common}\n{guarded}", lang)
@@ -201,40 +188,25 @@ def literal(value: float) -> str:
     return np.format_float_positional(value, DIGITS, unique=True, fractional=False, trim="0")
 
 
-def _repeated(text: str, count: int) -> str:
-    def each(block: re.Match[str]) -> str:
-        first, body = int(block.group(1)), block.group(2)
-        return "".join(body.replace("@i", str(i)).replace("@h", str(i - 1)) for i in range(first, count + 1))
-
-    return BLOCK.sub(each, text).replace("@n", str(count))
-
-
 LANGUAGES = ("glsl", "hlsl", "python")
-NUMPY = {
-    "exp": "np.exp",
-    "log": "np.log",
-    "sqrt": "np.sqrt",
-    "pow": "np.power",
-    "abs": "np.abs",
-    "min": "np.minimum",
-    "max": "np.maximum",
-    "clamp": "np.clip",
-    "sin": "np.sin",
-    "cos": "np.cos",
-    "atan": "np.arctan",
-    "PF_SELECT": "np.where",
-}
+# Functions that the languages share, by their names in numpy.
+NUMPY = {name: name for name in ("exp", "log", "sqrt", "abs", "sin", "cos")}
+NUMPY |= {"pow": "power", "min": "minimum", "max": "maximum", "clamp": "clip", "atan": "arctan", "PF_SELECT": "where"}
 COMMON = "shader source must keep to what GLSL, HLSL and numpy share"
 PYTHON_HEAD = "import numpy as np\nfrom types import SimpleNamespace\n"
 CALL = re.compile(r"\b(" + "|".join(NUMPY) + r")\(")
-NAME, TYPE = r"[A-Za-z_]\w*", r"(?:float|bool|int)"
-CONSTANT = re.compile(rf"const {TYPE} ({NAME}) = (.+);$")
+NAME = r"[A-Za-z_]\w*"
 FUNCTION = re.compile(rf"{NAME} ({NAME})\((.*)\) {{$")
-LOOP = re.compile(rf"for \(int ({NAME}) = 0; \1 < ({NAME}|\d+); \+\+\1\) {{$")
-STRUCTURE = re.compile(rf"({NAME}_{NAME}|Pf\w+) ({NAME});$")
-VALUE = re.compile(rf"(?:{NAME} )?({NAME}(?:\.{NAME})?) ([+*/-]?=) (.+);$")
-RETURN = re.compile(r"return (.+);$")
-DEFINE = re.compile(rf"#define ({NAME}) ([\d.e+-]+)$")
+# Every other line that a text may hold, and its Python: the first that matches counts, and {x} is an expression.
+LINES = (
+    (rf"#define ({NAME}) ([\d.e+-]+)$", "{0} = {1}"),
+    (r"#", ""),
+    (rf"for \(int ({NAME}) = 0; \1 < ({NAME}|\d+); \+\+\1\) {{$", "for {0} in range({1}):"),
+    (r"return (?P<x>.+);$", "return {x}"),
+    (rf"const (?:float|bool|int) ({NAME}) = (?P<x>.+);$", "{0} = {x}"),
+    (rf"(?:{NAME}_{NAME}|Pf\w+) ({NAME});$", "{0} = SimpleNamespace()"),
+    (rf"(?:{NAME} )?({NAME}(?:\.{NAME})?) ([+*/-]?=) (?P<x>.+);$", "{0} {1} {x}"),
+)
 # What the three languages read each in its own way, or not at all: whole numbers in a quotient, say.
 FOREIGN = re.compile(r"&&|\|\||[?%!\[\]^~]|(?<![\w.])(?<![\d.]e-)\d+(?![\w.])|\d[fF]\b")
 # Words that HLSL keeps for itself and GLSL does not: a variable of that name gets an underscore.
@@ -251,16 +223,11 @@ def translated(text: str, lang: str) -> str:
     if lang == "glsl":
         return text
     if lang == "hlsl":
-        return "\n".join(_hlsl_line(line) for line in text.split("\n"))
+        parts = (line.partition("//") for line in text.split("\n"))
+        hlsl = "\n".join(HLSL_WORDS.sub(r"\1_", code) + slashes + comment for code, slashes, comment in parts)
+        # A constant would else be a parameter that the application sets.
+        return re.sub(r"^const ", "static const ", hlsl, flags=re.MULTILINE)
     return PYTHON_HEAD + _python(text)
-
-
-def _hlsl_line(line: str) -> str:
-    code, slashes, comment = line.partition("//")
-    code = HLSL_WORDS.sub(r"\1_", code)
-    if code.startswith("const "):  # would else be a parameter that the application sets
-        code = f"static {code}"
-    return code + slashes + comment
 
 
 def _python(text: str) -> str:
@@ -296,22 +263,12 @@ def _statements(text: str):
 
 
 def _python_line(code: str) -> str:
-    if code.startswith("#"):
-        found = DEFINE.match(code)
-        return f"{found.group(1)} = {found.group(2)}" if found else ""
-    if found := LOOP.match(code):
-        return f"for {found.group(1)} in range({found.group(2)}):"
     if found := FUNCTION.match(code):
         names = [one.split()[-1] for one in found.group(2).split(",") if one.strip()]
         return f"def {found.group(1)}({', '.join(names)}):"
-    if found := RETURN.match(code):
-        return f"return {_expression(found.group(1))}"
-    if found := CONSTANT.match(code):
-        return f"{found.group(1)} = {_expression(found.group(2))}"
-    if found := STRUCTURE.match(code):
-        return f"{found.group(2)} = SimpleNamespace()"
-    if found := VALUE.match(code):
-        return f"{found.group(1)} {found.group(2)} {_expression(found.group(3))}"
+    for line, python in LINES:
+        if found := re.match(line, code):
+            return python.format(*found.groups(), x=_expression(found.groupdict().get("x", "")))
     raise InputError(f"{COMMON}, got {code!r}")
 
 
@@ -320,4 +277,4 @@ def _expression(code: str) -> str:
     foreign |= {name for name in CALLED.findall(code) if name not in NUMPY and "_" not in name}
     if foreign:
         raise InputError(f"{COMMON}, got {min(foreign)!r} in {code!r}")
-    return CALL.sub(lambda found: NUMPY[found.group(1)] + "(", code)
+    return CALL.sub(lambda found: f"np.{NUMPY[found.group(1)]}(", code)

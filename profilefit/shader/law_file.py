@@ -27,8 +27,6 @@ from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
-ENDINGS = {"glsl": "glsl", "hlsl": "hlsl", "glsl-es": "glsl", "python": "py", "json": "json"}
-MARKS = {"python": "#"}
 JOINING = re.compile(r"(?:\\|\?\?/|\s)+$")
 TARGETS = {
     "glsl": "GLSL, for after #version 330 or later",
@@ -53,11 +51,7 @@ PROFILE_NAMES = (
     ("density, _cumulated, _radius, _radius_density (x or xi, shape)", ""),
     ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
 )
-MAP_NAMES = (
-    ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
-    ("map_reflectance(alpha)", "and back"),
-)
-DOMAIN = "domain, which nothing checks: alpha in [0, 1]"
+MAP_NAMES = (PROFILE_NAMES[-1], ("map_reflectance(alpha)", "and back"))
 CONVENTIONS = """\
 alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
@@ -85,13 +79,11 @@ def export_subject(
     for kind in kinds.KINDS:
         module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module
         if hasattr(module, "source") and (found := kind.find(subject, fits, **options)) is not None:
-            text: str = module.source(found, lang, name)
-            return text
+            return module.source(found, lang, name)
     for ending, (words, home) in (scenes or {}).items():
         if subject == ending or (ending.startswith(".") and subject.endswith(ending)):
             kinds.require_none(options, words, subject)
-            text = import_module(home).source(subject, lang, name)
-            return text
+            return import_module(home).source(subject, lang, name)
     raise not_found(subject, known_folder(fits), options.get("constants"))
 
 
@@ -154,7 +146,8 @@ def text_file(head: Sequence[str], lang: str, text: str) -> str:
     The first two hold nothing from outside: there, a word of a comment can change how Python reads it (PEP 263).
     """
     lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
-    return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text
+    head_text = commented(lines, "#" if lang == "python" else "//")
+    return f"{head_text}\n{ES_HEAD if lang == 'glsl-es' else ''}{text}"
 
 
 def commented(lines: Iterable[str], mark: str) -> str:
@@ -172,29 +165,29 @@ def commented(lines: Iterable[str], mark: str) -> str:
 class _Source:
     """A record behind a text.
 
-    of     "law" or "map", whose constants it holds
+    of     "law" or "map", whose constants it holds; law itself
     spare  whether it is the shipped record of a map that the folder lacks
     """
 
     of: str
+    law: Constants
     path: Path
     content: dict[str, Any]
     digest: str
-    spare: bool = False
+    spare: bool
 
 
 def _sources(named: LoadedLaw, records: Records) -> list[_Source]:
     """Return the records behind a law: its own, and that of the map which normalises it."""
     own = "map" if isinstance(named.law, AlbedoLaw) else "law"
-    found = [_source(own, path, records) for path in named.files]
+    behind = [(own, named.law, path, False) for path in named.files]
     if getattr(named.law, "albedo", None) is not None:
         path = records.path_or_shipped(catalogue.ALBEDO_RECORD, named.setting)
-        found.append(_source("map", path, records, spare=path.parent != records.folder))
-    return found
-
-
-def _source(of: str, path: Path, records: Records, spare: bool = False) -> _Source:
-    return _Source(of, path, records.read(path, whole=True), hashlib.sha256(path.read_bytes()).hexdigest(), spare)
+        behind.append(("map", named.law.albedo, path, path.parent != records.folder))
+    return [
+        _Source(of, law, path, records.read(path, whole=True), hashlib.sha256(path.read_bytes()).hexdigest(), spare)
+        for of, law, path, spare in behind
+    ]
 
 
 def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> list[str]:
@@ -209,18 +202,18 @@ def _head(named: LoadedLaw, sources: Sequence[_Source], name: str | None) -> lis
     surface += ", other media by reduced lengths" if setting.is_isotropic else ""
     lines += ["", f"light: {LIGHT[setting.illumination]}", surface, *CONVENTIONS.splitlines(), ""]
     most = f"{start}_{emit.HIGHEST}"
-    lines.append(DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"))
+    lines.append(f"domain, which nothing checks: alpha in [0, 1]{'' if is_map else ', r >= 0, mfp > 0, xi in [0, 1)'}")
     lines.append(f"{most} = {emit.max_reflectance(named.law):.3g}: no half space of this n reflects more")
-    clamps = [f"A to [0, {most}]", *filter(None, [emit.clamps(named.law)])]
+    clamps = [f"A to [0, {most}]", *filter(None, [emit.text_of(named.law).clamps])]
     lines += [f"clamps: {'; '.join(clamps)}", ""]
     if printed := _printed(named):
         lines.append(f"constants as printed: {printed.source}")
     for source in sources:
-        lines += _provenance(source, f"{source.of}: ")
+        lines += _provenance(source)
     return lines
 
 
-def _provenance(source: _Source, before: str) -> list[str]:
+def _provenance(source: _Source) -> list[str]:
     """Return a record's title, equations, range, error and digests, each line after whose it is."""
     content = source.content
     lines = [f"record {source.path.stem}: {content['title']}", content["equations"]]
@@ -232,28 +225,23 @@ def _provenance(source: _Source, before: str) -> list[str]:
         lines.append(f"fitted for every refractive index above {span[0]:g} up to {span[1]:g}")
     if span := content.get("cosines"):
         lines.append(f"and every mean cosine g above {span[0]:g} up to {span[1]:g}")
-    measured = dict(content["quality"]["regenerated"])
-    measured |= content["quality"].get("by_index", {})
+    measured = content["quality"]["regenerated"] | content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
-    worst = [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]
-    if worst:
+    if worst := [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]:
         lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
     if content.get("data_digest"):
         lines.append(f"sha256 of the data {content['data_digest']}")
-    return [before + line for line in [*lines, f"sha256 of the record {source.digest}"]]
+    return [f"{source.of}: {line}" for line in [*lines, f"sha256 of the record {source.digest}"]]
 
 
 def _remarks(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, str]:
     """Return the errors of each constant, in words; of a profile law's map, the names begin with map_."""
-    remarks = {}
-    start = "" if isinstance(named.law, AlbedoLaw) else "map_"
+    # A record may hold a part of a law's constants.
+    remarks = dict.fromkeys(named.law.constant_names(), "as printed") if named.files else {}
     for source in sources:
-        law = named.law.albedo if source.of == "map" and start else named.law
-        before = start if source.of == "map" else ""
-        for name, errors in text_errors(law, source.content).items():
+        before = "" if source.law is named.law else "map_"
+        for name, errors in text_errors(source.law, source.content).items():
             remarks[before + name] = error_remark(errors) or "held"
-    if named.files:  # a record may hold a part of a law's constants
-        remarks = {**dict.fromkeys(named.law.constant_names(), "as printed"), **remarks}
     return remarks
 
 
@@ -308,19 +296,17 @@ def _plain(named: LoadedLaw, sources: Sequence[_Source]) -> dict[str, Any]:
         "constants": law.text_constants(),
         "max_reflectance": emit.max_reflectance(law),
         "printed_in": printed.source if printed else None,
-        "records": {source.path.stem: _record_data(source, named.law) for source in sources},
+        "records": {source.path.stem: _record_data(source) for source in sources},
     }
     if getattr(law, "albedo", None) is not None:
         made["map"] = {"entered": law.albedo.entered, **law.albedo.text_numbers(), **law.albedo.text_constants()}
     return made
 
 
-def _record_data(source: _Source, law: Any) -> dict[str, Any]:
+def _record_data(source: _Source) -> dict[str, Any]:
     content = source.content
-    of = law.albedo if source.of == "map" and not isinstance(law, AlbedoLaw) else law
-    errors = {
-        name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in text_errors(of, content).items()
-    }
+    found = text_errors(source.law, content).items()
+    errors = {name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in found}
     kept = {key: content.get(key) for key in ("title", "equations", "data_digest", "truth")}
     fitted = {key: content["protocol"]["albedos"][key] for key in ("low", "high")}
     own = {"of": source.of, "sha256": source.digest, "came_with_profilefit": source.spare}

@@ -46,11 +46,8 @@ def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = Non
     text = phase_text(record.phase(form, how), TRANSLATED.get(lang, lang), start, remarks)
     own, data = content["phases"][form][how], content["data"]
     head = [f"phase function {record.path.stem}: {FORMS[form].title}"]
-    head += [f"{start}_{called:<20}{words}" for called, words in NAMES]
-    head += [
-        "",
-        f"fitted to {data['source']}, {data['rows']} angles: root mean square of ln(p / table) {own['rms']:.3f}",
-    ]
+    head += [*(f"{start}_{called:<20}{words}" for called, words in NAMES), ""]
+    head += [f"fitted to {data['source']}, {data['rows']} angles: root mean square of ln(p / table) {own['rms']:.3f}"]
     head += [f"mean cosine {own['mean_cosine']:.4f}, turned by more than 90 degrees {own['backscattered']:.5f}"]
     head += [content["note"], f"sha256 of the data {content['data_digest']}"]
     return text_file(head, lang, text)

@@ -17,6 +17,7 @@ from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes.kinds.stack import StackRecord
 from profilefit.shader import emit
+from profilefit.shader.emit import Numbers
 from profilefit.shader.law_file import LIGHT, TRANSLATED, error_remark, json_file, require_language, text_file
 
 NAME = "stack"
@@ -32,7 +33,6 @@ NAMES = (
     ("density, _cumulated, _radius, _radius_density (x or xi, shape)", ""),
     ("once_radiance(channel, thickness, cos_in, cos_out, turned)", "light scattered once [1/sr], exactly"),
 )
-Numbers = dict[str, float]
 
 
 def stack_text(
@@ -66,10 +66,8 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
             constants |= {f"{channel}_alpha{i}": layer.alpha, f"{channel}_g{i}": layer.g}
             if 1 < i < count:
                 constants[f"{channel}_depth{i}"] = layer.mu_t * layer.thickness
-    return emit.filled(
-        [emit.read_text(part) for part in ("common", "channel", "single_scattering")],
-        *(name, constants, count, lang, {}),
-    )
+    texts = [emit.read_text(part) for part in ("common", "channel", "single_scattering")]
+    return emit.filled(texts, name, constants, count, lang, {})
 
 
 def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: str = "gaussians") -> str:
@@ -81,8 +79,8 @@ def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: st
         got = ", ".join(str(one.count()) for one in sums) or "none"
         raise InputError(f"sums must be three of one number of Gaussians, of red, green and blue, got {got}")
     shapes = [_rounded(one.text_shape()) for one in sums]
-    prefix = emit.PLACEHOLDER.removesuffix("_")
-    texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), _of_channel(prefix, "_shape", shapes)]
+    shape = _of_channel(emit.PLACEHOLDER.removesuffix("_"), "_shape", shapes)
+    texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), shape]
     return emit.filled(texts, name, {}, sums[0].count(), lang, {})
 
 
@@ -118,11 +116,8 @@ def _head(record: StackRecord, start: str) -> list[str]:
         lines += [f"layer {number} {layer['name']}: {coefficients}, g {layer['g']:g}, {thick}", f"  source: {source}"]
     worst = content["quality"]["regenerated"]
     lines += ["", "domain, which nothing checks: r >= 0, thickness >= 0, xi in [0, 1), cosines in (0, 1]"]
-    lines += [content["equations"], content["note"]]
-    lines += [
-        f"at thicknesses that were not fitted: rel at most {max(worst['rel']):.2g}, "
-        f"ks {max(worst['ks']):.2g}, A {worst['delta_A']:.2g}"
-    ]
+    errors = f"rel at most {max(worst['rel']):.2g}, ks {max(worst['ks']):.2g}, A {worst['delta_A']:.2g}"
+    lines += [content["equations"], content["note"], f"at thicknesses that were not fitted: {errors}"]
     return [*lines, f"sha256 of the data {content['data_digest']}", f"sha256 of the record {record.digest}"]
 
 
@@ -159,16 +154,14 @@ def channel_numbers(law: StackLaw) -> Numbers:
             "open": 1.0 - law.w,
             **law.constants(),
         }
-        one: StackLaw | LayerLaw = law
+        layer: LayerLaw | StackLaw = law
         number = 1
-        while True:
-            half_space = one.top if isinstance(one, StackLaw) else one
-            found[f"scale{number}"] = unit / half_space.mfp
-            if not isinstance(one, StackLaw):
-                return found
+        while isinstance(layer, StackLaw):
+            found[f"scale{number}"] = unit / layer.top.mfp
             if number > 1:
-                found |= {f"{key}{number}": value for key, value in _edge(one, unit).items()}
-            one, number = one.below, number + 1
+                found |= {f"{key}{number}": value for key, value in _edge(layer, unit).items()}
+            layer, number = layer.below, number + 1
+        return {**found, f"scale{number}": unit / layer.mfp}
 
 
 def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:

@@ -126,13 +126,13 @@ def _around(setting: Setting, by_index: dict[str, list[float]], measures: Sequen
 
     Where a law has g, return the worst of all.
     """
-    if setting.g:
-        return {measure: float(np.max(by_index[measure])) for measure in measures if measure in by_index}
-    known, n = by_index["n"], setting.n
-    i = int(np.searchsorted(known, n))
-    if n < known[0]:
-        return {}
-    near = slice(i, i + 1) if i < len(known) and known[i] == n else slice(i - 1, i + 1)
+    near: slice = slice(None)
+    if not setting.g:
+        known, n = by_index["n"], setting.n
+        i = int(np.searchsorted(known, n))
+        if n < known[0]:
+            return {}
+        near = slice(i, i + 1) if i < len(known) and known[i] == n else slice(i - 1, i + 1)
     return {measure: float(np.max(by_index[measure][near])) for measure in measures if measure in by_index}
 
 

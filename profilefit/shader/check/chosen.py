@@ -14,7 +14,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.law_check import HalfCheck, LawCheck, MapCheck, check_half, check_laws, check_map
-from profilefit.shader.check.law_cost import Cost, law_costs
+from profilefit.shader.check.law_cost import YARDSTICK, Cost, costs
 from profilefit.shader.check.shader_law import half_extension, no_half
 from profilefit.shader.context import opened, renderer
 
@@ -61,19 +61,17 @@ def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str
 def regenerated(folder: Folder) -> Chosen:
     """List all laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
+
+    def spread(loaded: LoadedLaw) -> list[LoadedLaw]:
+        content = records.content(loaded.label)
+        low, high = content.get("indices") or (0.0, 0.0)
+        cosines = COSINES if "cosines" in content else (loaded.setting.g,)
+        places = product((n for n in INDICES if low < n <= high), cosines)
+        return [catalogue.find(loaded.label, records, n=n, g=g) for n, g in places] or [loaded]
+
     profiles, maps = catalogue.all_profiles(records), catalogue.albedo_laws(records, matched=False)
-    of_laws, of_maps = (
-        [each for one in group if one.records for each in _spread(one, records)] for group in (profiles, maps)
-    )
-    return of_laws, of_maps
-
-
-def _spread(one: LoadedLaw, records: Records) -> list[LoadedLaw]:
-    content = records.content(one.label)
-    low, high = content.get("indices") or (0.0, 0.0)
-    cosines = COSINES if "cosines" in content else (one.setting.g,)
-    places = product((n for n in INDICES if low < n <= high), cosines)
-    return [catalogue.find(one.label, records, n=n, g=g) for n, g in places] or [one]
+    laws, of_maps = ([each for one in group if one.records for each in spread(one)] for group in (profiles, maps))
+    return laws, of_maps
 
 
 def printed(constants: str, folder: Folder) -> Chosen:
@@ -114,13 +112,14 @@ def checked(those: Chosen, folder: Path, in_half: bool = False, quiet: bool = Tr
     with opened() as context:
         checks = chain(check_laws(context, laws, folder), (check_map(context, one, folder) for one in maps))
         found = list(tracked(checks, "checking", "laws", len(laws) + len(maps), quiet))
+        yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
         with working("timing the sources", quiet):
-            costs = law_costs(context, laws, folder)
+            timed = costs(context, [one.law for one in laws], yardstick) if laws else {}
         halves = (check_half(context, one) for one in laws if in_half)
         return Checked(
             laws=[one for one in found if isinstance(one, LawCheck)],
             maps=[one for one in found if isinstance(one, MapCheck)],
-            costs=costs,
+            costs=timed,
             halves=list(tracked(halves, "halving", "laws", len(laws), quiet)),
             device=renderer(context),
             lacking="" if half_extension(context) else no_half(context),

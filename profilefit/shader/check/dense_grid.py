@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.shader.check.bounds import ULP, Bound, ModelError
+from profilefit.shader.check.bounds import ULP, Bound, Mask, ModelError
 from profilefit.shader.check.shader_law import Values
-
-Mask = NDArray[np.bool_]
 
 SMALLEST = 2.0**-126  # below it a float32 loses digits, or is 0 on many GPUs
 DIMMEST = 1e-30  # R_d l^2 below which products of small factors leave float32
@@ -24,17 +21,13 @@ LEAST_X = 1e-6  # R_d is taken here where x = r/l is less: at the source itself 
 STEPS_OF_PROFILE, STEPS_OF_CDF, STEPS_OF_SAMPLE = 16, 4, 16
 
 
-def _rounded(values: Sequence[float] | Floats) -> Floats:
-    return np.unique(np.asarray(values, np.float32)).astype(np.float64)
+def _rounded(*pieces: Sequence[float] | Floats) -> Floats:
+    return np.unique(np.concatenate(pieces).astype(np.float32)).astype(np.float64)
 
 
-ALPHA = _rounded(
-    np.concatenate([1.0 - np.linspace(0.0, 1.0, 56) ** 2, [1e-6, 1e-4], 1.0 - np.geomspace(2.0 * ULP, 1e-4, 6)])
-)
-X = _rounded(np.concatenate([[0.0, 1e-8], np.geomspace(LEAST_X, 1e4, 251), [1e6, 1e9, 1e30]]))
-XI = _rounded(
-    np.concatenate([[0.0], np.geomspace(ULP, 0.02, 40), np.linspace(0.03, 0.97, 175), 1 - np.geomspace(0.02, ULP, 40)])
-)
+ALPHA = _rounded(1.0 - np.linspace(0.0, 1.0, 56) ** 2, [1e-6, 1e-4], 1.0 - np.geomspace(2.0 * ULP, 1e-4, 6))
+X = _rounded([0.0, 1e-8], np.geomspace(LEAST_X, 1e4, 251), [1e6, 1e9, 1e30])
+XI = _rounded([0.0], np.geomspace(ULP, 0.02, 40), np.linspace(0.03, 0.97, 175), 1 - np.geomspace(0.02, ULP, 40))
 XI = np.append(XI, 1.0)
 MFP = np.array([1.0, 1e-3, 1e3], np.float32).astype(np.float64)
 
@@ -60,8 +53,7 @@ class Arguments:
     def place(self, index: int, of_share: bool = False) -> str:
         """Return the place of a flat index in words."""
         at = np.unravel_index(index, self.shape)
-        alpha, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.mfp))
-        xi = float(np.broadcast_to(self.xi, self.shape)[at])
+        alpha, xi, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.xi, self.mfp))
         first = f"ξ {_shown(xi)}" if of_share else f"r/l {float(self.x[at]):.3g}"
         return f"{first}, α {_shown(alpha)}" + (f", l {mfp:g}" if mfp != 1.0 else "")
 
@@ -81,14 +73,10 @@ def reference(law: ProfileLaw, at: Arguments) -> Values:
     r = np.maximum(at.r, LEAST_X * at.mfp)
     xi = np.minimum(at.xi, 1.0 - ULP)
     sampler = drawn_by(law)
+    functions = ((law.profile, r), (law.cdf, at.r), (sampler.sample, xi), (sampler.pdf, r))
     with np.errstate(all="ignore"):
-        found = (
-            law.profile(r, at.alpha, at.mfp),
-            law.cdf(at.r, at.alpha, at.mfp),
-            sampler.sample(xi, at.alpha, at.mfp),
-            sampler.pdf(r, at.alpha, at.mfp),
-        )
-    return Values(*(np.broadcast_to(np.asarray(value, float), at.shape) for value in found))
+        found = [np.asarray(function(given, at.alpha, at.mfp), float) for function, given in functions]
+    return Values(*(np.broadcast_to(value, at.shape) for value in found))
 
 
 def drawn_by(law: ProfileLaw) -> Sampler:
@@ -116,6 +104,9 @@ def spread(error: Floats, used: Mask, at: Arguments, of_share: bool = False) -> 
     return Spread(float(half), float(most), float(judged.flat[worst]), at.place(worst, of_share))
 
 
+KINDS = {"nan": "NaN", "infinite": "Inf", "negative": "negative", "wrong_way": "not monotone"}
+
+
 @dataclass(frozen=True)
 class Count:
     """Count results that are no number, infinite, negative, or go the wrong way; and name the first place."""
@@ -128,23 +119,32 @@ class Count:
 
     @property
     def total(self) -> int:
-        return self.nan + self.infinite + self.negative + self.wrong_way
+        return sum(getattr(self, name) for name in KINDS)
 
     def less(self, other: Count) -> Count:
         """Return what is counted here and not in another."""
-        names = ("nan", "infinite", "negative", "wrong_way")
-        return Count(*(getattr(self, name) - getattr(other, name) for name in names))
+        return Count(*(getattr(self, name) - getattr(other, name) for name in KINDS))
 
     @property
     def kinds(self) -> str:
         """Counts in words."""
-        kinds = {"NaN": self.nan, "Inf": self.infinite, "negative": self.negative, "not monotone": self.wrong_way}
-        return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
+        return ", ".join(f"{count} {kind}" for name, kind in KINDS.items() if (count := getattr(self, name))) or "none"
 
 
 def bad_numbers(count: Count) -> Bound:
     """Return the bound that allows none of the counted results."""
     return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
+
+
+def summed(faults: Iterable[tuple[list[Mask], Callable[[int], str]]]) -> Count:
+    """Count the faults of each result: a mask for each of `KINDS`, and the place of an index in words."""
+    numbers, first = np.zeros(len(KINDS), int), ""
+    for masks, place in faults:
+        numbers += [int(np.sum(mask)) for mask in masks]
+        bad = np.any(masks, axis=0)
+        if np.any(bad) and not first:
+            first = place(int(np.argmax(bad)))
+    return Count(**dict(zip(KINDS, numbers.tolist(), strict=True)), where=first)
 
 
 def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Floats | float = 1.0) -> Count:
@@ -153,34 +153,26 @@ def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Fl
     profiled  where profile and cdf count, drawn where radii and their pdf do; both as `Arguments.shape`
     jump      xi (alphas, 1, 1) at which radii begin at 0 anew, 1 where none does
     """
-    numbers, first = np.zeros(4, int), ""
-    for name in ("profile", "cdf", "sample", "pdf"):
-        kinds = _faults(name, getattr(values, name), at)
-        if name == "sample":
-            kinds[3][:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
+
+    def faults(name: str) -> tuple[list[Mask], Callable[[int], str]]:
+        value: Floats = getattr(values, name)
         among = drawn if name in ("sample", "pdf") else profiled
-        kinds[3][:, 1:] &= among[:, :-1]  # of two neighbours both count
-        numbers += [int(np.sum(kind & among)) for kind in kinds]
-        bad = np.any(kinds, axis=0) & among
-        if np.any(bad) and not first:
-            first = f"{name}, {at.place(int(np.argmax(bad)), name == 'sample')}"
-    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
-    return Count(nan, infinite, negative, wrong_way, first)
+        wrong = np.zeros(value.shape, bool)
+        with np.errstate(invalid="ignore"):
+            step, before = np.diff(value, axis=1), np.abs(value[:, :-1])
+            if name == "profile":
+                wrong[:, 1:] = step > STEPS_OF_PROFILE * ULP * before + SMALLEST
+            elif name == "cdf":
+                wrong[:, 1:] = step < -STEPS_OF_CDF * ULP
+            elif name == "sample":
+                median = np.abs(value[:, value.shape[1] // 2, None])
+                wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (before + median)
+                wrong[:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
+            wrong[:, 1:] &= among[:, :-1]  # of two neighbours both count
+            masks = [mask & among for mask in (np.isnan(value), np.isinf(value), value < 0, wrong)]
+        return masks, lambda index: f"{name}, {at.place(index, name == 'sample')}"
 
-
-def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
-    """Return a mask of values that are no number, infinite, negative, or go the wrong way."""
-    wrong = np.zeros(value.shape, bool)
-    with np.errstate(invalid="ignore"):
-        step, before = np.diff(value, axis=1), value[:, :-1]
-        if name == "profile":
-            wrong[:, 1:] = step > STEPS_OF_PROFILE * ULP * np.abs(before) + SMALLEST
-        elif name == "cdf":
-            wrong[:, 1:] = step < -STEPS_OF_CDF * ULP
-        elif name == "sample":
-            median = np.abs(value[:, value.shape[1] // 2, None])
-            wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (np.abs(before) + median)
-        return [np.isnan(value), np.isinf(value), value < 0, wrong]
+    return summed(map(faults, ("profile", "cdf", "sample", "pdf")))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ engines store albedo textures and results in float16 and compute in float32.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,6 @@ import jax
 import jax.numpy as jnp
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
@@ -32,15 +31,14 @@ from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid
-from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, ULP, Bound, ModelError
+from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, ULP, Bound, Mask, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, Count, ShaderCheck, Spread, bad_numbers
 from profilefit.shader.check.shader_law import ShaderLaw, ShaderMap, Values, half_extension
-from profilefit.shader.emit import translated
+from profilefit.shader.emit import Numbers, translated
 
-Mask = NDArray[np.bool_]
 # Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
 STEP = 1e-4
-NEAREST_XI, FARTHEST_XI = 1e-4, 1.0 - 1e-5
+INNER = Range(1e-4, 1.0 - 1e-5, open_low=True, open_high=True)  # shares whose difference quotients have a part's slope
 HALVINGS = 50
 LEAST_SHARE = 1e-9  # of a part of the light, which is rounding in a black medium
 
@@ -66,7 +64,7 @@ class Twin:
         """
         if alpha.size == 0:
             return None
-        inner = (max(NEAREST_XI, lowest) < XI) & (XI < FARTHEST_XI)
+        inner = INNER.holds(XI) & (lowest < XI)
         xi, albedo = np.broadcast_arrays(XI[None, :], alpha[:, None])
         x = self.radius(xi, albedo)
         share = np.broadcast_to(_jump(shader.law, alpha)[:, None], x.shape)
@@ -78,7 +76,7 @@ class Twin:
             both = last - first > LEAST_SHARE
             with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is none
                 density = density + np.where(both, 1.0 / self._slope(other, albedo, first, last), 0.0)
-                held = _inside((xi - low) / (high - low)) & (~both | _inside((other - first) / (last - first)))
+                held = INNER.holds((xi - low) / (high - low)) & (~both | INNER.holds((other - first) / (last - first)))
         error = np.abs(shader.values(x, xi, albedo).pdf / density - 1.0)
         at = Arguments(albedo, x, xi, np.array(1.0))
         return dense_grid.spread(error, held & inner, at, of_share=True)
@@ -103,11 +101,6 @@ def _single(x: Floats) -> Mask:
     earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
     found[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
     return found
-
-
-def _inside(share: Floats) -> Mask:
-    """Return a mask of shares where difference quotients of a part have its slope."""
-    return np.asarray((share > NEAREST_XI) & (share < FARTHEST_XI))
 
 
 def _jump(law: ProfileLaw, alpha: Floats) -> Floats:
@@ -136,9 +129,8 @@ class LawCheck(ShaderCheck):
 def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        references = pool.map(
-            lambda loaded: dense_grid.reference(loaded.law.in_reduced(), dense_grid.arguments()), laws
-        )
+        at = dense_grid.arguments()
+        references = pool.map(lambda loaded: dense_grid.reference(loaded.law.in_reduced(), at), laws)
         for loaded, known in zip(laws, references, strict=True):
             yield check_law(context, loaded, folder, exact=known)
 
@@ -175,14 +167,17 @@ def check_law(
 
 def _rounding(
     law: ProfileLaw, found: Values, right: Values, at: Arguments, profiled: Mask, drawn: Mask
-) -> tuple[dict[str, Spread], dict[str, float]]:
+) -> tuple[dict[str, Spread], Numbers]:
     """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
     seen = (at.x >= NEAREST) & (right.cdf <= ENERGY_WITHIN)  # where `rel` looks
     tells = profiled & (right.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(right.profile)
     dense = drawn.any(axis=1, keepdims=True) & (right.pdf * at.mfp > dense_grid.DIMMEST) & np.isfinite(right.pdf)
     profile = np.abs(found.profile / right.profile - 1.0)
     cdf = np.abs(found.cdf - right.cdf)
-    sample = _misplaced(law, found, right, at)
+    # The share of the energy between the radii of float32 and float64, of the part that both are of.
+    radii = np.where(found.sample >= 0, found.sample, np.inf), right.sample
+    mine, there = (np.asarray(dense_grid.drawn_by(law).undone(r, at.xi, at.alpha, at.mfp)) for r in radii)
+    sample = np.abs(mine - there)
     spreads = {
         PROFILE: dense_grid.spread(profile, tells & seen, at),
         EVERYWHERE: dense_grid.spread(profile, tells, at),
@@ -197,17 +192,9 @@ def _rounding(
     return {name: spread for name, spread in spreads.items() if spread is not None}, rounding
 
 
-def _misplaced(law: ProfileLaw, found: Values, right: Values, at: Arguments) -> Floats:
-    """Return the share of the energy between the radii of float32 and float64 [-], of the part that both are of."""
-    sampler = dense_grid.drawn_by(law)
-    drawn = np.where(found.sample >= 0, found.sample, np.inf)
-    mine, there = (np.asarray(sampler.undone(x, at.xi, at.alpha, at.mfp)) for x in (drawn, right.sample))
-    return np.abs(mine - there)
-
-
-def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[str, float]:
+def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> Numbers:
     """Return the errors of the GPU's numbers against the exact half space, for the measures with a model error."""
-    found: dict[str, float] = {}
+    found = Numbers()
     if not loaded.setting.is_solved:
         return found
     if model.get("rel") is not None:
@@ -218,9 +205,7 @@ def _measured(shader: ShaderLaw, loaded: LoadedLaw, model: ModelError) -> dict[s
     return found
 
 
-def _of_model(
-    model: ModelError, rounding: dict[str, float], measured: dict[str, float], places: dict[str, str]
-) -> list[Bound]:
+def _of_model(model: ModelError, rounding: Numbers, measured: Numbers, places: dict[str, str]) -> list[Bound]:
     found = []
     for name, value in model.values.items():
         found.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places.get(name, "")))
@@ -229,9 +214,7 @@ def _of_model(
     return found
 
 
-def _limits(
-    model: ModelError, rounding: dict[str, float], measured: dict[str, float], spreads: dict[str, Spread]
-) -> list[Bound]:
+def _limits(model: ModelError, rounding: Numbers, measured: Numbers, spreads: dict[str, Spread]) -> list[Bound]:
     places = {name: spreads[of].where for name, of in JUDGED.items() if of in spreads}
     found = _of_model(model, rounding, measured, places)
     rel, ks = model.get("rel"), model.get("ks")
@@ -278,7 +261,7 @@ def check_map(context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text
     return MapCheck(loaded, model, rounding, measured, inside, outside, tuple(limits), places)
 
 
-def _map_measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
+def _map_measured(shader: ShaderMap, of_alpha: Range) -> Numbers:
     """Largest errors against the exact half space, for albedos below 1 where the map holds [-]."""
     if not shader.setting.is_solved:
         return {}
@@ -292,18 +275,17 @@ def _map_measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
 
 def _map_counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_alpha: Range) -> Count:
     """Count what must not be: both directions rise."""
-    numbers, first = np.zeros(4, int), ""
-    for given, value, span, sign in ((REFLECTANCE, alpha, of_reflectance, "A"), (ALPHA, reflectance, of_alpha, "α")):
+
+    def faults(given: Floats, value: Floats, span: Range, sign: str) -> tuple[list[Mask], Callable[[int], str]]:
         held = span.holds(given)
         with np.errstate(invalid="ignore"):
-            falls = np.append(False, np.diff(value) < -STEPS * ULP) & held & np.append(False, held[:-1])
-            kinds = [np.isnan(value) & held, np.isinf(value) & held, (value < 0) & held, falls]
-        numbers += [int(np.sum(kind)) for kind in kinds]
-        bad = np.any(kinds, axis=0)
-        if np.any(bad) and not first:
-            first = f"{sign} {given[np.argmax(bad)]:.4g}"
-    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
-    return Count(nan, infinite, negative, wrong_way, first)
+            falls = np.append(False, np.diff(value) < -STEPS * ULP) & np.append(False, held[:-1])
+            bad = (np.isnan(value), np.isinf(value), value < 0, falls)
+        return [mask & held for mask in bad], lambda index: f"{sign} {given[index]:.4g}"
+
+    return dense_grid.summed(
+        (faults(REFLECTANCE, alpha, of_reflectance, "A"), faults(ALPHA, reflectance, of_alpha, "α"))
+    )
 
 
 # What is kept in half, or computed in it.
@@ -316,16 +298,16 @@ class HalfCheck:
     """`rel` and `ks` [-] of what float16 alone changes, worst over the records' albedos, for l = 1."""
 
     of: LoadedLaw
-    rel: dict[str, float]
-    ks: dict[str, float]
+    rel: Numbers
+    ks: Numbers
 
 
 def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
     """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
     law = loaded.law.in_reduced()
     r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]
-    cdf = np.asarray(law.cdf(r, alpha))
-    truth = np.asarray(law.profile(r, alpha)), cdf, cdf <= ENERGY_WITHIN
+    profile, cdf = np.asarray(law.profile(r, alpha)), np.asarray(law.cdf(r, alpha))
+    used = cdf <= ENERGY_WITHIN
     single = ShaderLaw(context, law)
     found = {HALVES[0]: single.values(r, 0.5, _half(alpha))}
     if getattr(law, "albedo", None) is not None:
@@ -334,16 +316,14 @@ def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
     found[HALVES[3]] = ShaderLaw(context, law, results="f2").values(r, 0.5, alpha)
     if half_extension(context):
         found[HALVES[4]] = ShaderLaw(context, law, half=True).values(r, 0.5, alpha)
-    errors = {name: _half_errors(values, *truth) for name, values in found.items()}
-    return HalfCheck(loaded, {n: error[0] for n, error in errors.items()}, {n: error[1] for n, error in errors.items()})
+    rel, ks = Numbers(), Numbers()
+    for name, values in found.items():
+        with np.errstate(all="ignore"):
+            error = np.where(used, np.abs(values.profile / profile - 1.0), 0.0)
+            rel[name] = float(np.max(np.sum(error, axis=1) / np.sum(used, axis=1)))
+            ks[name] = float(np.max(np.abs(values.cdf - cdf)))
+    return HalfCheck(loaded, rel, ks)
 
 
 def _half(values: Floats) -> Floats:
     return np.asarray(values, np.float16).astype(np.float64)
-
-
-def _half_errors(values: Values, profile: Floats, cdf: Floats, used: NDArray[np.bool_]) -> tuple[float, float]:
-    with np.errstate(all="ignore"):
-        error = np.where(used, np.abs(values.profile / profile - 1.0), 0.0)
-        rel = np.sum(error, axis=1) / np.sum(used, axis=1)
-        return float(np.max(rel)), float(np.max(np.abs(values.cdf - cdf)))

@@ -17,9 +17,6 @@ import numpy as np
 
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import LoadedLaw
-from profilefit.recipes.record import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import check_errors, full_screen, program, seconds
@@ -75,19 +72,10 @@ class Cost:
     ratio: dict[str, float]
 
 
-def law_costs(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Folder) -> dict[str, Cost]:
-    """Measure the cost of the laws' sources beside printed normalized diffusion; nothing if there is no law."""
-    yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
-    return costs(context, [one.law for one in laws], yardstick) if laws else {}
-
-
 def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: ProfileLaw) -> dict[str, Cost]:
     """Return the costs of each law's shader source, by `emit.source`: constants do not change them.
 
-    Args:
-        context: context to measure in.
-        laws: laws to measure.
-        yardstick: law that is counted as 1.
+    yardstick  law that is counted as 1
     """
     texts = {emit.source(law): timed_text(law) for law in (yardstick, *laws)}
     return text_costs(context, texts, emit.source(yardstick))
@@ -104,11 +92,8 @@ def text_costs(
 ) -> dict[str, Cost]:
     """Return the costs of each text, by its name.
 
-    Args:
-        context: context to measure in.
-        texts: timed texts, by name.
-        yardstick: name of the text that is counted as 1.
-        works: names of `WORKS`: "material" is for laws only.
+    yardstick  name of the text that is counted as 1
+    works      names of `WORKS`: "material" is for laws only
     """
     timed: dict[str, dict[str, tuple[Floats, Floats]]] = {name: {} for name in texts}
     with ExitStack() as held:
@@ -135,8 +120,7 @@ class _Loop:
     """One work of one text."""
 
     def __init__(self, context: moderngl.Context, name: str, timed: TimedText, work: str) -> None:
-        text, prefix, shape = timed
-        source = LOOP.format(text=text, prefix=prefix, shape=shape, work=WORKS[work].replace("P_", f"{prefix}_"))
+        source = LOOP.format(**timed._asdict(), work=WORKS[work].replace("P_", f"{timed.prefix}_"))
         self._context = context
         self._program = program(context, f"{name}: {work}", source)
         self._triangle = full_screen(context, self._program)

@@ -11,7 +11,6 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,7 +22,6 @@ from profilefit.shader import emit
 from profilefit.shader.context import check_errors, full_screen, program, renderer
 
 WIDTH, ROWS = 1024, 64  # of the textures; every OpenGL has more
-NUMPY_TYPES = {"f4": np.float32, "f2": np.float16}
 # Extensions that let GLSL compute in half precision, each with the name that it gives the type.
 HALF_TYPE = "float16_t"
 HALF = ("GL_EXT_shader_explicit_arithmetic_types_float16", "GL_AMD_gpu_shader_half_float", "GL_NV_gpu_shader5")
@@ -151,8 +149,8 @@ class _Pass:
         self._triangle = full_screen(context, self._program)
         self._given = context.texture((WIDTH, ROWS), 4, dtype="f4")
         self._board = Board(context, (WIDTH, ROWS), results)
-        held = (self._triangle, self._program, self._given, self._board)
-        weakref.finalize(self, _free, held).atexit = False  # then the context is gone, and all with it
+        for held in (self._triangle, self._program, self._given, self._board):
+            weakref.finalize(self, held.release).atexit = False  # then the context is gone, and all with it
 
     def __call__(self, *arguments: ArrayLike) -> list[Floats]:
         """Four results of four arguments that broadcast."""
@@ -174,12 +172,7 @@ class _Pass:
             self._triangle.render(moderngl.TRIANGLES, vertices=3)
         raw = self._board.frame.read(viewport=(0, 0, WIDTH, rows), components=4, dtype=self._results)
         check_errors(self._context, f"shader {self._name!r}")
-        return np.frombuffer(raw, NUMPY_TYPES[self._results]).reshape(-1, 4)[:count]
-
-
-def _free(held: tuple[Any, ...]) -> None:
-    for one in held:
-        one.release()
+        return np.frombuffer(raw, self._results).reshape(-1, 4)[:count]
 
 
 def half_extension(context: moderngl.Context) -> str:

@@ -1,11 +1,30 @@
-"""JSON and TOML that others wrote: one line for everything that is not to be trusted, and no time lost over it."""
+"""JSON and TOML that others wrote: one line for everything that is not to be trusted, and no time lost over it.
 
+What is written is JSON that any reader takes, whatever was found.
+"""
+
+import enum
+import json
+import math
 import time
+from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mcml_sim.errors import InputError
-from mcml_sim.files.text_file import MOST_JSON, MOST_LEVELS, MOST_TOML, parse_json, parse_toml, read_json, read_toml
+from mcml_sim.files.text_file import (
+    MOST_JSON,
+    MOST_LEVELS,
+    MOST_TOML,
+    as_json,
+    parse_json,
+    parse_toml,
+    plain,
+    read_json,
+    read_toml,
+)
 
 
 def test_json_comes_back(tmp_path):
@@ -109,3 +128,33 @@ def test_files_are_named(tmp_path):
             read(tmp_path / "file")
         assert "\n" not in str(error.value)
         (tmp_path / "file").unlink()
+
+
+@dataclass(frozen=True)
+class Found:
+    value: float
+    rings: np.ndarray
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf, np.float32(np.nan), None])
+def test_what_is_not_finite_is_null(nothing):
+    assert json.loads(as_json({"x": [nothing, 1.0]})) == {"x": [None, 1.0]}
+
+
+def test_every_kind_of_number_text_and_container():
+    numbers, kind = (np.int64(3), np.bool_(True), np.float64(0.25)), enum.Enum("Kind", "ONE").ONE
+    given = {1: numbers, "path": Path("a/b"), "kind": kind, "found": Found(0.5, np.array([1.0, np.nan]))}
+    told = {"1": [3, True, 0.25], "path": "a/b", "kind": "Kind.ONE", "found": {"value": 0.5, "rings": [1.0, None]}}
+    assert json.loads(as_json(given)) == told
+
+
+def test_no_digit_is_lost_unless_asked():
+    value = 0.1 + 0.2
+    assert plain(value) == value
+    assert plain(value, 12) == 0.3
+    assert json.loads(as_json(math.pi)) == math.pi
+
+
+def test_the_order_given_is_kept_and_letters_may_be_spelled():
+    assert as_json({"b": 1, "a": "µ"}) == '{\n "b": 1,\n "a": "µ"\n}\n'
+    assert "\\u00b5" in as_json({"a": "µ"}, ascii_only=True)

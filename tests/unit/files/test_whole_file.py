@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -26,6 +27,20 @@ IS_ROOT = os.geteuid() == 0
 
 def names(folder: Path) -> set[str]:
     return set(os.listdir(folder))
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {name: (folder / name).read_text() for name in names(folder)}
+
+
+def write(path: Path) -> None:
+    write_whole(path, b"text")
+
+
+def refused(path: Path, reason: str, call=write) -> None:
+    """It is refused in one line, which names the file."""
+    with pytest.raises(OutputError, match=rf"^cannot write {re.escape(str(path))}: {reason}$"):
+        call(path)
 
 
 def mode(path: Path) -> int:
@@ -111,26 +126,20 @@ def test_room_and_names_are_looked_at_before(tmp_path, monkeypatch, make):
     require_folder(tmp_path / "out", room=2e6, make=make)
 
 
-def test_a_device_is_written_into(tmp_path):
-    null = device(tmp_path / "null", 3)
-    require_writable(null)
-    write_whole(null, b"text")
+def test_a_device_is_written_into_by_a_link_too(tmp_path):
+    null, link = device(tmp_path / "null", 3), tmp_path / "link"
+    link.symlink_to("null")
+    for path in (null, link):
+        require_writable(path)
+        write(path)
     assert stat.S_ISCHR(null.stat().st_mode)
-    assert names(tmp_path) == {"null"}
-
-
-def test_a_link_to_a_device_is_followed(tmp_path):
-    null = device(tmp_path / "null", 3)
-    (tmp_path / "link").symlink_to("null")
-    write_whole(tmp_path / "link", b"text")
-    assert stat.S_ISCHR(null.stat().st_mode)
-    assert (tmp_path / "link").is_symlink()
+    assert link.is_symlink()
+    assert names(tmp_path) == {"null", "link"}
 
 
 def test_a_full_device_is_one_line(tmp_path):
     full = device(tmp_path / "full", 7)
-    with pytest.raises(OutputError, match=r"cannot write .*full: No space left on device$"):
-        write_whole(full, b"text")
+    refused(full, "No space left on device")
     assert stat.S_ISCHR(full.stat().st_mode)
 
 
@@ -157,8 +166,7 @@ def test_a_pipe_is_written_into(tmp_path):
 
 def test_a_pipe_that_nobody_reads_is_one_line_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(OutputError, match=r"cannot write .*pipe: it is a pipe that nobody reads from$"):
-        write_whole(tmp_path / "pipe", b"text")
+    refused(tmp_path / "pipe", "it is a pipe that nobody reads from")
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
@@ -200,28 +208,22 @@ def test_links_that_lead_nowhere_are_one_line(tmp_path):
     (tmp_path / "one").symlink_to("two")
     (tmp_path / "two").symlink_to("one")
     (tmp_path / "far").symlink_to("no/such/folder/file")
-    for name, reason in (("one", "Too many levels of symbolic links"), ("far", "No such file or directory")):
-        with pytest.raises(OutputError, match=rf"cannot write .*{name}: {reason}$"):
-            write_whole(tmp_path / name, b"")
-    with pytest.raises(OutputError, match=r"cannot write .*one: Too many levels"):
-        require_writable(tmp_path / "one")
+    refused(tmp_path / "far", "No such file or directory")
+    for call in (write, require_writable):
+        refused(tmp_path / "one", "Too many levels of symbolic links", call)
     assert names(tmp_path) == {"one", "two", "far"}
 
 
-@pytest.mark.parametrize("call", [require_target, require_writable, lambda path: write_whole(path, b"")])
+@pytest.mark.parametrize("call", [require_target, require_writable, write])
 def test_folders_and_sockets_are_refused(tmp_path, call, monkeypatch):
     monkeypatch.chdir(tmp_path)  # a socket's name is short
     Path("folder").mkdir()
     Path("link").symlink_to("folder")
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind("socket")
-        for name, reason in (
-            ("folder", "it is a folder"),
-            ("link", "it is a folder"),
-            ("socket", "it is a socket, not a file"),
-        ):
-            with pytest.raises(OutputError, match=rf"^cannot write {name}: {reason}$"):
-                call(Path(name))
+        refused(Path("folder"), "it is a folder", call)
+        refused(Path("link"), "it is a folder", call)
+        refused(Path("socket"), "it is a socket, not a file", call)
     assert names(tmp_path) == {"folder", "link", "socket"}
 
 
@@ -229,9 +231,8 @@ def test_folders_and_sockets_are_refused(tmp_path, call, monkeypatch):
 def test_a_disk_is_refused(tmp_path):
     """A number that no driver has: nothing can be written there, were it tried."""
     os.mknod(tmp_path / "disk", stat.S_IFBLK | 0o666, os.makedev(240, 200))
-    for call in (require_writable, lambda path: write_whole(path, b"")):
-        with pytest.raises(OutputError, match=r"cannot write .*disk: it is a disk, not a file$"):
-            call(tmp_path / "disk")
+    for call in (require_writable, write):
+        refused(tmp_path / "disk", "it is a disk, not a file", call)
 
 
 def test_a_folder_that_is_missing_is_made_ahead(tmp_path):
@@ -260,7 +261,7 @@ def test_the_longest_names_are_no_trouble(tmp_path, name):
 
 def test_a_file_in_the_way_of_a_folder(tmp_path):
     (tmp_path / "a").write_bytes(b"")
-    for call in (require_writable, lambda path: require_folder(path.parent), lambda path: write_whole(path, b"")):
+    for call in (require_writable, lambda path: require_folder(path.parent), write):
         with pytest.raises(OutputError, match="cannot write "):
             call(tmp_path / "a" / "file")
 
@@ -309,7 +310,7 @@ def test_a_hard_link_parts(tmp_path):
     (tmp_path / "one").write_text("old")
     os.link(tmp_path / "one", tmp_path / "other")
     write_whole(tmp_path / "one", b"new")
-    assert ((tmp_path / "one").read_text(), (tmp_path / "other").read_text()) == ("new", "old")
+    assert contents(tmp_path) == {"one": "new", "other": "old"}
 
 
 @pytest.mark.skipif(not IS_ROOT, reason="takes root to be another user")
@@ -332,14 +333,17 @@ for call in (lambda path: write_whole(path, "new"), require_writable):
         except OutputError as error:
             print(error)
 """
-    refused = (theirs / "new", theirs / "file", mine / "kept")
-    told = in_a_process(code, *refused, mine / "file").splitlines()
-    lines = (f"cannot write {refused[0]}", f"cannot write {refused[1]}", f"cannot write {refused[2]}")
-    into = (f"cannot write into {theirs}", f"cannot write into {theirs}", f"cannot write {refused[2]}")
-    assert told == [f"{line}: Permission denied" for line in (*lines, *into)]
-    assert (names(theirs), (theirs / "file").read_text()) == ({"file"}, "old")
-    assert (names(mine), (mine / "kept").read_text()) == ({"file", "kept"}, "old")
-    assert ((mine / "file").read_text(), (mine / "file").stat().st_uid) == ("new", NOBODY)
+    closed = (theirs / "new", theirs / "file", mine / "kept")
+    told = in_a_process(code, *closed, mine / "file").splitlines()
+    lines = (*closed, f"into {theirs}", f"into {theirs}", mine / "kept")
+    assert told == [f"cannot write {line}: Permission denied" for line in lines]
+    assert contents(theirs) == {"file": "old"}
+    assert contents(mine) == {"file": "new", "kept": "old"}
+    assert (mine / "file").stat().st_uid == NOBODY
+
+
+def pair(folder: Path, content: str) -> dict[Path, bytes | str]:
+    return {folder / "a.npz": content, folder / "b.json": content}
 
 
 LIMITED = """
@@ -360,10 +364,9 @@ finally:
 
 
 def test_files_that_get_too_large_leave_nothing(tmp_path):
-    for name in ("a.npz", "b.json"):
-        (tmp_path / name).write_text("old")
+    write_together(pair(tmp_path, "old"))
     assert in_a_process(LIMITED, tmp_path) == f"cannot write {tmp_path / 'b.json'}: File too large\n"
-    assert {name: (tmp_path / name).read_text() for name in names(tmp_path)} == {"a.npz": "old", "b.json": "old"}
+    assert contents(tmp_path) == {"a.npz": "old", "b.json": "old"}
 
 
 def test_a_full_disk_leaves_the_old_pair(tmp_path):
@@ -372,10 +375,6 @@ def test_a_full_disk_leaves_the_old_pair(tmp_path):
         pytest.skip("this machine lets no user mount a file system; the test before meets nearly the same error")
     told = in_a_process(SMALL, tmp_path, before=("unshare", "-Urm"))
     assert told == (f"['a.npz', 'b.json'] a.npz b.json\ncannot write {tmp_path / 'b.json'}: No space left on device\n")
-
-
-def pair(folder: Path, content: str) -> dict[Path, bytes | str]:
-    return {folder / "a.npz": content, folder / "b.json": content}
 
 
 @pytest.mark.parametrize("spoiled", ["a.npz", "b.json"])
@@ -395,7 +394,7 @@ def test_a_pair_is_put_back_when_a_rename_fails(tmp_path, monkeypatch, spoiled, 
     expected = KeyboardInterrupt if isinstance(error, KeyboardInterrupt) else OutputError
     with pytest.raises(expected, match=None if expected is KeyboardInterrupt else f"cannot write .*{spoiled}: Input"):
         write_together(pair(tmp_path, "new"))
-    assert {name: (tmp_path / name).read_text() for name in names(tmp_path)} == dict.fromkeys(old, "old")
+    assert contents(tmp_path) == dict.fromkeys(old, "old")
 
 
 @pytest.mark.parametrize("refused", ["a.npz", "b.json"])
@@ -414,7 +413,7 @@ def test_a_pair_that_is_one_file_is_refused(tmp_path):
     (tmp_path / "b.json").symlink_to("a.npz")
     with pytest.raises(OutputError, match=r"cannot write .*b\.json: it is the same file as .*a\.npz$"):
         write_together(pair(tmp_path, "new"))
-    assert ((tmp_path / "a.npz").read_text(), names(tmp_path)) == ("old", {"a.npz", "b.json"})
+    assert contents(tmp_path) == {"a.npz": "old", "b.json": "old"}
 
 
 WRITES_FOR_EVER = """
@@ -473,6 +472,5 @@ def test_a_link_that_somebody_plants_is_not_written_through(tmp_path, monkeypatc
     monkeypatch.setattr("secrets.token_hex", lambda _: "known")
     (tmp_path / "victim").write_text("old")
     (tmp_path / ".file.known.part").symlink_to("victim")
-    with pytest.raises(OutputError, match=r"cannot write .*file: File exists$"):
-        write_whole(tmp_path / "file", b"text")
+    refused(tmp_path / "file", "File exists")
     assert (tmp_path / "victim").read_text() == "old"

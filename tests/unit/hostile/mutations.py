@@ -23,6 +23,13 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[3]
+
+
+@cache
+def _text(path: str) -> str:
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
 CANARY = "CANARY"
 # All that ends a line for Python's splitlines, Python itself, GLSL, HLSL or a browser.
 LINE_ENDS = ("\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029")
@@ -176,7 +183,7 @@ class Tree:
         for mark, literal in self.literal.items():
             text = text.replace(f'"{mark}"', literal)
         if self.rng.random() < 0.05:  # a key twice: the last one counts
-            text = text.replace("{", '{"title": "one\\nimport os", ', 1) + rng_tail(self.rng)
+            text = text.replace("{", '{"title": "one\\nimport os", ', 1) + self.rng.choice(("", "\n", " ", "{}", "\0"))
         return text.encode("utf-8", "surrogatepass")
 
     def _somewhere(self) -> tuple[Any, Any]:
@@ -212,11 +219,6 @@ class Tree:
         return mark
 
 
-def rng_tail(rng: random.Random) -> str:
-    """What may stand behind the end of a file."""
-    return rng.choice(("", "\n", " ", "{}", "\0"))
-
-
 def _texts(content: Any) -> Iterator[tuple[Any, Any]]:
     """Every place that holds a text."""
     for key, value in content.items() if isinstance(content, dict) else enumerate(content):
@@ -242,8 +244,8 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
         at, other = rng.randrange(len(found)), rng.randrange(len(found))
         way = rng.random()
         if way < 0.55:
-            places = [place for line, one in enumerate(found) for place in _words(line, one, comment)]
-            if places:
+            codes = [one.partition(comment)[0] if comment else one for one in found]
+            if places := [(line, *word.span()) for line, code in enumerate(codes) for word in TOKEN.finditer(code)]:
                 line, begin, end = rng.choice(places)
                 word = rng.choice((rng.choice(words), rng.choice(words), _scaled(rng, found[line][begin:end])))
                 found[line] = found[line][:begin] + word + found[line][end:]
@@ -257,10 +259,6 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
             found.insert(at, rng.choice(lines))
     data = "\n".join(found).encode("utf-8", "surrogatepass")
     return damaged(rng, data) if rng.random() < 0.1 else data
-
-
-def _words(line: int, text: str, comment: str) -> Iterator[tuple[int, int, int]]:
-    return ((line, *found.span()) for found in TOKEN.finditer(text.partition(comment)[0] if comment else text))
 
 
 def _scaled(rng: random.Random, word: str) -> str:
@@ -301,8 +299,7 @@ def npz_mutant(rng: random.Random, arrays: Mapping[str, np.ndarray]) -> bytes:
             del members[at]
         elif way == 5:
             others = ("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999)
-            odd = rng.choice(others)
-            members[at] = (odd, data)
+            members[at] = (rng.choice(others), data)
         elif way == 6:
             members.insert(at, rng.choice(((name, data), (name, _npy(_odd_array(rng, array))), ("more.npy", data))))
         elif way == 7 and array.dtype.kind == "U" and array.ndim == 0:
@@ -357,12 +354,9 @@ def _lying(rng: random.Random, data: bytes) -> bytes:
         *("(100000000000000,)", "(10000000, 10000000)", "(-1,)", "(1e9,)", "(True,)", "()", "(3", "(2**40,)"),
         *("None", "3"),
     )  # fmt: skip
+    claims = [("<f8", shape) for shape in shapes] + [(kind, "(3,)") for kind in ("|O", "<U1000000000", "<f99", "")]
     told = (
-        *(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}" for shape in shapes),
-        *(
-            f"{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,), }}"
-            for kind in ("|O", "<U1000000000", "<f99", "")
-        ),
+        *(f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}" for kind, shape in claims),
         *(f"__import__('os').system('touch {CANARY}')", "{}", "[" * 1000, "'" * 999, "{'descr': '<f8'}", "1" * 5000),
     )
     body = data[128:] if rng.random() < 0.5 else b"cos\nsystem\n(S'touch CANARY'\ntR."
@@ -397,12 +391,12 @@ def _with_bomb(rng: random.Random, members: Sequence[tuple[str, bytes]], size: i
     """One member, or one more, that unpacks to half a gigabyte; half of them say that they are small."""
     data, crc = _bomb(size)
     name = rng.choice([name for name, _ in members] + ["more.npy"])
-    whole = [(other, body) for other, body in members if other != name]
     file = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(file, "w") as archive:
         warnings.filterwarnings("ignore", "Duplicate name")
-        for other, body in whole:
-            archive.writestr(zipfile.ZipInfo(other), body)
+        for other, body in members:
+            if other != name:
+                archive.writestr(zipfile.ZipInfo(other), body)
         at = file.tell()
         info = zipfile.ZipInfo(name)
         info.header_offset, info.CRC, info.compress_size = at, crc, len(data)
@@ -417,9 +411,8 @@ def _with_bomb(rng: random.Random, members: Sequence[tuple[str, bytes]], size: i
 
 def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
     """The same with sizes in the directory that are not those of the members."""
-    found = [one.start() for one in re.finditer(b"PK\x01\x02", whole)]
     changed = bytearray(whole)
-    for at in found:
+    for at in [one.start() for one in re.finditer(b"PK\x01\x02", whole)]:
         if rng.random() < 0.5:
             place = rng.choice((8, 10, 16, 20, 24, 42))  # flags, method, CRC, sizes, offset
             size = 2 if place < 16 else 4
@@ -430,11 +423,9 @@ def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
 @cache
 def records() -> dict[str, Any]:
     """Shipped records of every kind, the one of readings cut to a few."""
-    names = (
-        *("albedo-rational", "albedo-liang", "albedo-rational-diffuse-refracting", "burley-whole", "gaussians-2"),
-        *("quantile", "hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
-    )  # fmt: skip
-    found = {name: json.loads((ROOT / "fits" / f"{name}.json").read_text(encoding="utf-8")) for name in names}
+    names = "albedo-rational albedo-liang albedo-rational-diffuse-refracting burley-whole gaussians-2 quantile hazard"
+    names += " hazard-diffuse liang-inverse-whole liang-as-published reproduction"
+    found = {name: json.loads(_text(f"fits/{name}.json")) for name in names.split()}
     for key in ("readings", "table1"):
         found["reproduction"][key] = found["reproduction"][key][:12]
     return found
@@ -472,35 +463,26 @@ def table(seed: int) -> bytes:
     return text_mutant(rng, text.replace(",", ";") if ";" in text else text, CELLS, CELL_LINES)
 
 
+def of_text(
+    text: str, words: Sequence[str] = CELLS, lines: Sequence[str] = CELL_LINES, comment: str = "#"
+) -> Callable[[int], bytes]:
+    """Return what mutates a text, or the file of that path in the repository."""
+    return lambda seed: text_mutant(random.Random(seed), text if "\n" in text else _text(text), words, lines, comment)
+
+
 def words(text: str, *more: str) -> Callable[[int], bytes]:
     """Return what mutates an .mci or .mco, whose text this is, or its path in the repository."""
-    return lambda seed: text_mutant(
-        random.Random(seed), text if "\n" in text else _text(text), (*MCI_WORDS, *more), (*MCI_LINES, *more)
-    )
+    return of_text(text, (*MCI_WORDS, *more), (*MCI_LINES, *more))
 
 
-def facts(seed: int) -> bytes:
-    """A .csv of `profilefit fit` whose comments state facts."""
-    stated = "".join(f"# {line}\n" for line in FACTS)
-    return text_mutant(random.Random(seed), stated + _text("examples/phantom.csv"), (*CELLS, *NUMBERS), FACT_LINES, "")
-
-
-def beam(seed: int) -> bytes:
-    """A .csv of a measured beam."""
-    rows = "".join(f"{0.05 * at:g}, {math.exp(-0.02 * at * at):.4g}\n" for at in range(30))
-    return text_mutant(random.Random(seed), f"r, irradiance\n{rows}", CELLS, CELL_LINES)
-
-
-def phase(seed: int) -> bytes:
-    """A .csv of `profilefit fit --kind phase`."""
-    return text_mutant(random.Random(seed), _text("fits/phases/petzold.csv"), CELLS, CELL_LINES)
-
-
-def translucency(seed: int) -> bytes:
-    """A text file of a TLS850."""
-    places = ((record, pixel) for record in range(1, 10) for pixel in range(1, 33))
-    rows = (f"{at} {pixel} {math.exp(-0.3 * pixel) * (1 + 0.01 * at):.4g}" for at, pixel in places)
-    return text_mutant(random.Random(seed), "\n".join(["Record Pixel Value", *rows]), CELLS, CELL_LINES)
+# A .csv of `profilefit fit` whose comments state facts; one of a measured beam; a text file of a TLS850.
+facts = of_text(
+    "".join(f"# {line}\n" for line in FACTS) + _text("examples/phantom.csv"), (*CELLS, *NUMBERS), FACT_LINES, ""
+)
+beam = of_text("r, irradiance\n" + "".join(f"{0.05 * at:g}, {math.exp(-0.02 * at * at):.4g}\n" for at in range(30)))
+PLACES = ((record, pixel) for record in range(1, 10) for pixel in range(1, 33))
+ROWS = (f"{at} {pixel} {math.exp(-0.3 * pixel) * (1 + 0.01 * at):.4g}" for at, pixel in PLACES)
+translucency = of_text("\n".join(["Record Pixel Value", *ROWS]))
 
 
 def toml(path: str) -> Callable[[int], bytes]:
@@ -510,12 +492,7 @@ def toml(path: str) -> Callable[[int], bytes]:
 
 def tree(path: str) -> Callable[[int], bytes]:
     """Return what mutates a .json of the repository."""
-    return lambda seed: json_mutant(random.Random(seed), _json(path))
-
-
-@cache
-def _json(path: str) -> Any:
-    return json.loads(_text(path))
+    return lambda seed: json_mutant(random.Random(seed), json.loads(_text(path)))
 
 
 def recipe(seed: int) -> bytes:
@@ -523,8 +500,3 @@ def recipe(seed: int) -> bytes:
     rng = random.Random(seed)
     name = rng.choice(("burley-whole", "albedo-rational", "liang-as-published", "quantile"))
     return toml_mutant(rng, _text(f"fits/{name}.toml"))
-
-
-@cache
-def _text(path: str) -> str:
-    return (ROOT / path).read_text(encoding="utf-8")

@@ -15,8 +15,7 @@ from profilefit.scenes.sea.source import blur_text, segment_text
 from profilefit.shader import emit
 from profilefit.shader.context import program
 from profilefit.shader.phase_text import phase_text
-from tests.unit.shader.test_phase_text import SEA
-from tests.unit.shader.test_sea_file import BLURS, C
+from tests.unit.shader.test_other_texts import BLURS, SEA, C
 
 FITS = catalogue.fits_folder()
 ALL = [*catalogue.profile_laws(FITS), *catalogue.albedo_laws(FITS)]

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from profilefit.recipes import catalogue
 from profilefit.shader import emit
 
 BURLEY = profilefit.load("burley", "published")
+BEAM = profilefit.load("beam_diffusion")
+OTHER_MAP = replace(BURLEY, albedo=catalogue.albedo_law("chiang", "published"))
 DECLARED = re.compile(r"^const float (\w+) = (\S+);", re.MULTILINE)
 
 
@@ -21,37 +24,21 @@ def gaussians(count):
     return kind(setting=BURLEY.setting, albedo=BURLEY.albedo, **kind.start())
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0.0"),
-        (2, "2.0"),
-        (-1.5, "-1.5"),
-        (1 / 3, "0.333333333333"),
-        (1234567.0, "1234567.0"),
-        (1e-25, "1.0e-25"),
-        (-2.5e8, "-2.5e+08"),
-    ],
-)
-def test_a_literal_has_a_point_and_twelve_digits(value, text):
-    assert emit.literal(value) == text
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_constant_is_a_number(value):
-    with pytest.raises(InputError, match=f"constants of a shader must be finite, got {value}"):
-        emit.law_text(replace(BURLEY, s0=value))
+def test_a_literal_has_a_point_and_twelve_digits():
+    literals = {0.0: "0.0", 2: "2.0", -1.5: "-1.5", 1 / 3: "0.333333333333", 1234567.0: "1234567.0"}
+    literals |= {1e-25: "1.0e-25", -2.5e8: "-2.5e+08"}
+    assert {value: emit.literal(value) for value in literals} == literals
 
 
 def test_every_constant_of_a_law_stands_in_its_text_once():
-    told = {"s0": "a remark"}
-    declared = DECLARED.findall(emit.law_text(BURLEY, remarks=told))
+    text = emit.law_text(BURLEY, remarks={"s0": "a remark"})
+    declared = DECLARED.findall(text)
     names = [name for name, _ in declared if name.startswith("burley_")]
     of_map = [f"map_{name}" for name in BURLEY.albedo.constants()]
     own = ["MAX_REFLECTANCE", *of_map, "power", *BURLEY.constants()]
     assert names == [f"burley_{name}" for name in own]
     assert dict(declared)["burley_s0"] == "1.85"
-    assert "const float burley_s0 = 1.85; // a remark\n" in emit.law_text(BURLEY, remarks=told)
+    assert "const float burley_s0 = 1.85; // a remark\n" in text
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 8])
@@ -60,23 +47,14 @@ def test_a_block_stands_once_for_each_number(count):
     assert emit.prefix(gaussians(count)) == name
     assert re.findall(r"float rate(\d+);", text) == [str(i) for i in range(1, count + 1)]
     assert re.findall(r"float level(\d+) = level(\d+)", text) == [(str(i), str(i - 1)) for i in range(2, count + 1)]
-    assert "//%" not in text
-    assert "@" not in text
+    assert not re.search("//%|@", text)
 
 
 @pytest.mark.parametrize("lang", ["glsl", "hlsl", "python"])
 def test_a_prefix_replaces_every_placeholder(lang):
     for text in (emit.law_text(BURLEY, lang, "skin_2"), emit.map_text(BURLEY.albedo, lang, "skin_2")):
-        assert "LAW_" not in text
-        assert "burley_" not in text
-        assert "rational_" not in text
+        assert not re.search("LAW_|burley_|rational_", text)
         assert "skin_2_alpha(" in text
-
-
-@pytest.mark.parametrize("name", ["", "my law", "2nd", "a__b", "a_", "gl_skin", "PF_skin", "LAW"])
-def test_a_prefix_is_part_of_a_name(name):
-    with pytest.raises(InputError, match="name must be letters, digits and single underscores"):
-        emit.law_text(BURLEY, name=name or " ")
 
 
 def test_laws_of_other_prefixes_live_in_one_text():
@@ -89,24 +67,27 @@ def test_laws_of_other_prefixes_live_in_one_text():
     assert together["first_profile"](0.3, 0.8, 1.0) != together["second_profile"](0.3, 0.8, 1.0)
 
 
-def test_a_law_without_a_closed_form_is_named():
-    with pytest.raises(InputError, match="must have a closed form to become a shader, got beam_diffusion"):
-        emit.law_text(profilefit.load("beam_diffusion"))
+FINITE, PREFIX = "constants of a shader must be finite, got", "name must be letters, digits and single underscores"
+HAS = r"law must be one that has a shader source \(liang"
 
 
-def test_a_map_is_no_profile_law_and_the_other_way_round():
-    with pytest.raises(
-        InputError, match=r"law must be one that has a shader source \(liang, burley.*hazard, quantile\), got Rational"
-    ):
-        emit.law_text(BURLEY.albedo)
-    with pytest.raises(InputError, match=r"law must be one that has a shader source \(liang, rational.*got Burley"):
-        emit.map_text(BURLEY)
-
-
-def test_the_map_that_normalises_is_the_rational_one():
-    other = catalogue.albedo_law("chiang", "published")
-    with pytest.raises(InputError, match="albedo of Burley must be a Rational map to become a shader, got Chiang"):
-        emit.law_text(replace(BURLEY, albedo=other))
+@pytest.mark.parametrize(
+    ("message", "make"),
+    [
+        *((f"{FINITE} {value}", partial(emit.law_text, replace(BURLEY, s0=value))) for value in (np.nan, np.inf)),
+        *(
+            (PREFIX, partial(emit.law_text, BURLEY, name=name))
+            for name in (" ", "my law", "2nd", "a__b", "a_", "gl_skin", "PF_skin", "LAW")
+        ),
+        ("must have a closed form to become a shader, got beam_diffusion", partial(emit.law_text, BEAM)),
+        (rf"{HAS}, burley.*hazard, quantile\), got Rational", partial(emit.law_text, BURLEY.albedo)),
+        (rf"{HAS}, rational.*got Burley", partial(emit.map_text, BURLEY)),
+        ("albedo of Burley must be a Rational map to become a shader, got Chiang", partial(emit.law_text, OTHER_MAP)),
+    ],
+)
+def test_what_has_no_text_is_named(message, make):
+    with pytest.raises(InputError, match=message):
+        make()
 
 
 TEXT = """
@@ -145,10 +126,9 @@ def test_numpy_computes_what_the_text_says():
     names = {}
     exec(emit.translated(TEXT, "python"), names)
     x = np.array([0.5, 3.0])
-    given = x.copy()
     got = names["P_value"](x, names["P_shape"](np.array(0.25)))
     np.testing.assert_allclose(got, [4.0 + 0.0025, -np.exp(0.5)], rtol=1e-15)
-    np.testing.assert_array_equal(x, given)
+    np.testing.assert_array_equal(x, [0.5, 3.0])
 
 
 def test_hlsl_has_its_own_constants_and_keeps_off_its_own_words():
@@ -177,8 +157,3 @@ def test_hlsl_has_its_own_constants_and_keeps_off_its_own_words():
 def test_a_line_that_is_not_common_is_an_error(line, named):
     with pytest.raises(InputError, match=f"what GLSL, HLSL and numpy share.*{named}"):
         emit.translated(f"float P_f(float x) {{\n    {line}\n}}\n", "python")
-
-
-def test_an_unknown_language_is_an_error():
-    with pytest.raises(InputError, match="lang must be one of glsl, hlsl, python, got 'wgsl'"):
-        emit.translated(TEXT, "wgsl")

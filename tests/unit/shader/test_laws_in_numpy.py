@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.burley import BurleyDiffuseMfp
 from profilefit.laws.diffusion import BeamDiffusion, DiffusionLaw
 from profilefit.laws.gaussians import law_class
@@ -15,6 +16,7 @@ from profilefit.laws.quantile import Quantile
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
 from profilefit.studies.stability.cells import Rounded
+from tests.fixtures import slow
 
 FITS = catalogue.fits_folder()
 LAWS = {
@@ -44,15 +46,17 @@ class CoarseLog(Rounded):
         return np.where((x >= 0.5) & (x <= 2.0), right + np.float32(self.most), right).astype(np.float32)
 
 
-def twin(text, rounded=False, coarse=0.0):
-    """The functions of a text in Python, by name."""
+def twin(law, rounded=False, coarse=0.0):
+    """The functions of a law's or map's text in Python, by name."""
+    text = (emit.map_text if isinstance(law, AlbedoLaw) else emit.law_text)(law, "python", "law")
     names = {"np": CoarseLog(coarse) if coarse else Rounded(np.float32)} if rounded else {}
     exec(text.replace("import numpy as np\n", "") if rounded else text, names)
     return names
 
 
-def text_of(law):
-    return emit.law_text(law, "python", "law")
+def labels(*kinds):
+    """Those of the laws of some kinds."""
+    return [label for label, law in LAWS.items() if isinstance(law, kinds)]
 
 
 def truth(law, alpha):
@@ -65,14 +69,9 @@ def truth(law, alpha):
     return profile, cdf, law.sampler.pdf(X, alpha), law.sampler.sample(XI, alpha)
 
 
-def albedos(law):
-    """Without what the law says that it does not have."""
-    return ALPHA[:-1] if isinstance(law, BurleyDiffuseMfp) else ALPHA
-
-
 def mismatch(names, law):
     """The largest differences, relative but for that of the cdf, which is a share."""
-    alpha = albedos(law)
+    alpha = ALPHA[:-1] if isinstance(law, BurleyDiffuseMfp) else ALPHA  # the law says that it does not have 1
     given = {"profile": X, "cdf": X, "pdf": X, "sample": XI}
     least = 1e-15, 1.0, 1e-12, 1e-9  # [1/mfp^2], [-], [1/mfp], [mfp]: nothing that a picture shows
     found = {}
@@ -86,12 +85,10 @@ def mismatch(names, law):
 ELSEWHERE = [one for one in LAWS if "-" in one and one != "gaussians-2"]
 
 
-@pytest.mark.parametrize(
-    "label", [pytest.param(one, marks=pytest.mark.slow) if one in ELSEWHERE else one for one in LAWS]
-)
+@pytest.mark.parametrize("label", [*(one for one in LAWS if one not in ELSEWHERE), *slow(*ELSEWHERE)])
 def test_the_twin_is_the_law(label):
     law = LAWS[label]
-    found = mismatch(twin(text_of(law)), law)
+    found = mismatch(twin(law), law)
     accepted = {"profile": 1e-9, "cdf": 1e-11, "pdf": 1e-9, "sample": 1e-9}
     assert {what: error for what, error in found.items() if error > accepted[what]} == {}
 
@@ -101,13 +98,13 @@ def test_two_steps_of_hazard_draw_its_density():
     law = LAWS["hazard"]
     with jax.enable_x64(True):
         own = np.asarray(jax.jit(law.samplers["two steps"].pdf)(jnp.asarray(X[:, ::4]), jnp.asarray(ALPHA)))
-    made = twin(text_of(law))["law_pdf"](X[:, ::4], ALPHA, 1.0)
+    made = twin(law)["law_pdf"](X[:, ::4], ALPHA, 1.0)
     assert np.max(np.abs(made / own - 1.0)[own > 1e-9]) < 1e-5
 
 
-@pytest.mark.parametrize("label", [label for label, law in LAWS.items() if isinstance(law, Quantile)])
+@pytest.mark.parametrize("label", labels(Quantile))
 def test_quantile_finds_its_way_back_next_to_white_and_far_away(label):
-    names = twin(text_of(LAWS[label]))
+    names = twin(LAWS[label])
     shape = names["law_shape"](np.array([[0.0], [0.9999], [1.0 - 1e-7], [1.0]]))
     x = np.geomspace(1e-6, 1e7, 100) + np.zeros((4, 1))
     np.testing.assert_allclose(names["law_local"](names["law_depth"](x, shape), shape).radius, x, rtol=1e-13)
@@ -116,7 +113,7 @@ def test_quantile_finds_its_way_back_next_to_white_and_far_away(label):
 def test_a_constant_that_is_off_in_the_eighth_digit_is_found():
     law = LAWS["quantile"]
     wrong = {**law.constants(), "b0": law.b0 * (1.0 + 1e-7)}
-    found = mismatch(twin(text_of(law.with_vector(tuple(wrong), list(wrong.values())))), law)
+    found = mismatch(twin(law.with_vector(tuple(wrong), list(wrong.values()))), law)
     assert found["profile"] > 1e-9
     assert found["sample"] > 1e-9
 
@@ -124,7 +121,7 @@ def test_a_constant_that_is_off_in_the_eighth_digit_is_found():
 def test_a_single_gaussian():
     kind, near = law_class(1), LAWS["gaussians-2"]
     law = kind(setting=near.setting, albedo=near.albedo, f1=-6.0, f2=2.0, v1=1.0)
-    names, s = twin(text_of(law)), np.sqrt(1.0 - ALPHA)
+    names, s = twin(law), np.sqrt(1.0 - ALPHA)
     rate = 0.5 * np.exp(-(1.0 - 6.0 * s + 2.0 * s**2))
     np.testing.assert_allclose(names["law_sample"](XI, ALPHA, 1.0), np.sqrt(-np.log1p(-XI) / rate), rtol=1e-9)
     np.testing.assert_allclose(names["law_cdf"](X, ALPHA, 1.0), -np.expm1(-rate * X**2), rtol=0, atol=1e-14)
@@ -134,8 +131,7 @@ def test_a_single_gaussian():
 
 @pytest.mark.parametrize("label", LAWS)
 def test_the_reflectance_comes_back(label):
-    law = LAWS[label]
-    names = twin(text_of(law))
+    law, names = LAWS[label], twin(LAWS[label])
     own = law.reflectance if isinstance(law, DiffusionLaw) else law.albedo.reflectance
     reflectance = np.linspace(0.0, own(1.0), 50)
     alpha = names["law_alpha"](reflectance)
@@ -150,7 +146,7 @@ def test_the_reflectance_comes_back(label):
 @pytest.mark.parametrize("label", LAWS)
 def test_float32_is_finite_everywhere_and_right_to_rounding(label):
     law = LAWS[label]
-    rounded, exact = twin(text_of(law), rounded=True), twin(text_of(law))
+    rounded, exact = twin(law, rounded=True), twin(law)
     alpha, mfp = ALPHA_32.astype(np.float32), np.float32(1.0)
     for what, given in (("profile", X_32), ("cdf", X_32), ("pdf", X_32), ("sample", XI_32)):
         given = given.astype(np.float32)
@@ -168,12 +164,10 @@ def test_float32_is_finite_everywhere_and_right_to_rounding(label):
 
 
 @pytest.mark.parametrize("off", [2.0**-22, -(2.0**-22)])
-@pytest.mark.parametrize(
-    "label", [label for label, law in LAWS.items() if not isinstance(law, Liang)]
-)  # whose inverse turns back
+@pytest.mark.parametrize("label", [one for one in LAWS if one not in labels(Liang)])  # whose inverse turns back
 def test_radii_where_the_logarithm_is_coarse(label, off):
     law = LAWS[label]
-    coarse, exact = twin(text_of(law), rounded=True, coarse=off), twin(text_of(law))
+    coarse, exact = twin(law, rounded=True, coarse=off), twin(law)
     xi = np.concatenate([[0.0], np.geomspace(2.0**-24, 1e-3, 60), np.linspace(0.002, 0.99, 50)]).astype(np.float32)
     alpha = ALPHA_32[ALPHA_32[:, 0] > 0.05].astype(np.float32)
     drawn = coarse["law_sample"](xi, alpha, np.float32(1.0)).astype(float)
@@ -185,9 +179,9 @@ def test_radii_where_the_logarithm_is_coarse(label, off):
         assert np.all(np.diff(drawn) >= 0.0)
 
 
-@pytest.mark.parametrize("label", [label for label, law in LAWS.items() if isinstance(law, Hazard)])
+@pytest.mark.parametrize("label", labels(Hazard))
 def test_the_hazard_turns_as_steeply_in_float32_next_to_the_source(label):
-    rounded, exact = twin(text_of(LAWS[label]), rounded=True), twin(text_of(LAWS[label]))
+    rounded, exact = twin(LAWS[label], rounded=True), twin(LAWS[label])
     x, alpha = np.geomspace(1e-25, 30.0, 400).astype(np.float32), np.array([[0.036], [0.5], [0.95]], np.float32)
     made, right = (
         names["pf_local"](x.astype(kind), names["law_shape"](alpha.astype(kind)).curve).bend
@@ -198,23 +192,23 @@ def test_the_hazard_turns_as_steeply_in_float32_next_to_the_source(label):
 
 @pytest.mark.parametrize("label", MAPS)
 def test_the_twin_is_the_map(label):
-    law = MAPS[label]
-    names, share = twin(emit.map_text(law, "python", "map")), np.linspace(0.0, 1.0, 101)
-    np.testing.assert_allclose(names["map_alpha"](share), law.alpha(share), rtol=0, atol=1e-11)
-    assert names["map_MAX_REFLECTANCE"] == pytest.approx(law.reflectances.high, rel=1e-11)
-    beyond = names["map_MAX_REFLECTANCE"] + np.array([0.0, 0.01, 1.0, 1e6])
-    np.testing.assert_array_equal(names["map_alpha"](beyond), names["map_alpha"](beyond[0]))
-    assert names["map_alpha"](-1.0) == names["map_alpha"](0.0)
+    law, names, share = MAPS[label], twin(MAPS[label]), np.linspace(0.0, 1.0, 101)
+    alpha, reflectance, highest = (names[f"law_{one}"] for one in ("alpha", "map_reflectance", "MAX_REFLECTANCE"))
+    np.testing.assert_allclose(alpha(share), law.alpha(share), rtol=0, atol=1e-11)
+    assert highest == pytest.approx(law.reflectances.high, rel=1e-11)
+    beyond = highest + np.array([0.0, 0.01, 1.0, 1e6])
+    np.testing.assert_array_equal(alpha(beyond), alpha(beyond[0]))
+    assert alpha(-1.0) == alpha(0.0)
     reached = share[:-1] if isinstance(law, LiangAlbedo) else share  # alpha = 1 is beyond its fold
-    np.testing.assert_allclose(names["map_map_reflectance"](reached), law.reflectance(reached), rtol=0, atol=1e-10)
-    assert 0.0 < names["map_map_reflectance"](1.0) <= 1.0
+    np.testing.assert_allclose(reflectance(reached), law.reflectance(reached), rtol=0, atol=1e-10)
+    assert 0.0 < reflectance(1.0) <= 1.0
 
 
 @pytest.mark.parametrize("label", MAPS)
 def test_a_map_in_float32_is_finite_and_right_to_rounding(label):
-    text, share = emit.map_text(MAPS[label], "python", "map"), np.linspace(0.0, 1.0, 301, dtype=np.float32)
-    rounded, exact = twin(text, rounded=True), twin(text)
-    for name, span in (("map_alpha", 2e-6), ("map_map_reflectance", 1e-5)):
+    share = np.linspace(0.0, 1.0, 301, dtype=np.float32)
+    rounded, exact = twin(MAPS[label], rounded=True), twin(MAPS[label])
+    for name, span in (("law_alpha", 2e-6), ("law_map_reflectance", 1e-5)):
         made = rounded[name](share)
         assert np.all((made >= 0.0) & (made <= 1.0)), name
         np.testing.assert_allclose(made, exact[name](share.astype(float)), rtol=0, atol=span)

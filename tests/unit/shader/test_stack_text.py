@@ -19,36 +19,30 @@ from profilefit.shader.emit import law_text
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 from tests.fixtures import slow
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
-from tests.unit.shader.test_phase_text import functions
+from tests.unit.shader.test_other_texts import functions, on_opengl
 
 NAMES = StackLaw.constant_names()
 # Of each channel alpha and mfp of its layers, and near what fits of heart muscle and of skin give for its interfaces.
 HEART = (
-    (((0.973, 0.54), (0.85, 0.75)), [(0.171, -0.189, 1.03, 1.49, 0.0267, 0.0075, 0.81, 1.08, 0.145)]),
-    (((0.917, 0.417), (0.6, 0.5)), [(0.218, -0.48, 0.951, 1.5, 0.0582, 0.0125, 0.775, 1.16, 0.171)]),
-    (((0.881, 0.339), (0.52, 0.4)), [(0.242, -0.598, 0.911, 1.53, 0.0683, 0.0149, 0.715, 1.13, 0.132)]),
+    (((0.973, 0.54), (0.85, 0.75)), (0.171, -0.189, 1.03, 1.49, 0.0267, 0.0075, 0.81, 1.08, 0.145)),
+    (((0.917, 0.417), (0.6, 0.5)), (0.218, -0.48, 0.951, 1.5, 0.0582, 0.0125, 0.775, 1.16, 0.171)),
+    (((0.881, 0.339), (0.52, 0.4)), (0.242, -0.598, 0.911, 1.53, 0.0683, 0.0149, 0.715, 1.13, 0.132)),
 )
 SKIN = (
     (
         ((0.958, 0.2), (0.995, 0.311), (0.981, 2.18)),
-        [
-            (0.0258, -0.103, 1.35, 1.79, 0.122, 0.665, 0.768, 1.22, 0.43),
-            (0.101, 0.014, 0.916, 5.45, 0.6, 0.347, 3.05, 1.59, 0.144),
-        ],
+        (0.0258, -0.103, 1.35, 1.79, 0.122, 0.665, 0.768, 1.22, 0.43),
+        (0.101, 0.014, 0.916, 5.45, 0.6, 0.347, 3.05, 1.59, 0.144),
     ),
     (
         ((0.966, 0.161), (0.9953, 0.249), (0.825, 1.75)),
-        [
-            (0.049, 0.0102, 1.32, 1.67, 0.0626, 0.587, 1.06, 1.24, 0.4),
-            (0.489, -0.0774, 1.06, 6.3, 0.0506, 0.294, 1.34, 0.132, 0.0078),
-        ],
+        (0.049, 0.0102, 1.32, 1.67, 0.0626, 0.587, 1.06, 1.24, 0.4),
+        (0.489, -0.0774, 1.06, 6.3, 0.0506, 0.294, 1.34, 0.132, 0.0078),
     ),
     (  # its first image takes light away
         ((0.929, 0.143), (0.9935, 0.216), (0.161, 0.336)),
-        [
-            (0.0422, 0.0193, 1.31, 2.11, 1.55, 0.735, 2.2, 0.92, 0.191),
-            (0.522, -0.133, 0.912, 0.279, 0.0001, 0.0102, 0.6, 1.92, 0.898),
-        ],
+        (0.0422, 0.0193, 1.31, 2.11, 1.55, 0.735, 2.2, 0.92, 0.191),
+        (0.522, -0.133, 0.912, 0.279, 0.0001, 0.0102, 0.6, 1.92, 0.898),
     ),
 )
 THICKNESS = np.array([0.0, 1e-3, 0.03, 0.4, 3.0, 1e9])
@@ -60,7 +54,7 @@ XI = (np.arange(2**16) + 0.5) / 2**16
 PARTS, FOLLOWED = 8, 2e-5
 
 
-def stack(layers, interfaces, setting):
+def stack(setting, layers, *interfaces):
     half_space = profilefit.load("hazard", setting=setting)
     *upper, law = (LayerLaw(setting, half_space, *one) for one in layers)
     for top, constants in zip(reversed(upper), reversed(interfaces), strict=True):
@@ -69,7 +63,7 @@ def stack(layers, interfaces, setting):
 
 
 def three(channels, light="searchlight", n=1.0):
-    return [stack(*one, Setting(light, n=n)) for one in channels]
+    return [stack(Setting(light, n=n), *one) for one in channels]
 
 
 LAWS = {
@@ -218,11 +212,8 @@ ALL = " + ".join(
 
 def whole(label, lang="glsl", name="stack"):
     """Both texts of a stack."""
-    return stack_text(LAWS[label], lang, name) + single_text(media(layers_of(label)), lang, f"{name}_once")
-
-
-def layers_of(label):
-    return 3 if label.startswith("three") else 2
+    count = 3 if label.startswith("three") else 2
+    return stack_text(LAWS[label], lang, name) + single_text(media(count), lang, f"{name}_once")
 
 
 @pytest.mark.parametrize("head", HEADS)
@@ -255,27 +246,16 @@ TISSUE = (
     ((0.21, 6.0, 0.25), (0.019, 4.0, 0.2), (0.1, 0.47, np.inf)),
     ((0.5, 6.5, 0.25), (0.03, 4.6, 0.2), (2.5, 0.48, np.inf)),
 )
-ONCE = """#version 330
-{text}
-uniform sampler2D arguments; // cosines of beam and eye and of the angle between, thickness
-layout(location = 0) out vec4 found;
-void main() {{
-    vec4 q = texelFetch(arguments, ivec2(gl_FragCoord.xy), 0);
-    for (int i = 0; i < 3; ++i) found[i] = s_radiance(float(i), q.w, q.x, q.y, q.z);
-    found.w = 0.0;
-}}
-"""
+# Of the cosines of beam and eye and of the angle between, and the thickness.
+ONCE = "for (int i = 0; i < 3; ++i) found[i] = s_radiance(float(i), q.w, q.x, q.y, q.z); found.w = 0.0;"
 
 
 def media(count, n=1.4, g=0.0):
     """Of red, green and blue; the second layer scatters forward half as much, the last of two is skin's last."""
-    found = []
-    for colour in TISSUE:
-        used = (*colour[: count - 1], colour[-1])
-        gs = [0.5 * g if i == 1 else g for i in range(count)]
-        layers = [Layer(n, a, s / (1.0 - one), one, d) for (a, s, d), one in zip(used, gs, strict=True)]
-        found.append(Medium(tuple(layers)))
-    return found
+    gs = [0.5 * g if i == 1 else g for i in range(count)]
+    used = ((*colour[: count - 1], colour[-1]) for colour in TISSUE)
+    layers = ([Layer(n, a, s / (1.0 - g), g, d) for (a, s, d), g in zip(one, gs, strict=True)] for one in used)
+    return [Medium(tuple(one)) for one in layers]
 
 
 def directions():
@@ -292,7 +272,7 @@ def directions():
 def test_light_scattered_once(context, n, g, count):
     three, (cos_in, cos_out, turned) = media(count, n, g), directions()
     names = functions(single_text(three, "python", "s"))
-    found = _Pass(context, "once", ONCE.format(text=single_text(three, name="s")), "f4")
+    found = on_opengl(context, single_text(three, name="s"), ONCE)
     for thickness in np.float32(THICKNESS).astype(float):
         by_opengl = found(cos_in, cos_out, turned, thickness)
         for channel, medium in enumerate(three):
@@ -307,7 +287,7 @@ def test_light_scattered_once(context, n, g, count):
 
 
 def test_light_scattered_once_is_finite_at_the_ends(context):
-    found = _Pass(context, "once", ONCE.format(text=single_text(media(3, 1.0, 0.9), name="s")), "f4")
+    found = on_opengl(context, single_text(media(3, 1.0, 0.9), name="s"), ONCE)
     ends = np.meshgrid([0.0, 1e-30, 1.0], [0.0, 1e-30, 1.0], [-1.0, 1.0], [0.0, 1e9, 1e30])
     for values in found(*ends):
         assert np.all(np.isfinite(values) & (values >= 0.0))
@@ -327,12 +307,6 @@ def refused_laws():
     }
 
 
-@pytest.mark.parametrize(("message", "laws"), refused_laws().items())
-def test_laws_that_are_no_stack_are_refused(message, laws):
-    with pytest.raises(InputError, match=message):
-        stack_text(laws)
-
-
 def refused_media():
     good, layer = media(3), Layer(1.4, 0.1, 1.0, 0.0)
     ended = Medium((replace(layer, thickness=2.0), replace(layer, thickness=1.5)))
@@ -347,12 +321,6 @@ def refused_media():
         "media must have one number of layers in all channels, two or more, got 2, 2, 3": [*media(2)[:2], good[2]],
         "two or more, got 1, 1, 1": [Medium((layer,))] * 3,
     }
-
-
-@pytest.mark.parametrize(("message", "given"), refused_media().items())
-def test_media_that_are_no_stack_are_refused(message, given):
-    with pytest.raises(InputError, match=message):
-        single_text(given)
 
 
 SUMS = [
@@ -374,8 +342,17 @@ def test_sums_of_gaussians_are_the_laws():
     assert np.max(np.abs(names["sums_cumulated"](x, other) - SUMS[2].cdf(x, 0.5))) > 0.1
 
 
-def test_sums_of_unlike_numbers_are_refused():
+def refused_sums():
     unlike = replace(SUMS[0], variance=(1.0,), weight=(1.0,))
-    for sums, told in (([SUMS[0], SUMS[1], unlike], "3, 3, 1"), (SUMS[:2], "3, 3"), ([], "none")):
-        with pytest.raises(InputError, match=f"got {told}$"):
-            gaussians_text(sums)
+    return {"got 3, 3, 1$": [*SUMS[:2], unlike], "got 3, 3$": SUMS[:2], "got none$": []}
+
+
+REFUSED = {stack_text: refused_laws(), single_text: refused_media(), gaussians_text: refused_sums()}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [(text, message) for text, refused in REFUSED.items() for message in refused]
+)
+def test_what_is_no_stack_is_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        text(REFUSED[text][message])

@@ -1,20 +1,29 @@
-"""The texts of cones of fur are the library's functions: in float64, in float32, on OpenGL, and compile everywhere."""
+"""Texts that are no law's are the library's functions: of phase functions, of light in water, of cones of fur.
+
+In float64, in float32 in numpy and on OpenGL; and as whole files.
+"""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
 from benchmarks.fur_feet import shared_shadow
+from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, from_table
+from profilefit.errors import InputError
+from profilefit.recipes.kinds.phase import named
 from profilefit.scenes.fur import law, truth
-from profilefit.scenes.fur.law import source, strand_text
+from profilefit.scenes.fur.law import source as fur_source
+from profilefit.scenes.fur.law import strand_text
+from profilefit.scenes.sea import law as water
+from profilefit.scenes.sea.source import blur_text, export_blur, segment_text
+from profilefit.scenes.sea.source import source as sea_source
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
+from profilefit.shader.phase_text import export_phase, phase_text
 from profilefit.studies.stability.cells import RoundedText
-from tests.unit.shader.test_phase_text import functions
 
-TEXT = strand_text("python", "law")
-SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
 DRAW = """#version 330
 {text}
 uniform sampler2D arguments;
@@ -24,7 +33,88 @@ void main() {{
     {calls}
 }}
 """
-COVERED = """found = vec4(fur_shadow(q.x, q.y), fur_visibility(0.5, q.z, q.w), fur_slice(q.w, 1.5), 0.0);"""
+
+
+def on_opengl(context, text, calls):
+    """Calls of a text's functions with four arguments, q; they make four results, `found`."""
+    return _Pass(context, "text", DRAW.format(text=text, calls=calls), "f4")
+
+
+def functions(text):
+    names: dict = {}
+    exec(text, names)
+    return names
+
+
+RECORD = named("petzold")
+SEA = RECORD.phase()
+PHASES = pytest.mark.parametrize(
+    "phase",
+    [SEA, HenyeyGreenstein(0.9), Isotropic(), Mixture((0, 0.4, 0.6), (SEA, HenyeyGreenstein(-0.5), Isotropic()))],
+    ids=["sea", "one", "isotropic", "mixture"],
+)
+OFF = np.append(0.0, np.geomspace(1e-7, 2.0, 4095))
+XI = (np.arange(4096) + 0.5) / 4096
+
+
+@PHASES
+def test_phases_in_float64(phase):
+    made = functions(phase_text(phase, "python"))
+    np.testing.assert_allclose(made["phase_pdf"](OFF), phase.pdf(1 - OFF) + 0 * OFF, rtol=1e-8)
+    # Terms one after the other, the light of each from its straight back to its straight on.
+    drawn = np.sort(made["phase_sample"](XI))
+    np.testing.assert_allclose(1 - phase.invert(1 - drawn), XI, atol=1.5 / XI.size)
+
+
+@PHASES
+def test_phases_in_float32_on_opengl(context, phase):
+    run = on_opengl(context, phase_text(phase), "found = vec4(phase_pdf(q.x), phase_sample(q.y), 0.0, 0.0);")
+    density, drawn, *_ = run(OFF, XI, 0.0, 0.0)
+    exact = functions(phase_text(phase, "python"))
+    np.testing.assert_allclose(density, exact["phase_pdf"](OFF.astype(np.float32).astype(float)), rtol=3e-5)
+    share = 1 - phase.invert(1 - np.sort(drawn))
+    np.testing.assert_allclose(share, XI, atol=1.5 / XI.size + 1e-6)
+
+
+LOBES = ((0.7, 0.95), (0.3, 0.6))
+C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
+BLURS = [water.water_gaussians(omega, c * DEPTH, LOBES, 3) for omega, c in zip(OMEGA, C, strict=True)]
+WATER = """found = vec4(sea_blur_share(q.x, 2.0), sea_blur_mtf(q.y, 1.0),
+        sea_segment_integral(0.4, 1.0, 0.5, q.z, 3.0), 0.0);"""
+WAY = np.append(0.0, np.geomspace(1e-4, 1e3, 4095))  # [m]
+
+
+def test_the_segment_in_float64():
+    random = np.random.default_rng(2)
+    c, s0, t0, t1 = random.uniform(0.01, 2.0, (4, 1000))
+    m = np.append(-1.0, random.uniform(-1.0, 1.0, 999))
+    made = functions(segment_text("python"))
+    for name, given in (("integral", (c, s0, t0, m, t1)), ("between", (s0, t0, t1))):
+        right = getattr(water, f"segment_{name}")(*given)
+        np.testing.assert_allclose(made[f"sea_segment_{name}"](*given), right, rtol=1e-8)
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_the_blur_in_float64(channel):
+    made, blur, c = functions(blur_text(BLURS, C, "python")), BLURS[channel], C[channel]
+    np.testing.assert_allclose(made["sea_blur_share"](WAY, float(channel)), blur.share(c * WAY), rtol=1e-7)
+    np.testing.assert_allclose(made["sea_blur_mtf"](WAY, float(channel)), blur.mtf(WAY / c), rtol=1e-9)
+    numbers = {"sigma2": np.sqrt(blur.variances[1]) / c, "weight2": blur.weights[1], "unscattered": np.exp(-c * DEPTH)}
+    assert {one: made[f"sea_blur_{one}"](float(channel)) for one in numbers} == pytest.approx(numbers, rel=1e-10)
+
+
+def test_water_in_float32_on_opengl(context):
+    text = segment_text("glsl") + blur_text(BLURS, C, "glsl")
+    m = np.linspace(-1.0, 1.0, WAY.size).astype(np.float32).astype(float)
+    share, mtf, segment, _ = on_opengl(context, text, WATER)(WAY, WAY, m, 0.0)
+    np.testing.assert_allclose(share, BLURS[2].share(C[2] * WAY), rtol=3e-6)
+    np.testing.assert_allclose(mtf, BLURS[1].mtf(WAY / C[1]), rtol=3e-6)
+    np.testing.assert_allclose(segment, water.segment_integral(0.4, 1.0, 0.5, m, 3.0), rtol=3e-6)
+
+
+TEXT = strand_text("python", "law")
+SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
+COVERED = "found = vec4(fur_shadow(q.x, q.y), fur_visibility(0.5, q.z, q.w), fur_slice(q.w, 1.5), 0.0);"
 MET = """float k = {k};
     found = vec4(fur_swept(q.x, q.y, q.z, q.w, {r}, k), k, 0.0, 0.0);"""
 NONE = 1e8  # of a ray that meets no cone
@@ -61,8 +151,7 @@ def met_cleanly(start, slender, count=20000):
     back = (level - z) / np.cos(theta)
     m = np.sin(theta) * np.array([np.cos(turn), np.sin(turn)])
     q = off * radius * np.array([-np.sin(turn), np.cos(turn)]) - m * back
-    given = rounded(*q, *m, steepest * (1.0 - level), steepest * np.cos(theta))
-    return given
+    return rounded(*q, *m, steepest * (1.0 - level), steepest * np.cos(theta))
 
 
 def judged(found, given, r0):
@@ -94,7 +183,7 @@ def require_roots(found, given):
     assert np.all(left[met] <= 1e-4 * scale[met])
 
 
-def test_shadow_and_visibility_in_float64():
+def test_shadow_and_visibility_of_fur_in_float64():
     random = np.random.default_rng(2)
     made = functions(strand_text("python"))
     for lean in ((0.0, 0.0), (0.3, -0.2)):
@@ -160,7 +249,7 @@ def test_what_an_eye_and_a_lamp_share(context):
         assert np.all(exact <= DOUBLE.call("shadow", radius, one) * (1.0 + 1e-9))
     np.testing.assert_allclose(SINGLE.call("shared", *given), exact, rtol=1e-6)
     calls = "found = vec4(fur_shared(q.x, q.y, q.z, q.w), 0.0, 0.0, 0.0);"
-    drawn = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given)[0]
+    drawn = on_opengl(context, strand_text(), calls)(*given)[0]
     np.testing.assert_allclose(drawn, exact, rtol=3e-6)
 
 
@@ -205,11 +294,10 @@ def test_a_ray_along_the_axis_or_the_side(text):
     np.testing.assert_allclose(text.call("swept", *side), [1.0, NONE, NONE], rtol=1e-6)
 
 
-def test_in_float32_on_opengl(context):
-    text = strand_text()
+def test_fur_in_float32_on_opengl(context):
     radius, aside = covers()
     z, area = rounded(np.random.default_rng(5).random(radius.shape), 3.0)
-    shadow, seen, disc, _ = _Pass(context, "fur", DRAW.format(text=text, calls=COVERED), "f4")(radius, aside, area, z)
+    shadow, seen, disc, _ = on_opengl(context, strand_text(), COVERED)(radius, aside, area, z)
     np.testing.assert_allclose(shadow, DOUBLE.call("shadow", radius, aside), rtol=1e-6)
     np.testing.assert_allclose(seen, DOUBLE.call("visibility", 0.5, area, z), rtol=3e-6)
     np.testing.assert_allclose(disc, DOUBLE.call("slice", z, 1.5), rtol=3e-6, atol=3e-7)
@@ -220,35 +308,75 @@ def test_swept_on_opengl(context, start, r):
     """k is what the shader has made of m: a texel has room for four arguments."""
     calls = MET.format(k="0.02 * sqrt(max(1.0 - q.z * q.z - q.w * q.w, 0.0))", r=r)
     given = met_cleanly(start, 50)
-    found, k, _, _ = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given[:4])
+    found, k, _, _ = on_opengl(context, strand_text(), calls)(*given[:4])
     assert judged(found, [*given[:4], np.full_like(k, float(r)), k], 0.02) < 1e-5
 
 
 @pytest.mark.parametrize("r", ["0.0", "0.02"])
 def test_degenerate_rays_on_opengl(context, r):
     given = rounded(*degenerate(), float(r), 0.05)
-    calls = MET.format(k="0.05", r=r)
-    found = _Pass(context, "fur", DRAW.format(text=strand_text(), calls=calls), "f4")(*given[:4])[0]
+    found = on_opengl(context, strand_text(), MET.format(k="0.05", r=r))(*given[:4])[0]
     require_roots(found, given)
 
 
-@pytest.mark.parametrize("lang", LANGUAGES)
-def test_whole_files(lang):
-    text = source("fur", lang)
-    if lang == "json":
-        told = json.loads(text)
-        assert told["law"] == "fur"
-        assert "shadow(radius, aside)" in told["functions"]
-        return
-    for called in (
-        "shadow(radius, aside)",
-        "shared(radius, first, second, turn)",
-        "visibility(density, shadow, z)",
-        "slice(t, exponent)",
-        "swept(qx, qy, ",
-    ):
-        assert f"fur_{called}" in text
+EXPORTERS = {
+    "phase": partial(export_phase, RECORD),
+    "segment": partial(sea_source, "sea-segment"),
+    "blur": partial(export_blur, BLURS, C, DEPTH),
+    "fur": partial(fur_source, "fur"),
+}
+FUR = ("shadow(radius, aside)", "shared(radius, first, second, turn)", "visibility(density, shadow, z)")
+# What stands in each whole file.
+PARTS = {
+    "phase": (
+        *(RECORD.content["data_digest"], str(RECORD.content["constants"]["4-terms.held.w1"]["regenerated"])),
+        *("(jackknife)", "root mean square of ln(p / table) 0.068"),
+    ),
+    "segment": ("sea_segment_integral(c, s0, t0, m, t1)",),
+    "blur": ("after 4 m of water", "attenuation of red, green, blue 0.5, 0.2, 0.4 [1/m]"),
+    "fur": tuple(f"fur_{called}" for called in (*FUR, "slice(t, exponent)", "swept(qx, qy, ")),
+}
+
+
+@pytest.mark.parametrize("lang", [lang for lang in LANGUAGES if lang != "json"])
+@pytest.mark.parametrize("name", EXPORTERS)
+def test_whole_files(name, lang):
+    text, renamed = EXPORTERS[name](lang), EXPORTERS[name](lang, "fog")
+    assert [part for part in PARTS[name] if part not in text] == []
     assert "strand_" not in text
-    assert "fur_" not in source("fur", lang, "hair")
-    if lang == "python":
-        assert functions(text)["fur_shadow"](2.0, 0.0) == pytest.approx(4.0 * np.pi)
+    assert {"phase": "fog_pdf", "blur": "fog_share("}.get(name, "fog_") in renamed
+    assert {"segment": "sea_", "fur": "fur_"}.get(name, "LAW_") not in renamed
+
+
+def test_files_of_data():
+    told = {name: json.loads(export("json")) for name, export in EXPORTERS.items()}
+    assert RECORD.content["data_digest"] in EXPORTERS["phase"]("json")
+    assert from_table(told["phase"]["phase"]) == SEA
+    assert (told["segment"]["law"], told["fur"]["law"]) == ("sea-segment", "fur")
+    green = told["blur"]["numbers"]["green"]
+    assert green["unscattered"] + sum(green["weight"]) == pytest.approx(BLURS[1].mtf(0.0))
+    assert "shadow(radius, aside)" in told["fur"]["functions"]
+
+
+def test_python_files_compute():
+    made = functions("\n".join(EXPORTERS[name]("python") for name in ("phase", "segment", "fur")))
+    assert made["petzold_pdf"](0.5) == pytest.approx(SEA.pdf(0.5))
+    assert made["sea_segment_integral"](1.0, 0.0, 0.0, -1.0, 2.0) == 2.0
+    assert made["fur_shadow"](2.0, 0.0) == pytest.approx(4.0 * np.pi)
+
+
+REFUSED = {
+    "phase must be terms of Henyey and Greenstein to become a shader": partial(phase_text, FournierForand(1.1, 3.6)),
+    "at most 4 terms to become a shader, got 5": partial(phase_text, Mixture((0.2,) * 5, (SEA.phases[0],) * 5)),
+    "blurs must be three of one number of Gaussians, .*, got 3, 3$": partial(blur_text, BLURS[:2], C),
+    "blurs must be three .*, got none": partial(blur_text, [], C),
+    "blurs must be three of one number of Gaussians, .*, got 3, 3, 2": lambda: blur_text(
+        [*BLURS[:2], water.water_gaussians(0.5, 1.0, LOBES, 2)], C
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_refused(message):
+    with pytest.raises(InputError, match=message):
+        REFUSED[message]()
