@@ -144,8 +144,10 @@ FUNCTIONS: dict[str, Callable[[Records, bool], Findings]] = {
     "solver": _of_solver,
     "stacks": lambda folder, _: _findings("stacks", stacks.cells_of(folder.folder)),
     "heart": lambda *_: _findings("heart", scenes.heart_cells()),
-    "sea": lambda *_: _findings("sea", scenes.sea_cells()),
-    "fur": lambda *_: _findings("fur", scenes.fur_cells()),
+    "sea": lambda *_: _findings(
+        "sea", [*scenes.of_hits(), scenes.of_level_floors(), scenes.of_beam(), *scenes.of_segment()]
+    ),
+    "fur": lambda *_: _findings("fur", [*scenes.of_shells(), scenes.of_slabs(), *scenes.of_shadow()]),
 }
 
 

@@ -100,19 +100,10 @@ def labelled(name: str, labels: Iterable[str]) -> ArgumentAxis:
     return ArgumentAxis(name, "-", np.arange(len(words), dtype=float), words)
 
 
-def alpha_axis(dtype: type) -> ArgumentAxis:
-    """Return single-scattering albedos in [0, 1]."""
-    return axis("α", _cells(dtype, (*ALPHA, *_ends(dtype), *_around_one())))
-
-
-def reflectance_axis(dtype: type) -> ArgumentAxis:
-    """Return total reflectances in [0, 1]."""
-    return axis("A", _cells(dtype, (*REFLECTANCE, *_ends(dtype), *_around_one())))
-
-
-def share_axis(dtype: type) -> ArgumentAxis:
-    """Return uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
-    return axis("ξ", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(), *_pairs(dtype, (0.1, 0.5)))))
+def unit_axis(name: str, dtype: type) -> ArgumentAxis:
+    """Return albedos α, reflectances A or uniform numbers ξ in [0, 1], of which no generator should give 1 itself."""
+    between = {"α": ALPHA, "A": REFLECTANCE, "ξ": (*SHARE, *_pairs(dtype, (0.1, 0.5)))}[name]
+    return axis(name, _cells(dtype, (*between, *_ends(dtype), *(1.0 - 2.0**-k for k in POWERS), 1.0)))
 
 
 def radius_axis(dtype: type) -> ArgumentAxis:
@@ -153,10 +144,6 @@ def _ends(dtype: type) -> tuple[float, ...]:
     return (0.0, float(limits.smallest_subnormal), float(limits.tiny), *(2.0**-k for k in POWERS))
 
 
-def _around_one() -> tuple[float, ...]:
-    return (*(1.0 - 2.0**-k for k in POWERS), 1.0)
-
-
 def _pairs(dtype: type, values: Iterable[float]) -> list[float]:
     """Return values and their next neighbours."""
     return [float(one) for value in values for one in (dtype(value), np.nextafter(dtype(value), dtype(np.inf)))]
@@ -183,7 +170,8 @@ class ArgumentGrid:
     @classmethod
     def of(cls, dtype: type, beyond: bool = True) -> ArgumentGrid:
         """Return the grid of a format; `beyond` takes in lengths that the law does not accept."""
-        return cls(dtype, alpha_axis(dtype), radius_axis(dtype), share_axis(dtype), length_axis(dtype, beyond))
+        alpha, xi = unit_axis("α", dtype), unit_axis("ξ", dtype)
+        return cls(dtype, alpha, radius_axis(dtype), xi, length_axis(dtype, beyond))
 
     @property
     def arguments(self) -> tuple[Floats, Floats, Floats, Floats]:

@@ -34,7 +34,8 @@ NEAR_SOURCE = 1e-4  # relative, of R_d closer than 1e-6 mfp, where its limit sta
 def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator[Cells]:
     """Yield every function of a matched half space. Errors are those that more nodes show, or those of an identity."""
     name = "exact" if setting.illumination == "searchlight" else "exact, diffuse light"
-    alpha, x, xi = cells.alpha_axis(np.float64), cells.radius_axis(np.float64), cells.share_axis(np.float64)
+    alpha, xi = (cells.unit_axis(symbol, np.float64) for symbol in ("α", "ξ"))
+    x = cells.radius_axis(np.float64)
     low, high = cells.LENGTHS[np.float64]
     mfp = axis("l", (low, 1.0, high), "length")
     a = alpha.values[:, None, None]
@@ -127,7 +128,7 @@ def refracting_cells() -> Iterator[Cells]:
 
 def _refracting(setting: Setting) -> Iterator[Cells]:
     name = f"exact, n = {setting.n:.10g}" + ("" if setting.illumination == "searchlight" else ", diffuse light")
-    alpha, x = cells.alpha_axis(np.float64), cells.radius_axis(np.float64)
+    alpha, x = cells.unit_axis("α", np.float64), cells.radius_axis(np.float64)
     a, r = alpha.values[:, None], x.values[None]
     closed, barely = Setting(setting.illumination), setting.n == BARELY
     bound = REFRACTING[cells.PROFILE]

@@ -42,11 +42,9 @@ def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
             dtype = cells.DTYPES[arithmetic]
-            at = cells.reflectance_axis(dtype) if name == cells.ALPHA_OF else cells.alpha_axis(dtype)
-            value, reference = (
-                _value(text.law, name, arithmetic, at),
-                _text_value(text.law, cells.EXTENDED, name, at.values),
-            )
+            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", dtype)
+            value = _value(text.law, name, arithmetic, at)
+            reference = _text_value(text.law, cells.EXTENDED, name, at.values)
             own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
             yield _cells(text, name, arithmetic, at, value, reference, own, span)
     yield from _kept_in_half(text, spans[1])
@@ -101,7 +99,7 @@ def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Any) -> Floats:
 
 def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
     """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
-    at = cells.alpha_axis(np.float32)
+    at = cells.unit_axis("α", np.float32)
     reference = _text_value(named.law, cells.EXTENDED, cells.REFLECTANCE_OF, at.values)
     half = at.values.astype(np.float16).astype(np.float32)
     root = np.sqrt(1.0 - at.values).astype(np.float16).astype(np.float32)
@@ -144,7 +142,7 @@ def conversion_cells() -> Iterator[Cells]:
 
 def _length(name: str) -> Cells:
     """Return l = 1 there and back: infinite lengths, where nothing is absorbed, are refused by name on the way back."""
-    at = cells.alpha_axis(np.float64)
+    at = cells.unit_axis("α", np.float64)
     with np.errstate(all="ignore"):
         value = np.asarray(Optical(at.values, np.array(1.0)).length(name))
         back = np.array([_returned(name, one, a) for one, a in zip(value, at.values, strict=True)])
@@ -171,7 +169,7 @@ def _albedo(reflectance: float, light: str) -> float:
 
 
 def _colour(light: str) -> Cells:
-    at = cells.reflectance_axis(np.float64)
+    at = cells.unit_axis("A", np.float64)
     value = np.array([_albedo(one, light) for one in at.values])
     raised = np.isnan(value)
     error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - at.values)
