@@ -73,11 +73,12 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     def chosen(named: LoadedLaw, label: str) -> bool:
         return bool({label, named.name, *named.records} & set(requested)) if requested else not quick or label in QUICK
 
-    todo: list[Job] = []
-    for one in profiles:
-        if chosen(one, one.label):
-            more = DERIVED_IF_NAMED.get(one.label, ()) if requested else ()
-            todo.append((one.label, partial(_of_law, one, records, quick, more)))
+    more = DERIVED_IF_NAMED if requested else {}
+    todo: list[Job] = [
+        (one.label, partial(_of_law, one, records, quick, more.get(one.label, ())))
+        for one in profiles
+        if chosen(one, one.label)
+    ]
     todo += [(map_label(one), partial(_of_map, one, records, quick)) for one in albedos if chosen(one, map_label(one))]
     usual = () if requested or quick else set(FUNCTIONS) - set(IF_NAMED)
     todo += [(name, partial(of, records, quick)) for name, of in FUNCTIONS.items() if name in {*requested, *usual}]

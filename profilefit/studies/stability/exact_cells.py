@@ -19,6 +19,7 @@ from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
 from mcml_sim.media.arrays import Floats
+from profilefit.laws.base import Range
 from profilefit.laws.rational import Normalisation
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentAxis, Cells, Mask, absolute, axis, relative, steps_down, steps_up
@@ -108,7 +109,7 @@ BARELY = 1.0 + 1e-9  # an index that hardly refracts
 SETTINGS = (Setting(n=BARELY), Setting(n=1.4), Setting("diffuse", n=3.0))
 # What the docstrings of `exact` and of `exact.solve` promise where surfaces refract.
 REFRACTING = {cells.PROFILE: 1e-7, cells.CDF: 2e-7, cells.REFLECTANCE_OF: 1e-7}
-REFRACTING_ALPHA, REFRACTING_X = (0.05, 0.999), (1e-3, 15.0)
+REFRACTING_ALPHA, REFRACTING_X = Range(0.05, 0.999), Range(1e-3, 15.0)
 PLATE_ALPHA = (0.0, 0.05, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0)
 THICKNESS = (1e-3, 0.03, 0.5, 3.0, 30.0, 1e3)  # [mfp]
 PLATE_INDEX = (1.0, 1.4, 3.0)
@@ -121,8 +122,7 @@ def refracting_cells() -> Iterator[Cells]:
     """Yield half spaces by albedo and radius, plates by albedo and thickness, and the profile of some of them."""
     for setting in SETTINGS:
         yield from _refracting(setting)
-    for n in PLATE_INDEX:
-        yield plates(n)
+    yield from map(plates, PLATE_INDEX)
     yield _plate_profiles()
 
 
@@ -139,16 +139,15 @@ def _refracting(setting: Setting) -> Iterator[Cells]:
         else:
             error = np.asarray(exact.error_estimate(r, a, setting=setting))
         limit = np.where(r == 0, np.inf, a * source_strength(setting) / (2 * np.pi * r))
-    sure = _within(a, REFRACTING_ALPHA)
+    sure = REFRACTING_ALPHA.holds(a)
     near = (r < SURE_X[0]) & sure
     error = np.where(near, relative(profile, limit) * bound / NEAR_SOURCE, error)
-    reference, inside = np.where(near, limit, profile), near | sure & _within(r, REFRACTING_X)
+    reference, inside = np.where(near, limit, profile), near | sure & REFRACTING_X.holds(r)
     yield _cells(name, cells.PROFILE, (alpha, x), profile, reference, error, 1e-6 if barely else bound, inside)
     cdf = np.asarray(exact.cdf(r, a, setting=setting))
-    if barely:
-        finer = np.asarray(exact.cdf(r, a, setting=closed))
-    else:
-        finer = finer_cdf(x.values, alpha.values, setting)[..., 0]
+    finer = (
+        np.asarray(exact.cdf(r, a, setting=closed)) if barely else finer_cdf(x.values, alpha.values, setting)[..., 0]
+    )
     bound = REFRACTING[cells.CDF]
     falls = steps_down(cdf, 1, np.float64, bound / np.finfo(float).eps / 16.0)
     yield _cells(name, cells.CDF, (alpha, x), cdf, finer, absolute(cdf, finer), bound, sure, wrong_way=falls)
@@ -189,9 +188,5 @@ def _plate_profiles() -> Cells:
     )
     seen = finer > SEEN * finer[:, [PLATE_X.index(1.0)]]
     error = relative(value, finer) * np.where(thickness.values[:, None] < THIN, PROFILE_BOUND / THIN_BOUND, 1.0)
-    inside = seen & (x.values >= REFRACTING_X[0]) | (x.values == 0)
+    inside = seen & (x.values >= REFRACTING_X.low) | (x.values == 0)
     return _cells("stack, n = 1.4", cells.PROFILE, (thickness, x), value, finer, error, PROFILE_BOUND, inside)
-
-
-def _within(values: Floats, ends: tuple[float, float]) -> Mask:
-    return (values >= ends[0]) & (values <= ends[1])

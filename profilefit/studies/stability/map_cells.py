@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -108,9 +109,7 @@ def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
         yield _cells(named, name, cells.STORED16, at, value, reference, cells.HALF_BOUND, span)
 
 
-def _against_exact(
-    named: LoadedLaw, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError
-) -> Iterator[Cells]:
+def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: bounds.ModelError) -> Iterator[Cells]:
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = axis("α", 1.0 - root**2)
@@ -121,11 +120,9 @@ def _against_exact(
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     stated = model.get(WAYS[cells.REFLECTANCE_OF][0]) or np.nan
     bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, alpha, there, reflectance.values, bound, of_alpha)
+    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, alpha, there, reflectance.values, bound, albedos)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    yield _cells(
-        named, cells.ALPHA_OF, cells.MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error
-    )
+    yield _cells(named, cells.ALPHA_OF, cells.MODEL, reflectance, back, alpha.values, MODEL_BOUND, colours, error)
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.
@@ -145,7 +142,10 @@ def _length(name: str) -> Cells:
     at = cells.unit_axis("α", np.float64)
     with np.errstate(all="ignore"):
         value = np.asarray(Optical(at.values, np.array(1.0)).length(name))
-        back = np.array([_returned(name, one, a) for one, a in zip(value, at.values, strict=True)])
+        back = np.where(np.isinf(value), 1.0, np.nan)
+        for i, length in enumerate(value):
+            with contextlib.suppress(InputError):
+                back[i] = Optical.from_length(name, length, at.values[i]).mfp
     infinite = np.isinf(value) & (at.values == 1.0)
     error, reference = np.where(infinite, 0.0, np.abs(back - 1.0)), np.where(infinite, np.inf, value)
     made = Cells("convert", False, name, cells.FLOAT64, (at,), value, reference, error, RETURN_BOUND)
@@ -153,24 +153,12 @@ def _length(name: str) -> Cells:
     return made
 
 
-def _returned(name: str, value: float, alpha: float) -> float:
-    try:
-        return float(Optical.from_length(name, value, alpha).mfp)
-    except InputError:
-        return 1.0 if np.isinf(value) else np.nan
-
-
-def _albedo(reflectance: float, light: str) -> float:
-    """Return alpha [-], or NaN where something is raised: every A in [0, 1] has one."""
-    try:
-        return float(alpha_of(reflectance, light))
-    except Exception:  # whatever comes is what is looked for
-        return np.nan
-
-
 def _colour(light: str) -> Cells:
     at = cells.unit_axis("A", np.float64)
-    value = np.array([_albedo(one, light) for one in at.values])
+    value = np.full(at.values.size, np.nan)  # where something is raised: every A in [0, 1] has an alpha
+    for i, reflectance in enumerate(at.values):
+        with contextlib.suppress(Exception):  # whatever comes is what is looked for
+            value[i] = alpha_of(reflectance, light)
     raised = np.isnan(value)
     error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - at.values)
     given = "convert", False, f"{cells.ALPHA_OF}, {light}", cells.FLOAT64, (at,), value, value, error, COLOUR_BOUND

@@ -8,7 +8,7 @@ known, a ball lit from one side, and an edge of light on a plane, with errors of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -210,8 +210,19 @@ def of_slabs() -> Cells:
 def of_shadow() -> Iterator[Cells]:
     """Yield a cone's shadow in float32: by its shader source, and by the formula as textbooks have it."""
     text = RoundedText(strand_text("python", cells.NAME), np.float32)
-    yield _shadow("cone's shadow", True, cells.TEXT32, lambda *given: text.call("shadow", *given))
-    yield _shadow("cone's shadow, by acos", False, cells.FLOAT32, by_acos)
+    aside, radius = np.meshgrid(ASIDES, ROOTS, indexing="ij")
+    root = radius.astype(np.float32)
+    away = (aside * root.astype(float)).astype(np.float32)
+    # A tip that leans by the length is seen that far aside from above, to the last digit.
+    exactly = np.asarray(shadow(root.astype(float), away.astype(float), 0.0, (1.0, 0.0)))
+    axes = axis("d/r0", ASIDES), axis("r0", ROOTS, "length")
+    for name, own, arithmetic, value in (
+        ("cone's shadow", True, cells.TEXT32, text.call("shadow", root, away)),
+        ("cone's shadow, by acos", False, cells.FLOAT32, by_acos(root, away)),
+    ):
+        value = np.asarray(value, float)
+        judged = value, exactly, relative(value, exactly), DIGITS
+        yield Cells(name, own, SHADOW, arithmetic, axes, *judged, advice=OF_SHADOW)
 
 
 def by_acos(radius: Floats, aside: Floats) -> Floats:
@@ -220,17 +231,6 @@ def by_acos(radius: Floats, aside: Floats) -> Floats:
     with np.errstate(all="ignore"):
         beyond = radius**2 * (one(np.pi) - np.arccos(radius / aside)) + radius * np.sqrt(aside**2 - radius**2)
     return np.where(aside <= radius, one(np.pi) * radius**2, beyond)
-
-
-def _shadow(name: str, own: bool, arithmetic: str, function: Callable[..., Floats]) -> Cells:
-    aside, radius = np.meshgrid(ASIDES, ROOTS, indexing="ij")
-    root = radius.astype(np.float32)
-    away = (aside * root.astype(float)).astype(np.float32)
-    value = np.asarray(function(root, away), float)
-    # A tip that leans by the length is seen that far aside from above, to the last digit.
-    exactly = np.asarray(shadow(root.astype(float), away.astype(float), 0.0, (1.0, 0.0)))
-    axes, given = (axis("d/r0", ASIDES), axis("r0", ROOTS, "length")), (value, exactly, relative(value, exactly))
-    return Cells(name, own, SHADOW, arithmetic, axes, *given, DIGITS, advice=OF_SHADOW)
 
 
 WITHIN = 2.0  # sigma from a pole that are not promised: lines of the atlas turn there
