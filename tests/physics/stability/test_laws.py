@@ -1,4 +1,4 @@
-"""Cells of laws and maps: what is right, what narrower formats do, known failures; and what the atlas found in ours, mended."""
+"""Cells of laws and maps: what is right, what narrower formats do, known failures; and what was mended in ours."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Truths on the same rings: what their errors are against, and that they are what the methods state; the scalar tracer."""
+"""Truths on the same rings: what their errors are against, and what the methods state; the scalar tracer."""
 
 import dataclasses
 import sys
