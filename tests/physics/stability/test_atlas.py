@@ -16,50 +16,6 @@ from profilefit.studies.stability.cells import ADVICE, CDF, FLOAT64, Verdict, ab
 FITS = catalogue.fits_folder()
 
 
-@pytest.mark.slow
-def test_jobs_by_name():
-    assert [name for name, _ in atlas.jobs(["liang"], FITS, False)] == [
-        *("liang, published", "liang, corrected", "liang-whole", "liang-as-published", "liang-inverse-as-published"),
-        *("map liang, published", "albedo-liang"),
-    ]
-    assert [name for name, _ in atlas.jobs(["exact", "hazard-refracting"], FITS, False)] == [
-        "hazard-refracting",
-        "exact",
-    ]
-    everything = [name for name, _ in atlas.jobs([], FITS, False)]
-    assert set(atlas.QUICK) | set(atlas.FUNCTIONS) - set(atlas.IF_NAMED) | set(atlas.DERIVED) | {"albedo-liang"} <= set(
-        everything
-    )
-    assert len(everything) == len(set(everything))
-    assert not set(atlas.IF_NAMED) & set(everything)
-    for one in ("sea", "fur"):
-        assert [name for name, _ in atlas.jobs([one], FITS, True)] == [one]
-    with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
-        atlas.jobs(["hazzard"], FITS, False)
-
-
-def _law(region):
-    """The name of the law that a region is of."""
-    return region.subject.split("-")[0].split(",")[0]
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_ours_hold_and_every_failure_has_its_advice():
-    parts = list(atlas.run(atlas.jobs([], FITS, False)))
-    regions = [one for part in parts for one in part.regions]
-    assert [(one.subject, one.quantity, one.arithmetic, one.place) for one in regions if one.is_failure] == []
-    assert [(one.subject, one.quantity) for one in regions if one.verdict.is_red and not one.advice] == []
-    assert [one for part in parts for one in part.fits if one.is_failure] == []
-    assert [(one.subject, one.advice) for one in regions if one.own and _law(one) in one.advice] == []
-    assert {law_cells.OF_LIANG, map_cells.OF_MAPS, stacks.OF_LAWS, misuse.CHECK, *ADVICE.values()} <= {
-        one.advice for one in regions
-    }
-
-
-FITS = catalogue.fits_folder()
-
-
 def test_laws_and_functions_refuse_nonsense_by_name():
     cells = [*misuse.of_law(find("hazard", FITS)), *misuse.of_map(find("albedo-rational", FITS))]
     cells += [*misuse.of_exact(), *misuse.of_convert()]
@@ -80,7 +36,7 @@ def test_what_passes_or_raises_otherwise_is_red():
     assert np.all(cells.failures)
 
 
-FITS = catalogue.fits_folder()
+DERIVATIVES = {"∂α(A)/∂A", "∂α(A)/∂constants", "∂A(α)/∂α", "∂A(α)/∂constants"}
 
 
 def of_map(label):
@@ -90,7 +46,7 @@ def of_map(label):
 
 def test_the_rational_map_is_differentiable_both_ways():
     cells = of_map("albedo-rational")
-    assert {one.quantity for one in cells} == {"∂α(A)/∂A", "∂α(A)/∂constants", "∂A(α)/∂α", "∂A(α)/∂constants"}
+    assert {one.quantity for one in cells} == DERIVATIVES
     assert not any(one.failures.any() for one in cells)
 
 
@@ -111,7 +67,7 @@ def test_a_wrong_derivative_is_found_and_leaves_nothing_behind(monkeypatch):
 
     with monkeypatch.context() as wrong:
         wrong.setattr(gradients, "WEIGHTS", tuple((0.5 * k, weight) for k, weight in gradients.WEIGHTS))
-        assert found() == {"∂α(A)/∂A", "∂α(A)/∂constants", "∂A(α)/∂α", "∂A(α)/∂constants"}
+        assert found() == DERIVATIVES
     assert found() == set()
 
 
@@ -151,9 +107,8 @@ def test_no_cell_is_red_where_something_is_promised():
 
 @pytest.mark.slow
 def test_the_rational_map_is_found_from_anywhere():
-    cases = {
-        (one.case, one.value): one for one in fit_cases.fits_of(catalogue.albedo_law("rational"), "reflectance", "r", 6)
-    }
+    fits = fit_cases.fits_of(catalogue.albedo_law("rational"), "reflectance", "r", 6)
+    cases = {(one.case, one.value): one for one in fits}
     random = cases[fit_cases.STARTS, "× e^(0.69 normal)"]
     assert random.converged > 0.5
     assert random.spread < 1e-6
@@ -181,3 +136,37 @@ def test_a_fit_that_accepts_nonsense_is_a_failure():
     assert case.is_failure
     assert not replace(case, converged=0.0, results=(("the residual is not finite there", 1),)).is_failure
     assert replace(case, converged=0.0, results=(("", 1),)).is_failure
+
+
+@pytest.mark.slow
+def test_jobs_by_name():
+    def named(*words, quick=False):
+        return [name for name, _ in atlas.jobs(words, FITS, quick)]
+
+    assert named("liang") == [
+        *("liang, published", "liang, corrected", "liang-whole", "liang-as-published", "liang-inverse-as-published"),
+        *("map liang, published", "albedo-liang"),
+    ]
+    assert named("exact", "hazard-refracting") == ["hazard-refracting", "exact"]
+    everything, if_named = named(), set(atlas.IF_NAMED)
+    assert {*atlas.QUICK, *atlas.DERIVED, "albedo-liang"} | set(atlas.FUNCTIONS) - if_named <= set(everything)
+    assert len(everything) == len(set(everything))
+    assert not if_named & set(everything)
+    for one in ("sea", "fur"):
+        assert named(one, quick=True) == [one]
+    with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
+        atlas.jobs(["hazzard"], FITS, False)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_ours_hold_and_every_failure_has_its_advice():
+    parts = list(atlas.run(atlas.jobs([], FITS, False)))
+    regions = [one for part in parts for one in part.regions]
+    assert [(one.subject, one.quantity, one.arithmetic, one.place) for one in regions if one.is_failure] == []
+    assert [(one.subject, one.quantity) for one in regions if one.verdict.is_red and not one.advice] == []
+    assert [one for part in parts for one in part.fits if one.is_failure] == []
+    laws = [(one.subject.split("-")[0].split(",")[0], one.advice) for one in regions if one.own]
+    assert [(law, advice) for law, advice in laws if law in advice] == []
+    advice = {law_cells.OF_LIANG, map_cells.OF_MAPS, stacks.OF_LAWS, misuse.CHECK, *ADVICE.values()}
+    assert advice <= {one.advice for one in regions}
