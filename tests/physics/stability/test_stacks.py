@@ -92,7 +92,5 @@ def test_light_scattered_once(monkeypatch, n):
     assert all("g -0.95" in one.where for one in found)
     assert np.mean(single.inside) > 0.8
     scatter = stacks.single_scattering  # negative control: a direction that is off in the ninth digit
-    monkeypatch.setattr(
-        stacks, "single_scattering", lambda m, into, out, turned: scatter(m, into, out * (1 - 1e-8), turned)
-    )
+    monkeypatch.setattr(stacks, "single_scattering", lambda of, i, o, turned: scatter(of, i, o * (1 - 1e-8), turned))
     assert Verdict.INACCURATE in stacks.once(n, FLOAT64).verdicts

@@ -44,15 +44,12 @@ def test_front_is_what_the_plain_definition_says():
 
 
 def test_beaten_is_only_what_is_worse_by_more_than_the_errors_in_both():
+    """As fast within the errors, or as near, is tied; and of two errors both must be smaller."""
     better = point(1.0, 0.1, spread=0.1)
-    assert standings([better, point(1.5, 0.15, spread=0.1)])[1] == BEATEN
-    assert standings([better, point(1.1, 0.5, spread=0.1)])[1] == TIED  # as fast, within the errors
-    assert standings([better, point(5.0, 0.11, spread=0.1)])[1] == TIED  # as near
-    assert standings([better, point(1.1, 0.11, spread=0.1)]) == [FRONT, FRONT]
-    assert standings([better, point(1.5, 0.05, spread=0.1)]) == [FRONT, FRONT]
-
-
-def test_both_errors_must_be_smaller():
+    for cost, error, standing in ((1.5, 0.15, BEATEN), (1.1, 0.5, TIED), (5.0, 0.11, TIED)):
+        assert standings([better, point(cost, error, spread=0.1)])[1] == standing
+    for cost, error in ((1.1, 0.11), (1.5, 0.05)):
+        assert standings([better, point(cost, error, spread=0.1)]) == [FRONT, FRONT]
     assert standings([point(1.0, 0.1, worst=0.5), point(2.0, 0.2, worst=0.4)]) == [FRONT, FRONT]
     assert standings([point(1.0, 0.1, worst=0.3), point(2.0, 0.2, worst=0.4)]) == [FRONT, BEATEN]
 
@@ -116,13 +113,9 @@ def test_one_core_and_back():
     assert stopwatch.cores() == before
 
 
-@pytest.fixture(scope="module")
-def law():
-    return catalogue.load("liang", "corrected")
-
-
-def test_change_is_that_of_the_energies(law):
+def test_change_is_that_of_the_energies():
     """a and b a hundredth larger, and c as it was: so is every ring's energy."""
+    law = catalogue.load("liang", "corrected")
     assert fits.change(law, law) == (0.0, 0.0)
     larger = fits.with_constants(law, {name: 1.01 * getattr(law, name) for name in ("a1", "a2", "b0")})
     energy, counts = fits.judged()
@@ -142,14 +135,10 @@ def test_standardised_is_in_standard_errors():
 def test_points_have_the_spread_of_the_seeds_and_failures_are_told():
     trials = [Trial(0.1 * k, 1.0, 0.01 * k, 0.1 * k, 1.0, k != 2) for k in (1, 2, 3)]
     alone, whole = (fits.point_of(panel, "way", 10**6, trials) for panel in ("fit", "whole"))
-    assert alone.cost.value == pytest.approx(0.2)
-    assert whole.cost.value == pytest.approx(1.2)
-    assert alone.error.value == pytest.approx(0.02)
+    assert (alone.cost.value, whole.cost.value, alone.error.value) == pytest.approx((0.2, 1.2, 0.02))
     assert alone.error.low < alone.error.value < alone.error.high
-    assert alone.label == "1e6 photons"
-    assert alone.facts["converged"] == 2
-    notes = fits.notes_of({("way", 10**6): trials}, {"way": 3.0})
-    assert notes == (
+    assert (alone.label, alone.facts["converged"]) == ("1e6 photons", 2)
+    assert fits.notes_of({("way", 10**6): trials}, {"way": 3.0}) == (
         "1 of 3 did not converge: way, 1e+06 photons",
         "first fits, which compile, not in the times [s]: way 3.0",
     )
