@@ -89,6 +89,9 @@ class ArgumentAxis:
         return int(np.argmin(np.abs(self.values - value)))
 
 
+Axes = tuple[ArgumentAxis, ...]
+
+
 def axis(name: str, values: ArrayLike, unit: str = "-") -> ArgumentAxis:
     """Return the axis of some numbers."""
     return ArgumentAxis(name, unit, np.array(values, float))
@@ -249,7 +252,7 @@ class Cells:
     own: bool
     quantity: str
     arithmetic: str
-    axes: tuple[ArgumentAxis, ...]
+    axes: Axes
     value: Floats
     reference: Floats
     error: Floats

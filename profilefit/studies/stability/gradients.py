@@ -20,11 +20,10 @@ from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import Cells, Mask, axis
+from profilefit.studies.stability.cells import Axes, Cells, Mask, axis
 from profilefit.studies.stability.map_cells import map_label
 
 Triple = tuple[Floats, Floats, Floats]
-Axes = tuple[cells.ArgumentAxis, ...]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)
 RADIUS = (0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1e6, np.inf)
 SHARE = (0.0, 1e-12, 1e-6, 1e-3, 0.008, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
@@ -45,8 +44,6 @@ FUNCTIONS: dict[str, Function] = {
     cells.CDF: lambda law, r, alpha, mfp: law.cdf(r, alpha, mfp),
     cells.SAMPLE: lambda law, xi, alpha, mfp: law.sampler.sample(xi, alpha, mfp),
     cells.PDF: lambda law, r, alpha, mfp: law.sampler.pdf(r, alpha, mfp),
-}
-MAPS: dict[str, Function] = {
     cells.ALPHA_OF: lambda law, a, _, __: law.alpha(a),
     cells.REFLECTANCE_OF: lambda law, alpha, _, __: law.reflectance(alpha),
 }
@@ -72,7 +69,7 @@ def of_map(named: LoadedLaw, spans: tuple[Range, Range]) -> Iterator[Cells]:
     for (name, symbol, values), span in zip(ways, spans, strict=True):
         at = axis(symbol, values)
         u = at.values
-        derivatives = _derivatives(MAPS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
+        derivatives = _derivatives(FUNCTIONS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
         sure = valid & SURE[symbol].holds(u)
         for by in (symbol, "constants"):

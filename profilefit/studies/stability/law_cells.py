@@ -28,9 +28,8 @@ from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import ArgumentGrid, Cells, Mask, RoundedText, absolute, axis, relative
+from profilefit.studies.stability.cells import ArgumentGrid, Axes, Cells, Mask, RoundedText, absolute, axis, relative
 
-Axes = tuple[cells.ArgumentAxis, ...]
 # Of laws without a record: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
 MEASURED: dict[str, dict[str, float]] = {
     "burley_diffuse_mfp": {"rel": 0.156, "ks": 0.0658},

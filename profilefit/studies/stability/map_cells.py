@@ -47,7 +47,7 @@ def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
             value = _value(text.law, name, arithmetic, at)
             reference = _text_value(text.law, cells.EXTENDED, name, at.values)
             own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
-            yield _cells(text, name, arithmetic, at, value, reference, own, span)
+            yield _cells(text, name, arithmetic, at, value, reference, limit=own, span=span)
     yield from _kept_in_half(text, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
@@ -59,22 +59,15 @@ def in_reduced(named: LoadedLaw) -> LoadedLaw:
 
 
 def _cells(
-    named: LoadedLaw,
-    name: str,
-    arithmetic: str,
-    at: ArgumentAxis,
-    value: Floats,
-    reference: Floats,
-    limit: float,
-    span: Range,
-    error: Floats | None = None,
+    named: LoadedLaw, name: str, arithmetic: str, at: ArgumentAxis, *values: Floats, limit: float, span: Range
 ) -> Cells:
-    """Return the cells of one direction; the error is |value - reference| by default."""
+    """Return the cells of one direction, of value, reference and error, by default |value - reference|."""
+    value, reference = values[:2]
+    error = values[2] if len(values) > 2 else absolute(value, reference)
     inside, held, dtype = span.holds(at.values), arithmetic in cells.HELD, cells.DTYPES[arithmetic]
     return Cells(
-        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference,
-        absolute(value, reference) if error is None else error, limit, inside & held, judge=inside,
-        wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
+        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside & held,
+        judge=inside, wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
     )  # fmt: skip
 
 
@@ -106,7 +99,7 @@ def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
     root = np.sqrt(1.0 - at.values).astype(np.float16).astype(np.float32)
     for name, alpha in ((cells.REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
         value = _text_value(named.law, np.float32, cells.REFLECTANCE_OF, alpha)
-        yield _cells(named, name, cells.STORED16, at, value, reference, cells.HALF_BOUND, span)
+        yield _cells(named, name, cells.STORED16, at, value, reference, limit=cells.HALF_BOUND, span=span)
 
 
 def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: bounds.ModelError) -> Iterator[Cells]:
@@ -120,9 +113,10 @@ def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: boun
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     stated = model.get(WAYS[cells.REFLECTANCE_OF][0]) or np.nan
     bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, alpha, there, reflectance.values, bound, albedos)
+    of_alpha, of_colour = (alpha, there, reflectance.values), (reflectance, back, alpha.values)
+    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, *of_alpha, limit=bound, span=albedos)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    yield _cells(named, cells.ALPHA_OF, cells.MODEL, reflectance, back, alpha.values, MODEL_BOUND, colours, error)
+    yield _cells(named, cells.ALPHA_OF, cells.MODEL, *of_colour, error, limit=MODEL_BOUND, span=colours)
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.

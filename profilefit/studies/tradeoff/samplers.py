@@ -161,8 +161,7 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
     """Return a gather weighted by the law's own density: all weights are 1."""
-    drawn = by_law(law, alpha, sampler)
-    return EdgeGather(drawn.sample, np.ones_like)
+    return EdgeGather(by_law(law, alpha, sampler).sample, np.ones_like)
 
 
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
