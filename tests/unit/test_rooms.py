@@ -3,6 +3,7 @@
 import ast
 import graphlib
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -62,9 +63,9 @@ def names_in(path: Path, module: str) -> set[str]:
 
 
 @cache
-def import_graph(root: Path, package: str) -> Imports:
-    """Module -> the modules of the same package that it names, each the deepest that exists."""
-    files = modules(root, package)
+def import_graph(root: Path, *packages: str) -> Imports:
+    """Module -> the modules of these packages that it names, each the deepest that exists."""
+    files = modules(root, *packages)
 
     def deepest(name: str) -> str | None:
         while name and name not in files:
@@ -171,25 +172,16 @@ def test_commands_know_no_kind_by_name():
     assert [place for path in commands for place in known_kinds(path)] == []
 
 
-def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
-    """Module -> the modules of all packages that import it or from it."""
-    found: dict[str, set[str]] = {}
-    for module, path in modules(root, *packages).items():
-        for name in names_in(path, module):
-            for home in (name, name.rpartition(".")[0]):
-                found.setdefault(home, set()).add(module)
-    return found
-
-
 def test_a_file_is_one_noun():
     """Neither a crumb of one other file nor two; commands, kinds and a scene's names are a file each, however short."""
-    known, wrong = importers(ROOT, PACKAGES), set()
+    importers = Counter(home for targets in import_graph(ROOT, *PACKAGES).values() for home in targets)
+    wrong = set()
     for module, path in modules(ROOT, *PACKAGES).items():
         lines = len(path.read_text(encoding="utf-8").splitlines())
         of_scene = ".scenes." in module and path.stem in FIVE_NAMES
         if path.stem in ("__init__", "__main__") or of_scene or ".cli." in module or ".recipes.kinds." in module:
             continue
-        if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
+        if lines > LONG or (lines < SHORT and importers[module] < 2):
             wrong.add(module)
     assert wrong == set()
 

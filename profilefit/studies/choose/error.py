@@ -318,10 +318,7 @@ def estimates(law: ProfileLaw, alpha: tuple[float, ...], samples: int, case: Cas
 
 
 def _met(side: Floats, across: Floats, x: Floats, case: Case) -> tuple[Floats, Floats]:
-    """Return the distance at which each sample's ray meets the tangent plane of its pixel, and the area it stands for.
-
-    Beside the cylinder the area is 0.
-    """
+    """Return how far each sample's ray goes to the tangent plane of its pixel, and its area, 0 beside the cylinder."""
     if case.is_flat:
         return side, np.ones_like(side)
     radius = case.radius

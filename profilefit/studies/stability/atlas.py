@@ -63,10 +63,7 @@ Job = tuple[str, Callable[[], Findings]]
 
 
 def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
-    """Return what there is to do, a job a subject: all of it, or what is named.
-
-    Raises InputError for an unknown name.
-    """
+    """Return what there is to do, a job a subject: all of it, or what is named; InputError for an unknown name."""
     requested, records = list(names), Records.of(folder)
     profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
     albedos = catalogue.albedo_laws(records, matched=False)

@@ -191,10 +191,7 @@ class ArgumentGrid:
 
 
 class Verdict(enum.IntEnum):
-    """Class of a cell; of several that hold, the last one here counts.
-
-    NOT_JUDGED  a number, not negative and in order, without a reference value here
-    """
+    """Class of a cell; of several, the last one here counts. NOT_JUDGED: a number in order, but without a reference."""
 
     RIGHT = 0
     OUTSIDE = 1
@@ -323,10 +320,7 @@ def judged(
 
 
 def steps_down(value: Floats, along: int, dtype: type, scale: Floats | float = 0.0) -> Mask:
-    """Return where a value is less than its neighbour before it along an axis, by more than rounding.
-
-    `scale` adds to the size that the rounding is of.
-    """
+    """Return where a value falls from its neighbour before it on an axis, by more than rounding of it and `scale`."""
     moved, size = (np.moveaxis(np.broadcast_to(one, value.shape), along, 0)[:-1] for one in (value, scale))
     lower, upper = moved, np.moveaxis(value, along, 0)[1:]
     with np.errstate(invalid="ignore", over="ignore"):

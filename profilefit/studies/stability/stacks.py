@@ -84,10 +84,7 @@ ONCE_BOUNDS = {FLOAT64: 1e-9, TEXT32: 1e-5}
 
 @dataclass(frozen=True)
 class StackCase:
-    """Law of a stack.
-
-    errors  rel, ks and the error of A that the law states of itself [-];  own  whether it was fitted to its layers
-    """
+    """Law of a stack: errors rel, ks and of A, as it states of itself [-]; own, whether it was fitted to its layers."""
 
     label: str
     law: StackLaw

@@ -200,10 +200,7 @@ class TableContender(Contender):
 
 
 def contenders(folder: Path | None = None, specs: Sequence[LawSpec] | None = None) -> tuple[list[Contender], list[str]]:
-    """Return all laws that load, by default of `SPECS`, with the constants in `folder`, and a line for each other.
-
-    Raises InputError where the yardstick itself is missing.
-    """
+    """Return all laws that load, by default of `SPECS`, and a line for each other; InputError without the yardstick."""
     loaded: list[Contender] = []
     left_out = []
     for one in specs or SPECS:

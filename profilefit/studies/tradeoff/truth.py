@@ -77,13 +77,10 @@ class Annuli:
 
 
 def half_spaces(setting: Setting, rule: Rule, anew: bool = False) -> Floats:
-    """Return the energy within EDGES at ALPHAS from the table of n alone: no transform is kept between calls.
-
-    anew  make the table of n, too, that is otherwise kept
-    """
+    """Return the energy within EDGES at ALPHAS from the table of n alone, which is kept unless made `anew`."""
     if anew:
         refracting.new_table(float(setting.n), rule)
-    by_albedo.forget()
+    by_albedo.forget()  # no transform is kept between calls
     return by_albedo.by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
 
 

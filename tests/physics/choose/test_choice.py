@@ -33,36 +33,28 @@ def predicted(*pairs):
     ]
 
 
+WITHIN_LIMITS = {"meets_tolerance": True, "meets_budget": True}
 OPTIONS = predicted((1.0, 0.2), (2.0, 0.03), (3.0, 0.05), (4.0, 0.015), (5.0, 0.018), (6.0, 0.004))
 
 
-def test_the_cheapest_that_serves(scene):
-    choice = chosen(scene, OPTIONS)
-    assert choice.chosen is choice.nearest is OPTIONS[3]
-    assert choice.cheaper is OPTIONS[1]  # the most accurate of the cheaper ones
-    assert choice.dearer is OPTIONS[5]  # not the next, which is worse
-    assert choice.meets_tolerance
-    assert choice.meets_budget
-
-
-def test_too_dear(scene):
-    """No money for it: the cheapest within the tolerance is named."""
-    choice = chosen(replace(scene, budget=replace(scene.budget, ms=3.5)), OPTIONS)
-    assert choice.chosen is None
-    assert choice.nearest is OPTIONS[3]
-    assert choice.meets_tolerance
-    assert not choice.meets_budget
-
-
-def test_none_is_good_enough(scene):
-    """The most accurate within the budget."""
-    choice = chosen(replace(scene, tolerance=0.001), OPTIONS)
-    assert choice.chosen is None
-    assert choice.nearest is OPTIONS[3]
-    free = chosen(replace(scene, tolerance=0.001, budget=replace(scene.budget, ms=None)), OPTIONS)
-    assert free.nearest is OPTIONS[5]
-    assert free.dearer is None
-    assert chosen(replace(scene, tolerance=0.5), OPTIONS).cheaper is None
+@pytest.mark.parametrize(
+    ("tolerance", "ms", "expected"),
+    [
+        # Of the cheaper ones the most accurate; not the next, which is worse, but the next that is better.
+        (0.02, 5.0, {"chosen": 3, "nearest": 3, "cheaper": 1, "dearer": 5, **WITHIN_LIMITS}),
+        # No money for it: the cheapest within the tolerance is named.
+        (0.02, 3.5, {"chosen": None, "nearest": 3, "meets_tolerance": True, "meets_budget": False}),
+        # None is good enough: the most accurate within the budget, or of all.
+        (0.001, 5.0, {"chosen": None, "nearest": 3}),
+        (0.001, None, {"nearest": 5, "dearer": None}),
+        (0.5, 5.0, {"cheaper": None}),
+    ],
+    ids=["the cheapest that serves", "too dear", "none is good enough", "at any price", "all are good enough"],
+)
+def test_choice(scene, tolerance, ms, expected):
+    choice = chosen(replace(scene, tolerance=tolerance, budget=replace(scene.budget, ms=ms)), OPTIONS)
+    for name, value in expected.items():
+        assert getattr(choice, name) is (OPTIONS[value] if type(value) is int else value)
 
 
 def test_a_hair_is_not_worth_its_price(scene):

@@ -94,11 +94,7 @@ def test_defaults(written):
     assert math.isinf(scene.radius)
     assert (scene.pixel, scene.resolution) == ((0.5, 0.5), (80, 60))
     assert (scene.unit, scene.budget.ms, scene.layers) == ("mm", None, None)
-
-
-def test_layers_beside_a_material_have_colours(written):
-    stack = "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"
-    scene = read(written("", stack))
+    scene = read(written("", "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"))  # they have colours
     assert [medium.layers[0].mu_a for medium in scene.layers.media] == [1.0, 2.0, 3.0]
 
 
