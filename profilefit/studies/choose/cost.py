@@ -132,7 +132,8 @@ def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tu
         frame = _least(stage, scene, SeparableFilter(), Sampling(YARDSTICK_TAPS), "frame")
         works: list[tuple[str, By, tuple[int, int]]] = [("separable", SeparableFilter(), TAPS)]
         works += [(source(law), law, SAMPLES) for law in laws.values()]
-        fixed, each = {}, {}
+        fixed: dict[str, float] = {}
+        each: dict[str, float] = {}
         for key, law, numbers in works:
             times = [_least(stage, scene, law, Sampling(number), "scatter") / frame for number in numbers]
             each[key] = max((times[1] - times[0]) / (numbers[1] - numbers[0]), 0.0)

@@ -27,7 +27,6 @@ from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.laws.evaluate import POSITIVE
 from profilefit.shader import emit
 
-Codes = NDArray[np.int8]
 Mask = NDArray[np.bool_]
 PROFILE, CDF, SAMPLE, PDF = "R_d", "cdf", "sample", "pdf"
 QUANTITIES = (PROFILE, CDF, SAMPLE, PDF)
@@ -290,7 +289,7 @@ def judged(
     dtype: type,
     dim: Mask | bool = False,
     wrong_way: Mask | None = None,
-) -> Codes:
+) -> NDArray[np.int8]:
     """Return the class of every cell: not judged without a reference, where the error is NaN or the bound infinite.
 
     value, reference, error  of one shape;  bound  largest error that counts as right;  dtype  format of `value`

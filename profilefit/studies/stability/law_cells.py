@@ -137,28 +137,23 @@ def _wrong_way(name: str, value: Floats, reference: Reference) -> Mask | None:
 
 
 def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> dict[str, Floats]:
+    r, xi, alpha, mfp = at.arguments
     if arithmetic in (cells.FLOAT64, cells.FLOAT32):
-        r, xi, alpha, mfp = at.arguments
         if arithmetic == cells.FLOAT32:
-            law, r, xi, alpha, mfp = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), (law, *at.arguments))
+            law, r, xi, alpha, mfp = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), (law, r, xi, alpha, mfp))
         sampler = dense_grid.drawn_by(law)
         profile, cdf = law.profile(r, alpha, mfp), law.cdf(r, alpha, mfp)
         values: tuple = profile, cdf, sampler.sample(xi, alpha, mfp), sampler.pdf(r, alpha, mfp)
     else:
-        values = _of_text(law, arithmetic, *at.arguments)
+        text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
+        if arithmetic == cells.STORED16:
+            alpha = _stored_albedo(text, alpha)
+        calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
+        values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
+        if arithmetic == cells.STORED16:
+            with np.errstate(over="ignore"):
+                values = tuple(each.astype(np.float16) for each in values)
     return dict(zip(cells.QUANTITIES, (np.asarray(each, float) for each in values), strict=True))
-
-
-def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
-    text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
-    if arithmetic == cells.STORED16:
-        alpha = _stored_albedo(text, alpha)
-    calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
-    values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
-    if arithmetic != cells.STORED16:
-        return values
-    with np.errstate(over="ignore"):
-        return tuple(each.astype(np.float16) for each in values)
 
 
 def _stored_albedo(text: RoundedText, alpha: Floats) -> Floats:

@@ -164,11 +164,16 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
     rates = stopwatch.take_turns({one.key: partial(run, one) for one in every}, sizes.turns, track, "truths")
     points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in every)
-    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(every, rates).items())
+    first: dict[str, float] = {}  # what a method's very first call took longer than later ones: it compiles for all
+    for one in every:
+        more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
+        name = f"{one.method} ({one.annuli.panel})"
+        first[name] = first.get(name, 0.0) + max(more, 0.0)
+    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in first.items())
     title = f"Energies of annuli at {ALPHAS.size} albedos, and of a stack: seconds against error"
     panels = [
-        Panel(one.panel, one.title, *axes, tuple(p for p in points if p.panel == one.panel), joined=True)
-        for one, axes in ((MATCHED, AXES), (REFRACTING, AXES), (STACK, STACK_AXES))
+        Panel(case.panel, case.title, *axes, tuple(p for p in points if p.panel == case.panel), joined=True)
+        for case, axes in ((MATCHED, AXES), (REFRACTING, AXES), (STACK, STACK_AXES))
     ]
     traced = tuple(replace(point, panel="tracers") for point in panels[0].points if point.method != EXACT)
     panels.insert(1, Panel("tracers", "the same without the exact solution", *AXES, traced, joined=True))
@@ -210,16 +215,6 @@ def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], e
     }
     seconds = WithSpread.of(rates.seconds(contestant.key))
     return Point(case.panel, method, label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
-
-
-def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
-    """Return what a method's very first call took longer than later ones [s]: the first effort compiles for all."""
-    first: dict[str, float] = {}
-    for one in contestants:
-        more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
-        name = f"{one.method} ({one.annuli.panel})"
-        first[name] = first.get(name, 0.0) + max(more, 0.0)
-    return first
 
 
 def scalar_tracer(trace: Callable, photons: int, seed: int) -> RingEnergies:
