@@ -67,24 +67,15 @@ def normalisation():
     return NORMALISATION
 
 
-def _published(law, name):
-    return next(dict(s.constants) for s in SETS if (s.law, s.name) == (law, name))
+def _published(kind, law, name):
+    """A fixture of a law with published constants."""
+    constants = next(dict(s.constants) for s in SETS if (s.law, s.name) == (law, name))
+    return pytest.fixture(scope="session")(lambda: kind(Setting(), NORMALISATION, **constants))
 
 
-@pytest.fixture(scope="session")
-def liang():
-    """As printed, with b0 = 0.0641."""
-    return Liang(Setting(), NORMALISATION, **_published("liang", "corrected"))
-
-
-@pytest.fixture(scope="session")
-def liang_printed():
-    return Liang(Setting(), NORMALISATION, **_published("liang", "published"))
-
-
-@pytest.fixture(scope="session")
-def burley():
-    return Burley(Setting(), NORMALISATION, **_published("burley", "published"))
+liang = _published(Liang, "liang", "corrected")  # as printed, with b0 = 0.0641
+liang_printed = _published(Liang, "liang", "published")
+burley = _published(Burley, "burley", "published")
 
 
 @pytest.fixture(scope="session")
@@ -154,14 +145,10 @@ class Tallies:
 
     def profiles(self, counts):
         factor, dropped = covariance_factor(counts, self.weights, self.photons, 5)
-        value = self.energy(counts)
-        error = np.sqrt(np.sum(factor**2, axis=2)).T
-        effective = np.full_like(value, 1e6)
-        rest = np.zeros(self.alpha.size)
+        value, error = self.energy(counts), np.sqrt(np.sum(factor**2, axis=2)).T
+        rings = self.alpha, self.edges, value, error, np.full_like(value, 1e6), np.zeros(self.alpha.size)
         covariance = Covariance(factor, value, self.photons, dropped)
-        return Profiles(
-            self.alpha, self.edges, value, error, effective, rest, "orders", Setting(), self.photons, covariance
-        )
+        return Profiles(*rings, "orders", Setting(), self.photons, covariance)
 
 
 class Line(AlbedoLaw):

@@ -28,15 +28,9 @@ def test_it():
 def test_over_its_budget_a_file_fails_the_run(tmp_path, mark, budget, status):
     (tmp_path / "test_burns.py").write_text(BURNS.format(mark=mark))
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow: here, too\n")
-    words = ["-p", "tests.seconds", "-p", "no:cacheprovider", "-n", "1", "--budget", str(budget)]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *words],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    words = ["-m", "pytest", "-p", "tests.seconds", "-p", "no:cacheprovider", "-n", "1", "--budget", str(budget)]
+    where = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
+    done = subprocess.run([sys.executable, *words], **where, capture_output=True, text=True, timeout=120)
     assert done.returncode == status, done.stdout
     assert "1 passed" in done.stdout
     assert ("test_burns.py: 0." in done.stdout) == bool(status)

@@ -38,13 +38,12 @@ class Option:
     @property
     def label(self) -> str:
         """Name in a table."""
-        if self.kind == "nothing":
-            return "nothing (Lambert)"
-        if self.kind == "separable":
-            return f"separable, {self.number} taps"
-        if self.kind == "gaussians":
-            return f"{self.count} Gaussians, {self.number} taps each"
-        return f"{self.name}, {self.number} samples"
+        of_filters = {
+            "nothing": "nothing (Lambert)",
+            "separable": f"separable, {self.number} taps",
+            "gaussians": f"{self.count} Gaussians, {self.number} taps each",
+        }
+        return of_filters.get(self.kind, f"{self.name}, {self.number} samples")
 
 
 NOTHING = Option("nothing")

@@ -132,14 +132,14 @@ def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tu
         frame = _least(stage, scene, SeparableFilter(), Sampling(YARDSTICK_TAPS), "frame")
         works: list[tuple[str, By, tuple[int, int]]] = [("separable", SeparableFilter(), TAPS)]
         works += [(source(law), law, SAMPLES) for law in laws.values()]
-        lines = {}
+        fixed: dict[str, float] = {}
+        each: dict[str, float] = {}
         for key, law, numbers in works:
             times = [_least(stage, scene, law, Sampling(number), "scatter") / frame for number in numbers]
-            each = max((times[1] - times[0]) / (numbers[1] - numbers[0]), 0.0)
-            lines[key] = (max(times[0] - each * numbers[0], 0.0), each)
-    fixed, each_one = ({key: line[i] for key, line in lines.items()} for i in (0, 1))
-    scatter = fixed["separable"] + YARDSTICK_TAPS * each_one["separable"]
-    return Ratios(renderer(context), max(1.0 - scatter, 0.0), fixed, each_one)
+            each[key] = max((times[1] - times[0]) / (numbers[1] - numbers[0]), 0.0)
+            fixed[key] = max(times[0] - each[key] * numbers[0], 0.0)
+    scatter = fixed["separable"] + YARDSTICK_TAPS * each["separable"]
+    return Ratios(renderer(context), max(1.0 - scatter, 0.0), fixed, each)
 
 
 def _least(stage: Stage, scene: Head, law: By, sampling: Sampling, passes: str) -> float:

@@ -104,8 +104,7 @@ def averaged(share: Beyond, x: Floats, pixel: float, mfp: float, radius: float, 
 def _within(share: Beyond, mfp: float, radius: float) -> CubicSpline:
     """Return I(s) of arcs up to half the circle, by the way from u to u of s = s0 sinh u."""
     first = 1e-3 * min(mfp, radius)
-    last = np.arcsinh(np.pi * radius / first)
-    u = np.linspace(0.0, last, ARCS)
+    u = np.linspace(0.0, np.arcsinh(np.pi * radius / first), ARCS)
     s = first * np.sinh(u)
     middle = 0.5 * (s[1:] + s[:-1])
     fall = -np.diff(share(2.0 * radius * np.sin(np.minimum(0.5 * s / radius, 0.5 * np.pi)) / mfp))
@@ -265,8 +264,7 @@ def filtered(option: Option, case: Case, light: ReferenceLight, channel: int, x:
             seen = np.abs(middle) < case.radius
             depth = np.sqrt(np.maximum(case.radius**2 - middle**2, 0.0)) - np.sqrt(case.radius**2 - x[:, None] ** 2)
             lost = np.where(seen, np.minimum(FOLLOW / np.max(stretches) * np.abs(depth), 1.0), 1.0)
-        lit = np.where(place > 0, 1.0, lost)
-        total += share[channel] * (lit @ taps[:, channel])
+        total += share[channel] * (np.where(place > 0, 1.0, lost) @ taps[:, channel])
     return total
 
 
@@ -320,10 +318,7 @@ def estimates(law: ProfileLaw, alpha: tuple[float, ...], samples: int, case: Cas
 
 
 def _met(side: Floats, across: Floats, x: Floats, case: Case) -> tuple[Floats, Floats]:
-    """Return the distance at which each sample's ray meets the tangent plane of its pixel, and the area it stands for.
-
-    Beside the cylinder the area is 0.
-    """
+    """Return how far each sample's ray goes to the tangent plane of its pixel, and its area, 0 beside the cylinder."""
     if case.is_flat:
         return side, np.ones_like(side)
     radius = case.radius

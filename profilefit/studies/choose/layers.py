@@ -15,20 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
+from mcml_sim import Estimate, Grid, Medium, Setting, simulate, simulate_orders
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack
-from profilefit.scenes.layers.half_space import (
-    FARTHEST,
-    NEAREST,
-    RINGS,
-    WHITE,
-    RingShares,
-    nearest_length,
-    one_half_space,
-    places,
-)
+from profilefit.scenes.layers import half_space
+from profilefit.scenes.layers.half_space import RingShares
 from profilefit.scenes.layers.passes import alike_error
 from profilefit.studies.choose.case import Within
 
@@ -77,35 +69,37 @@ def one_layer(
     tolerance  share of white, which says how many photons it takes, unless `photons` does
     progress   show a bar on stderr; by default only if that is a terminal
     """
-    n = stack.layers[0].n / stack.n_above
-    if photons is None and _is_solved(stack):
-        near = one_half_space(stack, illumination, within.mfp)
+    first = stack.layers[0]
+    n = first.n / stack.n_above
+    is_isotropic = all(layer.g == 0 and layer.n == first.n and layer.mu_t > 0 for layer in stack.layers)
+    # Exact light is known of the stack, and of the half spaces that are tried for it.
+    is_solved = is_isotropic and stack.is_half_space and first.n >= stack.n_above and first.mu_s > 0
+    if photons is None and is_solved:
+        near = half_space.one_half_space(stack, illumination, within.mfp)
         return OneLayer(near.reflectance, near.alpha, near.mfp, n, near.error, 0.0, 0, alike_error(stack))
     number = int(np.clip((PRECISE / tolerance) ** 2, FEWEST, MOST)) if photons is None else photons
     reduced = [layer.mu_a + layer.mu_s * (1.0 - layer.g) for layer in stack.layers]
     lengths = [1.0 / mu for mu in reduced if mu > 0]
     if not lengths:
         raise InputError(f"layers must scatter or absorb somewhere, got {len(reduced)} that are clear")
-    edges = np.append(0.0, np.geomspace(NEAREST * min(lengths), FARTHEST * max(lengths), RINGS))
+    ends, rings = (half_space.NEAREST, half_space.FARTHEST), half_space.RINGS
+    edges = np.append(0.0, np.geomspace(ends[0] * min(lengths), ends[1] * max(lengths), rings))
     tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress, illumination=illumination)
     reflectance = float(tally.diffuse_reflectance.value)
-    scaled = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
+    scaled = np.append(0.0, np.geomspace(*ends, rings))
     setting = Setting(illumination, n)
     white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=setting, progress=progress)
-    alpha = _alpha(white, reflectance)
+    palest = 1.0 - half_space.WHITE
+    most = float(white.reflectance(palest).value)
+    if not 0 < reflectance < most:
+        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
+    alpha = float(brentq(lambda a: float(white.reflectance(a).value) - reflectance, 0.0, palest))
     of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
-    mfp = nearest_length(of_stack, of_one, within.mfp)
+    mfp = half_space.nearest_length(of_stack, of_one, within.mfp)
     error, standard_error = _difference(of_stack, of_one, mfp, within)
     once = alike_error(stack)
     return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number, once)
-
-
-def _is_solved(stack: Medium) -> bool:
-    """Return whether exact light is known of it, and of the half spaces that are tried for it."""
-    n = stack.layers[0].n
-    is_isotropic = all(layer.g == 0 and layer.n == n and layer.mu_t > 0 for layer in stack.layers)
-    return is_isotropic and stack.is_half_space and n >= stack.n_above and stack.layers[0].mu_s > 0
 
 
 def of_each_colour(
@@ -125,17 +119,9 @@ def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:
     return RingShares.of(edges, np.append(energy.value, overflow.value), spread)
 
 
-def _alpha(white: Orders, reflectance: float) -> float:
-    """Return the albedo that reflects as much."""
-    most = float(white.reflectance(1.0 - WHITE).value)
-    if not 0 < reflectance < most:
-        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
-    return float(brentq(lambda alpha: float(white.reflectance(alpha).value) - reflectance, 0.0, 1.0 - WHITE))
-
-
 def _difference(stack: RingShares, one: RingShares, mfp: float, within: Within) -> tuple[float, float]:
     """Return the root mean square difference and its standard error, by replicates of both with their rings' errors."""
-    random, d = np.random.default_rng(SEED), places(mfp, within.mfp)
+    random, d = np.random.default_rng(SEED), half_space.places(mfp, within.mfp)
     apart = stack.beyond(d) - one.beyond(d / mfp)
 
     def drawn(rings: RingShares, at: Floats) -> Floats:

@@ -71,6 +71,7 @@ class Requirements:
 
 
 Pixels = Annotated[int, Field(ge=1, le=16384)]
+Resolution = Annotated[tuple[Pixels, Pixels], LISTED, words("two whole numbers of pixels in 1 ... 16384")]
 
 
 class ChooseTable(Declared):
@@ -86,9 +87,7 @@ class ChooseTable(Declared):
     pixels: Annotated[int, Field(ge=1, le=100)] = 2
     ms: Annotated[float, Field(gt=0.0)] | None = None
     gpu: Annotated[str, OneOf(*GPUS)] = YARDSTICK
-    resolution: Annotated[tuple[Pixels, Pixels], LISTED, words("two whole numbers of pixels in 1 ... 16384")] | None = (
-        None
-    )
+    resolution: Resolution | None = None
     coverage: Tolerance = 0.5
 
 
@@ -108,7 +107,11 @@ def read(path: Path | str, content: Table | None = None) -> Requirements:
     """
     content = read_toml(path) if content is None else content
     file, kind = str(path), content.get("scene")
-    _refuse_older(file, content)
+    tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
+    if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
+        today = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
+        first = "" if "scene" in content else 'scene = "skin" and '
+        raise InputError(f"{file}: keys are of an older format: write {first}{today}")
     if kind not in ("skin", "layers"):
         known = ("skin", "layers") if isinstance(kind, str) and kind in SCENES else SCENES
         got = "nothing" if kind is None else shown(kind)
@@ -134,25 +137,8 @@ def read(path: Path | str, content: Table | None = None) -> Requirements:
             f"at least {LEAST_RADIUS:g} times the longest mean free path, {least:.3g}, and at most {LENGTHS[1]:g} mm"
         )
         raise InputError(f"{file}: [{CHOOSE}] radius must be {accepted}, got {shown(limits.radius)}")
-    return Requirements(
-        "mm",
-        setting,
-        material.reflectance,
-        material.mfp,
-        limits.pixel or (request.camera.height / request.size[1],) * 2,
-        limits.radius,
-        request.technique.tolerance,
-        within,
-        Budget(limits.ms, limits.gpu, limits.coverage),
-        limits.resolution or request.size,
-        stack,
-    )
-
-
-def _refuse_older(file: str, content: Table) -> None:
-    """Raise InputError for the keys of an older format, which says what is written today."""
-    tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
-    if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
-        told = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
-        first = "" if "scene" in content else 'scene = "skin" and '
-        raise InputError(f"{file}: keys are of an older format: write {first}{told}")
+    pixel = limits.pixel or (request.camera.height / request.size[1],) * 2
+    lengths = "mm", setting, material.reflectance, material.mfp, pixel, limits.radius
+    budget = Budget(limits.ms, limits.gpu, limits.coverage)
+    resolution = limits.resolution or request.size
+    return Requirements(*lengths, request.technique.tolerance, within, budget, resolution, stack)

@@ -127,11 +127,16 @@ def steps_for(steepness: float) -> int:
 def sea_need(of: SeaRequest) -> SeaNeed:
     """Return what a scene needs, by closed forms: nothing is drawn."""
     world = of.world
+    down = -_views(of)[:, 2]
+    above = of.camera.eye[2] - world.floor.mean
+    # Cosine to the vertical of the steepest view that meets the floor no farther away than one sees; a picture's least
+    # is at a corner.
+    least = max(above / reach_of(world), float(np.min(down)))
     return SeaNeed(
         haze=_haze(of, world),
         focus=focus(world.sea, world.depth, world.n, world.tilt),
         light=world.floor.steepest * steepest_ray(world),
-        view=world.floor.steepest * _steepest_view(of, world),
+        view=world.floor.steepest * float(np.sqrt(max(1.0 / least**2 - 1.0, 0.0))),
     )
 
 
@@ -163,14 +168,6 @@ def _views(of: SeaRequest) -> Floats:
     sides = ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
     views = np.array([forward + x * right + y * up for x, y in sides])
     return np.asarray(views / np.linalg.norm(views, axis=1, keepdims=True))
-
-
-def _steepest_view(of: SeaRequest, world: World) -> float:
-    """Return tangent to the vertical of the steepest view that meets the floor no farther away than one sees [-]."""
-    down = -_views(of)[:, 2]
-    above = of.camera.eye[2] - world.floor.mean
-    least = max(above / reach_of(world), float(np.min(down)))  # cosine; the least of a picture is at a corner
-    return float(np.sqrt(max(1.0 / least**2 - 1.0, 0.0)))
 
 
 ANGLES = (0, 30, 45, 60, 75, 85)  # of the view to the normal [degrees]

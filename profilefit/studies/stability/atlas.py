@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
@@ -62,10 +63,7 @@ Job = tuple[str, Callable[[], Findings]]
 
 
 def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
-    """Return what there is to do, a job a subject: all of it, or what is named.
-
-    Raises InputError for an unknown name.
-    """
+    """Return what there is to do, a job a subject: all of it, or what is named; InputError for an unknown name."""
     requested, records = list(names), Records.of(folder)
     profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
     albedos = catalogue.albedo_laws(records, matched=False)
@@ -73,14 +71,13 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     def chosen(named: LoadedLaw, label: str) -> bool:
         return bool({label, named.name, *named.records} & set(requested)) if requested else not quick or label in QUICK
 
-    todo: list[Job] = []
-    for one in profiles:
-        if chosen(one, one.label):
-            more = DERIVED_IF_NAMED.get(one.label, ()) if requested else ()
-            todo.append((one.label, partial(_of_law, one, records, quick, more)))
-    todo += [(map_label(one), partial(_of_map, one, records, quick)) for one in albedos if chosen(one, map_label(one))]
+    def job(name: str, look: Callable[..., Iterable[Cells | FitCase]], *of: Any) -> Job:
+        return name, partial(_findings, name, look, *of, records, quick)
+
+    todo = [job(one.label, _of_law, one, bool(requested)) for one in profiles if chosen(one, one.label)]
+    todo += [job(map_label(one), _of_map, one) for one in albedos if chosen(one, map_label(one))]
     usual = () if requested or quick else set(FUNCTIONS) - set(IF_NAMED)
-    todo += [(name, partial(of, records, quick)) for name, of in FUNCTIONS.items() if name in {*requested, *usual}]
+    todo += [job(name, look) for name, look in FUNCTIONS.items() if name in {*requested, *usual}]
     every = [*profiles, *albedos]
     known = {*FUNCTIONS, *(name for name, _ in todo), *(n for one in every for n in (one.name, *one.records))}
     unknown = [name for name in requested if name not in known]
@@ -102,53 +99,54 @@ def run(todo: list[Job]) -> Iterator[Findings]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _of_law(named: LoadedLaw, folder: Records, quick: bool, more: tuple[str, ...]) -> Findings:
-    limits = law_cells.limits_of(named, folder)
-    arithmetics = QUICK_ARITHMETICS if quick else law_cells.COMPUTED
-    text = map_cells.in_reduced(named)
-    cells = [*law_cells.cells_of(text, limits, arithmetics), *law_cells.model_cells(named, limits)]
-    cells += misuse.of_law(text)
+def _findings(name: str, look: Callable[..., Iterable[Cells | FitCase]], *given: Any) -> Findings:
+    """Return the cells and the fits that a function yields."""
+    every = list(look(*given))
+    cells = tuple(one for one in every if isinstance(one, Cells))
+    fits = tuple(one for one in every if isinstance(one, FitCase))
+    return Findings(name, cells, tuple(region for each in cells for region in regions_of(each)), fits)
+
+
+def _of_law(named: LoadedLaw, is_named: bool, folder: Records, quick: bool) -> Iterator[Cells]:
+    limits, text = law_cells.limits_of(named, folder), map_cells.in_reduced(named)
+    yield from law_cells.cells_of(text, limits, QUICK_ARITHMETICS if quick else law_cells.COMPUTED)
+    yield from law_cells.model_cells(named, limits)
+    yield from misuse.of_law(text)
     if named.label in DERIVED and not quick:
-        cells += gradients.of_law(text, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
-    return _findings(named.label, cells)
+        more = DERIVED_IF_NAMED.get(named.label, ()) if is_named else ()
+        yield from gradients.of_law(text, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
 
 
-def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Findings:
+def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Iterator[Cells]:
     text = map_cells.in_reduced(named)
-    cells = [*map_cells.cells_of(named, folder), *misuse.of_map(text)]
+    yield from map_cells.cells_of(named, folder)
+    yield from misuse.of_map(text)
     if named.label in DERIVED_MAPS and not quick:
-        cells += gradients.of_map(text, bounds.valid_map(named, folder))
-    return _findings(map_label(named), cells)
+        yield from gradients.of_map(text, bounds.valid_map(named, folder))
 
 
-def _of_exact(folder: Records, quick: bool) -> Findings:
-    settings = SETTINGS[:1] if quick else SETTINGS
-    cells = [each for s in settings for each in exact_cells.half_space_cells(s, catalogue.normalisation(s, folder))]
+def _of_exact(folder: Records, quick: bool) -> Iterator[Cells]:
+    for setting in SETTINGS[:1] if quick else SETTINGS:
+        yield from exact_cells.half_space_cells(setting, catalogue.normalisation(setting, folder))
     if not quick:
-        cells += exact_cells.refracting_cells()
-    return _findings("exact", [*cells, *misuse.of_exact()])
+        yield from exact_cells.refracting_cells()
+    yield from misuse.of_exact()
 
 
-def _of_solver(folder: Records, quick: bool) -> Findings:
-    cases: list[FitCase] = []
+def _of_solver(folder: Records, quick: bool) -> Iterator[FitCase]:
     for name, objective, lanes in FITTED[:2] if quick else FITTED:
         law = (catalogue.albedo_law if name in MAPS else catalogue.load)(name, folder=folder)
-        cases += fit_cases.fits_of(law, objective, name, lanes)
+        yield from fit_cases.fits_of(law, objective, name, lanes)
     start = catalogue.load("liang", "corrected", folder=folder)
-    return Findings("solver", (), (), (*cases, *fit_cases.trimmed_fits(start)))  # type: ignore[arg-type]
+    yield from fit_cases.trimmed_fits(start)  # type: ignore[arg-type]
 
 
-FUNCTIONS: dict[str, Callable[[Records, bool], Findings]] = {
+FUNCTIONS: dict[str, Callable[[Records, bool], Iterable[Cells | FitCase]]] = {
     "exact": _of_exact,
-    "convert": lambda *_: _findings("convert", [*map_cells.conversion_cells(), *misuse.of_convert()]),
+    "convert": lambda *_: [*map_cells.conversion_cells(), *misuse.of_convert()],
     "solver": _of_solver,
-    "stacks": lambda folder, _: _findings("stacks", stacks.cells_of(folder.folder)),
-    "heart": lambda *_: _findings("heart", scenes.heart_cells()),
-    "sea": lambda *_: _findings("sea", scenes.sea_cells()),
-    "fur": lambda *_: _findings("fur", scenes.fur_cells()),
+    "stacks": lambda folder, _: stacks.cells_of(folder.folder),
+    "heart": lambda *_: scenes.heart_cells(),
+    "sea": lambda *_: [*scenes.of_hits(), scenes.of_level_floors(), scenes.of_beam(), *scenes.of_segment()],
+    "fur": lambda *_: [*scenes.of_shells(), scenes.of_slabs(), *scenes.of_shadow()],
 }
-
-
-def _findings(name: str, cells: Iterable[Cells]) -> Findings:
-    known = tuple(cells)
-    return Findings(name, known, tuple(region for each in known for region in regions_of(each)))

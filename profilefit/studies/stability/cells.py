@@ -27,7 +27,6 @@ from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.laws.evaluate import POSITIVE
 from profilefit.shader import emit
 
-Codes = NDArray[np.int8]
 Mask = NDArray[np.bool_]
 PROFILE, CDF, SAMPLE, PDF = "R_d", "cdf", "sample", "pdf"
 QUANTITIES = (PROFILE, CDF, SAMPLE, PDF)
@@ -89,6 +88,9 @@ class ArgumentAxis:
         return int(np.argmin(np.abs(self.values - value)))
 
 
+Axes = tuple[ArgumentAxis, ...]
+
+
 def axis(name: str, values: ArrayLike, unit: str = "-") -> ArgumentAxis:
     """Return the axis of some numbers."""
     return ArgumentAxis(name, unit, np.array(values, float))
@@ -100,19 +102,10 @@ def labelled(name: str, labels: Iterable[str]) -> ArgumentAxis:
     return ArgumentAxis(name, "-", np.arange(len(words), dtype=float), words)
 
 
-def alpha_axis(dtype: type) -> ArgumentAxis:
-    """Return single-scattering albedos in [0, 1]."""
-    return axis("α", _cells(dtype, (*ALPHA, *_ends(dtype), *_around_one())))
-
-
-def reflectance_axis(dtype: type) -> ArgumentAxis:
-    """Return total reflectances in [0, 1]."""
-    return axis("A", _cells(dtype, (*REFLECTANCE, *_ends(dtype), *_around_one())))
-
-
-def share_axis(dtype: type) -> ArgumentAxis:
-    """Return uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
-    return axis("ξ", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(), *_pairs(dtype, (0.1, 0.5)))))
+def unit_axis(name: str, dtype: type) -> ArgumentAxis:
+    """Return albedos α, reflectances A or uniform numbers ξ in [0, 1], of which no generator should give 1 itself."""
+    between = {"α": ALPHA, "A": REFLECTANCE, "ξ": (*SHARE, *_pairs(dtype, (0.1, 0.5)))}[name]
+    return axis(name, _cells(dtype, (*between, *_ends(dtype), *(1.0 - 2.0**-k for k in POWERS), 1.0)))
 
 
 def radius_axis(dtype: type) -> ArgumentAxis:
@@ -153,10 +146,6 @@ def _ends(dtype: type) -> tuple[float, ...]:
     return (0.0, float(limits.smallest_subnormal), float(limits.tiny), *(2.0**-k for k in POWERS))
 
 
-def _around_one() -> tuple[float, ...]:
-    return (*(1.0 - 2.0**-k for k in POWERS), 1.0)
-
-
 def _pairs(dtype: type, values: Iterable[float]) -> list[float]:
     """Return values and their next neighbours."""
     return [float(one) for value in values for one in (dtype(value), np.nextafter(dtype(value), dtype(np.inf)))]
@@ -183,7 +172,8 @@ class ArgumentGrid:
     @classmethod
     def of(cls, dtype: type, beyond: bool = True) -> ArgumentGrid:
         """Return the grid of a format; `beyond` takes in lengths that the law does not accept."""
-        return cls(dtype, alpha_axis(dtype), radius_axis(dtype), share_axis(dtype), length_axis(dtype, beyond))
+        alpha, xi = unit_axis("α", dtype), unit_axis("ξ", dtype)
+        return cls(dtype, alpha, radius_axis(dtype), xi, length_axis(dtype, beyond))
 
     @property
     def arguments(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -200,10 +190,7 @@ class ArgumentGrid:
 
 
 class Verdict(enum.IntEnum):
-    """Class of a cell; of several that hold, the last one here counts.
-
-    NOT_JUDGED  a number, not negative and in order, without a reference value here
-    """
+    """Class of a cell; of several, the last one here counts. NOT_JUDGED: a number in order, but without a reference."""
 
     RIGHT = 0
     OUTSIDE = 1
@@ -261,7 +248,7 @@ class Cells:
     own: bool
     quantity: str
     arithmetic: str
-    axes: tuple[ArgumentAxis, ...]
+    axes: Axes
     value: Floats
     reference: Floats
     error: Floats
@@ -302,7 +289,7 @@ def judged(
     dtype: type,
     dim: Mask | bool = False,
     wrong_way: Mask | None = None,
-) -> Codes:
+) -> NDArray[np.int8]:
     """Return the class of every cell: not judged without a reference, where the error is NaN or the bound infinite.
 
     value, reference, error  of one shape;  bound  largest error that counts as right;  dtype  format of `value`
@@ -332,10 +319,7 @@ def judged(
 
 
 def steps_down(value: Floats, along: int, dtype: type, scale: Floats | float = 0.0) -> Mask:
-    """Return where a value is less than its neighbour before it along an axis, by more than rounding.
-
-    `scale` adds to the size that the rounding is of.
-    """
+    """Return where a value falls from its neighbour before it on an axis, by more than rounding of it and `scale`."""
     moved, size = (np.moveaxis(np.broadcast_to(one, value.shape), along, 0)[:-1] for one in (value, scale))
     lower, upper = moved, np.moveaxis(value, along, 0)[1:]
     with np.errstate(invalid="ignore", over="ignore"):

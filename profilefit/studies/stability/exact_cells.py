@@ -19,9 +19,10 @@ from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
 from mcml_sim.media.arrays import Floats
+from profilefit.laws.base import Range
 from profilefit.laws.rational import Normalisation
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import ArgumentAxis, Cells, Mask, absolute, axis, relative, steps_down, steps_up
+from profilefit.studies.stability.cells import Axes, Cells, Mask, absolute, axis, relative, steps_down, steps_up
 
 DECAY = "κ(α)"
 # What its own docstring promises of profile and cdf, and of a map that is fitted to A.
@@ -34,7 +35,8 @@ NEAR_SOURCE = 1e-4  # relative, of R_d closer than 1e-6 mfp, where its limit sta
 def half_space_cells(setting: Setting, normalisation: Normalisation) -> Iterator[Cells]:
     """Yield every function of a matched half space. Errors are those that more nodes show, or those of an identity."""
     name = "exact" if setting.illumination == "searchlight" else "exact, diffuse light"
-    alpha, x, xi = cells.alpha_axis(np.float64), cells.radius_axis(np.float64), cells.share_axis(np.float64)
+    alpha, xi = (cells.unit_axis(symbol, np.float64) for symbol in ("α", "ξ"))
+    x = cells.radius_axis(np.float64)
     low, high = cells.LENGTHS[np.float64]
     mfp = axis("l", (low, 1.0, high), "length")
     a = alpha.values[:, None, None]
@@ -65,7 +67,7 @@ def finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
     return np.asarray(by_albedo.by_alpha(by_albedo.cdf, x, alpha[:, None], setting, FINER))[..., None]
 
 
-def _profile(name: str, setting: Setting, places: tuple[ArgumentAxis, ...], value: Floats) -> Cells:
+def _profile(name: str, setting: Setting, places: Axes, value: Floats) -> Cells:
     """Return R_d against its own limit next to the source; beyond, what more nodes change.
 
     Where nothing is promised of it, for dark media and beyond 100 mfp, what they change is outside its range.
@@ -88,17 +90,11 @@ def _profile(name: str, setting: Setting, places: tuple[ArgumentAxis, ...], valu
 
 
 def _cells(
-    name: str,
-    quantity: str,
-    axes: tuple[ArgumentAxis, ...],
-    value: Floats,
-    reference: Floats,
-    error: Floats,
-    bound: float | None = None,
-    inside: Mask | bool = True,
-    **more: Any,
+    name: str, quantity: str, axes: Axes, *triple: Floats, bound: float = 0.0, inside: Mask | bool = True, **more: Any
 ) -> Cells:
-    given = axes, value, reference, error, BOUNDS[quantity] if bound is None else bound, inside
+    """Return cells of value, reference and error, by default within the bound of the quantity."""
+    value, reference, error = triple
+    given = axes, value, reference, error, bound or BOUNDS[quantity], inside
     more["unjudged"] = NO_LIMIT if quantity == cells.PROFILE else ""
     return Cells(name, True, quantity, cells.FLOAT64, *given, judge=inside, **more)
 
@@ -107,7 +103,7 @@ BARELY = 1.0 + 1e-9  # an index that hardly refracts
 SETTINGS = (Setting(n=BARELY), Setting(n=1.4), Setting("diffuse", n=3.0))
 # What the docstrings of `exact` and of `exact.solve` promise where surfaces refract.
 REFRACTING = {cells.PROFILE: 1e-7, cells.CDF: 2e-7, cells.REFLECTANCE_OF: 1e-7}
-REFRACTING_ALPHA, REFRACTING_X = (0.05, 0.999), (1e-3, 15.0)
+REFRACTING_ALPHA, REFRACTING_X = Range(0.05, 0.999), Range(1e-3, 15.0)
 PLATE_ALPHA = (0.0, 0.05, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0)
 THICKNESS = (1e-3, 0.03, 0.5, 3.0, 30.0, 1e3)  # [mfp]
 PLATE_INDEX = (1.0, 1.4, 3.0)
@@ -120,17 +116,16 @@ def refracting_cells() -> Iterator[Cells]:
     """Yield half spaces by albedo and radius, plates by albedo and thickness, and the profile of some of them."""
     for setting in SETTINGS:
         yield from _refracting(setting)
-    for n in PLATE_INDEX:
-        yield plates(n)
+    yield from map(plates, PLATE_INDEX)
     yield _plate_profiles()
 
 
 def _refracting(setting: Setting) -> Iterator[Cells]:
     name = f"exact, n = {setting.n:.10g}" + ("" if setting.illumination == "searchlight" else ", diffuse light")
-    alpha, x = cells.alpha_axis(np.float64), cells.radius_axis(np.float64)
+    alpha, x = cells.unit_axis("α", np.float64), cells.radius_axis(np.float64)
     a, r = alpha.values[:, None], x.values[None]
     closed, barely = Setting(setting.illumination), setting.n == BARELY
-    bound = REFRACTING[cells.PROFILE]
+    promised = REFRACTING[cells.PROFILE]
     with np.errstate(all="ignore"):
         profile = np.asarray(exact.profile(r, a, setting=setting))
         if barely:
@@ -138,19 +133,20 @@ def _refracting(setting: Setting) -> Iterator[Cells]:
         else:
             error = np.asarray(exact.error_estimate(r, a, setting=setting))
         limit = np.where(r == 0, np.inf, a * source_strength(setting) / (2 * np.pi * r))
-    sure = _within(a, REFRACTING_ALPHA)
+    sure = REFRACTING_ALPHA.holds(a)
     near = (r < SURE_X[0]) & sure
-    error = np.where(near, relative(profile, limit) * bound / NEAR_SOURCE, error)
-    reference, inside = np.where(near, limit, profile), near | sure & _within(r, REFRACTING_X)
-    yield _cells(name, cells.PROFILE, (alpha, x), profile, reference, error, 1e-6 if barely else bound, inside)
+    error = np.where(near, relative(profile, limit) * promised / NEAR_SOURCE, error)
+    reference, inside = np.where(near, limit, profile), near | sure & REFRACTING_X.holds(r)
+    bound = 1e-6 if barely else promised
+    yield _cells(name, cells.PROFILE, (alpha, x), profile, reference, error, bound=bound, inside=inside)
     cdf = np.asarray(exact.cdf(r, a, setting=setting))
-    if barely:
-        finer = np.asarray(exact.cdf(r, a, setting=closed))
-    else:
-        finer = finer_cdf(x.values, alpha.values, setting)[..., 0]
+    finer = (
+        np.asarray(exact.cdf(r, a, setting=closed)) if barely else finer_cdf(x.values, alpha.values, setting)[..., 0]
+    )
     bound = REFRACTING[cells.CDF]
     falls = steps_down(cdf, 1, np.float64, bound / np.finfo(float).eps / 16.0)
-    yield _cells(name, cells.CDF, (alpha, x), cdf, finer, absolute(cdf, finer), bound, sure, wrong_way=falls)
+    given = cdf, finer, absolute(cdf, finer)
+    yield _cells(name, cells.CDF, (alpha, x), *given, bound=bound, inside=sure, wrong_way=falls)
 
 
 def plates(n: float) -> Cells:
@@ -171,7 +167,7 @@ def plates(n: float) -> Cells:
         error[:, 0] = np.maximum(error[:, 0], np.where(np.abs(thin) > 0.02 * value[:, 0], np.abs(thin), 0.0))
     falls = steps_down(value, 0, np.float64) | steps_down(value, 1, np.float64) & (n == 1.0)
     name, bound = f"stack, n = {n:g}", REFRACTING[cells.REFLECTANCE_OF]
-    return _cells(name, cells.REFLECTANCE_OF, (alpha, thickness), value, reference, error, bound, wrong_way=falls)
+    return _cells(name, cells.REFLECTANCE_OF, (alpha, thickness), value, reference, error, bound=bound, wrong_way=falls)
 
 
 def plate(alpha: float, thickness: float, n: float) -> Medium:
@@ -188,9 +184,6 @@ def _plate_profiles() -> Cells:
     )
     seen = finer > SEEN * finer[:, [PLATE_X.index(1.0)]]
     error = relative(value, finer) * np.where(thickness.values[:, None] < THIN, PROFILE_BOUND / THIN_BOUND, 1.0)
-    inside = seen & (x.values >= REFRACTING_X[0]) | (x.values == 0)
-    return _cells("stack, n = 1.4", cells.PROFILE, (thickness, x), value, finer, error, PROFILE_BOUND, inside)
-
-
-def _within(values: Floats, ends: tuple[float, float]) -> Mask:
-    return (values >= ends[0]) & (values <= ends[1])
+    inside = seen & (x.values >= REFRACTING_X.low) | (x.values == 0)
+    given = value, finer, error
+    return _cells("stack, n = 1.4", cells.PROFILE, (thickness, x), *given, bound=PROFILE_BOUND, inside=inside)

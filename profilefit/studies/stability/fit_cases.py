@@ -70,10 +70,19 @@ def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[F
     label = f"{name}, {objective}"
 
     def solved(begins: Floats, data: list[Rings]) -> list[Solution]:
-        return [judged(one, names) for one in solve_batch(problem, begins, _stacked(law, data))]
+        laws = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(data), *np.shape(leaf))), law)
+        rings = jax.tree.map(lambda *leaves: np.stack(leaves), *data)
+        return [judged(one, names) for one in solve_batch(problem, begins, (laws, rings))]
 
     def case_of(case: str, value: str, begins: Floats, data: list[Rings], start: Floats | None = None) -> FitCase:
-        return _case(label, case, value, names, solved(begins, data), start)
+        solutions = solved(begins, data)
+        done = [one for one in solutions if one.converged]
+        least = min((one.cost for one in done), default=np.inf)
+        best = [one for one in done if one.cost <= least * (1.0 + SAME_COST) + 1e-20]
+        spread, worst = _spread(np.array([one.parameters for one in (done if case == NOISE else best)]), names, start)
+        results = Counter(re.split("[,:]", one.result)[0] for one in solutions)
+        shares = len(done) / len(solutions), len(best) / len(solutions)
+        return FitCase(label, case, value, *shares, spread, worst, tuple(results.most_common()))
 
     alone, usual = np.tile(own, (lanes, 1)), even_rings(ORDINARY, LAST)
     random = spread_out(own, lanes, SEED)
@@ -136,24 +145,6 @@ def _noisy(rings: Rings, photons: float, lane: int) -> Rings:
     energy = np.abs(np.asarray(rings.energy) + normal[0] * np.sqrt(np.asarray(rings.energy) / photons))
     beyond = np.abs(np.asarray(rings.beyond) + normal[1, :, 0] * np.sqrt(np.asarray(rings.beyond) / photons))
     return replace(rings, energy=energy, beyond=beyond)
-
-
-def _stacked(law: Constants, data: list[Rings]) -> Any:
-    """Return law and rings with a leading axis of lanes."""
-    laws = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(data), *np.shape(leaf))), law)
-    return laws, jax.tree.map(lambda *leaves: np.stack(leaves), *data)
-
-
-def _case(
-    label: str, case: str, value: str, names: tuple[str, ...], solutions: list[Solution], start: Floats | None
-) -> FitCase:
-    done = [one for one in solutions if one.converged]
-    least = min((one.cost for one in done), default=np.inf)
-    best = [one for one in done if one.cost <= least * (1.0 + SAME_COST) + 1e-20]
-    spread, worst = _spread(np.array([one.parameters for one in (done if case == NOISE else best)]), names, start)
-    results = Counter(re.split("[,:]", one.result)[0] for one in solutions)
-    shares = len(done) / len(solutions), len(best) / len(solutions)
-    return FitCase(label, case, value, *shares, spread, worst, tuple(results.most_common()))
 
 
 def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) -> tuple[float, str]:

@@ -20,11 +20,10 @@ from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import Cells, Mask, axis
+from profilefit.studies.stability.cells import Axes, Cells, Mask, axis
 from profilefit.studies.stability.map_cells import map_label
 
 Triple = tuple[Floats, Floats, Floats]
-Axes = tuple[cells.ArgumentAxis, ...]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)
 RADIUS = (0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1e6, np.inf)
 SHARE = (0.0, 1e-12, 1e-6, 1e-3, 0.008, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
@@ -36,7 +35,7 @@ WEIGHTS: Weights = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), 
 BOUND = 1e-4  # relative; derivatives that are less than a millionth of value over argument count as that
 LEAST = 1e-6
 # Where differences are taken: elsewhere the step, or what is left of the value, is rounding.
-SURE = {"r": (1e-3, 30.0), "ξ": (0.005, 0.99), "α": (1e-3, 0.9985), "A": (1e-3, 0.97)}
+SURE = {"r": Range(1e-3, 30.0), "ξ": Range(0.005, 0.99), "α": Range(1e-3, 0.9985), "A": Range(1e-3, 0.97)}
 INSIDE = "differentiate inside, alpha < 1, r > 0 and xi > 0, or by sqrt(1 - alpha), in which A is smooth"
 UNSURE = "differences are rounding there: only whether the derivative is a number is looked at"
 Function = Callable[[Any, Array, Array, Array], Array]
@@ -45,8 +44,6 @@ FUNCTIONS: dict[str, Function] = {
     cells.CDF: lambda law, r, alpha, mfp: law.cdf(r, alpha, mfp),
     cells.SAMPLE: lambda law, xi, alpha, mfp: law.sampler.sample(xi, alpha, mfp),
     cells.PDF: lambda law, r, alpha, mfp: law.sampler.pdf(r, alpha, mfp),
-}
-MAPS: dict[str, Function] = {
     cells.ALPHA_OF: lambda law, a, _, __: law.alpha(a),
     cells.REFLECTANCE_OF: lambda law, alpha, _, __: law.reflectance(alpha),
 }
@@ -60,7 +57,7 @@ def of_law(named: LoadedLaw, names: tuple[str, ...], holds: Range) -> Iterator[C
         first = axis(symbol, SHARE) if symbol == "ξ" else axis("r/l", RADIUS)
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
-        sure = valid & _within(symbol, u) & _within("α", a)
+        sure = valid & SURE[symbol].holds(u) & SURE["α"].holds(a)
         derivatives = _derivatives(FUNCTIONS[name], named.law, u, a, symbol, named.law.constant_names() != ())
         for by, triple in derivatives.items():
             yield _cells(named, named.label, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
@@ -72,16 +69,11 @@ def of_map(named: LoadedLaw, spans: tuple[Range, Range]) -> Iterator[Cells]:
     for (name, symbol, values), span in zip(ways, spans, strict=True):
         at = axis(symbol, values)
         u = at.values
-        derivatives = _derivatives(MAPS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
+        derivatives = _derivatives(FUNCTIONS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
-        sure = valid & _within(symbol, u)
+        sure = valid & SURE[symbol].holds(u)
         for by in (symbol, "constants"):
             yield _cells(named, map_label(named), f"∂{name}/∂{by}", (at,), derivatives[by], valid, sure)
-
-
-def _within(symbol: str, values: Floats) -> Mask:
-    low, high = SURE[symbol]
-    return (values >= low) & (values <= high)
 
 
 def _cells(named: LoadedLaw, label: str, quantity: str, axes: Axes, triple: Triple, valid: Mask, sure: Mask) -> Cells:

@@ -28,9 +28,8 @@ from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import ArgumentGrid, Cells, Mask, RoundedText, absolute, axis, relative
+from profilefit.studies.stability.cells import ArgumentGrid, Axes, Cells, Mask, RoundedText, absolute, axis, relative
 
-Axes = tuple[cells.ArgumentAxis, ...]
 # Of laws without a record: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
 MEASURED: dict[str, dict[str, float]] = {
     "burley_diffuse_mfp": {"rel": 0.156, "ks": 0.0658},
@@ -98,11 +97,14 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
     stored = arithmetic == cells.STORED16
     albedo = _stored_albedo(RoundedText(named.law, np.float32), at.arguments[2]) if stored else None
     reference = Reference(named.law, at, albedo, nearest)
+    shares = np.where(at.xi.values < 1.0, at.xi.values, np.inf)  # a uniform number is below 1
+    profiled, drawn = bounds.masks(limits.valid, at.alpha.values, shares)
+    holds = {cells.SAMPLE: drawn, cells.PDF: np.any(drawn, axis=1, keepdims=True)}
     for name, value in _values(named.law, arithmetic, at).items():
         places = (at.alpha, at.xi if name == cells.SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
         value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
-        inside, bound = _inside(name, limits.valid, at), limits.bound(name, at.dtype)
+        inside, bound = holds.get(name, profiled) & at.accepted, limits.bound(name, at.dtype)
         if name == cells.SAMPLE:
             error = reference.misplaced(value)
         else:
@@ -114,15 +116,6 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
             wrong_way=_wrong_way(name, value, reference),
             unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
         )
-
-
-def _inside(name: str, valid: bounds.Validity, at: ArgumentGrid) -> Mask:
-    """Return where the law says that the quantity holds; a uniform number is below 1."""
-    albedos, shares = at.alpha.values, at.xi.values
-    profiled, drawn = bounds.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
-    if name == cells.SAMPLE:
-        return drawn & at.accepted
-    return (np.any(drawn, axis=1, keepdims=True) if name == cells.PDF else profiled) & at.accepted
 
 
 def _wrong_way(name: str, value: Floats, reference: Reference) -> Mask | None:
@@ -144,33 +137,23 @@ def _wrong_way(name: str, value: Floats, reference: Reference) -> Mask | None:
 
 
 def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> dict[str, Floats]:
-    if arithmetic == cells.FLOAT64:
-        values = _of_law(law, *at.arguments)
-    elif arithmetic == cells.FLOAT32:
-        with np.errstate(over="ignore"):
-            single = (jnp.asarray(each, jnp.float32) for each in at.arguments)
-        values = _of_law(jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law), *single)
+    r, xi, alpha, mfp = at.arguments
+    if arithmetic in (cells.FLOAT64, cells.FLOAT32):
+        if arithmetic == cells.FLOAT32:
+            law, r, xi, alpha, mfp = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), (law, r, xi, alpha, mfp))
+        sampler = dense_grid.drawn_by(law)
+        profile, cdf = law.profile(r, alpha, mfp), law.cdf(r, alpha, mfp)
+        values: tuple = profile, cdf, sampler.sample(xi, alpha, mfp), sampler.pdf(r, alpha, mfp)
     else:
-        values = _of_text(law, arithmetic, *at.arguments)
+        text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
+        if arithmetic == cells.STORED16:
+            alpha = _stored_albedo(text, alpha)
+        calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
+        values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
+        if arithmetic == cells.STORED16:
+            with np.errstate(over="ignore"):
+                values = tuple(each.astype(np.float16) for each in values)
     return dict(zip(cells.QUANTITIES, (np.asarray(each, float) for each in values), strict=True))
-
-
-def _of_law(law: ProfileLaw, r, xi, alpha, mfp) -> tuple:
-    sampler = dense_grid.drawn_by(law)
-    profile, cdf = law.profile(r, alpha, mfp), law.cdf(r, alpha, mfp)
-    return profile, cdf, sampler.sample(xi, alpha, mfp), sampler.pdf(r, alpha, mfp)
-
-
-def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
-    text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
-    if arithmetic == cells.STORED16:
-        alpha = _stored_albedo(text, alpha)
-    calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
-    values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
-    if arithmetic != cells.STORED16:
-        return values
-    with np.errstate(over="ignore"):
-        return tuple(each.astype(np.float16) for each in values)
 
 
 def _stored_albedo(text: RoundedText, alpha: Floats) -> Floats:
@@ -244,8 +227,12 @@ class Reference:
         shape = self._shape
         if not hasattr(shape, "share"):
             return np.asarray(self._text.call("cumulated", x, shape))
-        single, multiple = (self._text.call("cumulated", x, _of_part(shape, part)) for part in (1.0, 0.0))
-        first, second = shape.share * single, shape.share + shape.rest * multiple
+        parts = []
+        for share in (1.0, 0.0):  # all light is of the first part, or of the second
+            alone = copy(shape)
+            alone.share, alone.rest = cells.EXTENDED(share), cells.EXTENDED(1.0 - share)
+            parts.append(self._text.call("cumulated", x, alone))
+        first, second = shape.share * parts[0], shape.share + shape.rest * parts[1]
         return np.where(np.abs(first - self._xi) < np.abs(second - self._xi), first, second)
 
     def _known_at(self, value: NDArray) -> NDArray:
@@ -272,13 +259,6 @@ class Reference:
 
     def _radius(self) -> NDArray:
         return np.asarray(self._text.call("radius", self._xi, self._shape))
-
-
-def _of_part(shape: Any, share: float) -> Any:
-    """Return the shape of a law whose light is all of its first part, or of its second."""
-    part = copy(shape)
-    part.share, part.rest = cells.EXTENDED(share), cells.EXTENDED(1.0 - share)
-    return part
 
 
 # What a picture shows at once: R_d off by a third, three hundredths of the light in the wrong place.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -42,13 +43,11 @@ def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
             dtype = cells.DTYPES[arithmetic]
-            at = cells.reflectance_axis(dtype) if name == cells.ALPHA_OF else cells.alpha_axis(dtype)
-            value, reference = (
-                _value(text.law, name, arithmetic, at),
-                _text_value(text.law, cells.EXTENDED, name, at.values),
-            )
+            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", dtype)
+            value = _value(text.law, name, arithmetic, at)
+            reference = _text_value(text.law, cells.EXTENDED, name, at.values)
             own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
-            yield _cells(text, name, arithmetic, at, value, reference, own, span)
+            yield _cells(text, name, arithmetic, at, value, reference, limit=own, span=span)
     yield from _kept_in_half(text, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
@@ -60,22 +59,15 @@ def in_reduced(named: LoadedLaw) -> LoadedLaw:
 
 
 def _cells(
-    named: LoadedLaw,
-    name: str,
-    arithmetic: str,
-    at: ArgumentAxis,
-    value: Floats,
-    reference: Floats,
-    limit: float,
-    span: Range,
-    error: Floats | None = None,
+    named: LoadedLaw, name: str, arithmetic: str, at: ArgumentAxis, *values: Floats, limit: float, span: Range
 ) -> Cells:
-    """Return the cells of one direction; the error is |value - reference| by default."""
+    """Return the cells of one direction, of value, reference and error, by default |value - reference|."""
+    value, reference = values[:2]
+    error = values[2] if len(values) > 2 else absolute(value, reference)
     inside, held, dtype = span.holds(at.values), arithmetic in cells.HELD, cells.DTYPES[arithmetic]
     return Cells(
-        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference,
-        absolute(value, reference) if error is None else error, limit, inside & held, judge=inside,
-        wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
+        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside & held,
+        judge=inside, wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
     )  # fmt: skip
 
 
@@ -101,18 +93,16 @@ def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Any) -> Floats:
 
 def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
     """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
-    at = cells.alpha_axis(np.float32)
+    at = cells.unit_axis("α", np.float32)
     reference = _text_value(named.law, cells.EXTENDED, cells.REFLECTANCE_OF, at.values)
     half = at.values.astype(np.float16).astype(np.float32)
     root = np.sqrt(1.0 - at.values).astype(np.float16).astype(np.float32)
     for name, alpha in ((cells.REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
         value = _text_value(named.law, np.float32, cells.REFLECTANCE_OF, alpha)
-        yield _cells(named, name, cells.STORED16, at, value, reference, cells.HALF_BOUND, span)
+        yield _cells(named, name, cells.STORED16, at, value, reference, limit=cells.HALF_BOUND, span=span)
 
 
-def _against_exact(
-    named: LoadedLaw, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError
-) -> Iterator[Cells]:
+def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: bounds.ModelError) -> Iterator[Cells]:
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = axis("α", 1.0 - root**2)
@@ -123,11 +113,10 @@ def _against_exact(
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     stated = model.get(WAYS[cells.REFLECTANCE_OF][0]) or np.nan
     bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, alpha, there, reflectance.values, bound, of_alpha)
+    of_alpha, of_colour = (alpha, there, reflectance.values), (reflectance, back, alpha.values)
+    yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, *of_alpha, limit=bound, span=albedos)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    yield _cells(
-        named, cells.ALPHA_OF, cells.MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error
-    )
+    yield _cells(named, cells.ALPHA_OF, cells.MODEL, *of_colour, error, limit=MODEL_BOUND, span=colours)
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.
@@ -144,10 +133,13 @@ def conversion_cells() -> Iterator[Cells]:
 
 def _length(name: str) -> Cells:
     """Return l = 1 there and back: infinite lengths, where nothing is absorbed, are refused by name on the way back."""
-    at = cells.alpha_axis(np.float64)
+    at = cells.unit_axis("α", np.float64)
     with np.errstate(all="ignore"):
         value = np.asarray(Optical(at.values, np.array(1.0)).length(name))
-        back = np.array([_returned(name, one, a) for one, a in zip(value, at.values, strict=True)])
+        back = np.where(np.isinf(value), 1.0, np.nan)
+        for i, length in enumerate(value):
+            with contextlib.suppress(InputError):
+                back[i] = Optical.from_length(name, length, at.values[i]).mfp
     infinite = np.isinf(value) & (at.values == 1.0)
     error, reference = np.where(infinite, 0.0, np.abs(back - 1.0)), np.where(infinite, np.inf, value)
     made = Cells("convert", False, name, cells.FLOAT64, (at,), value, reference, error, RETURN_BOUND)
@@ -155,24 +147,12 @@ def _length(name: str) -> Cells:
     return made
 
 
-def _returned(name: str, value: float, alpha: float) -> float:
-    try:
-        return float(Optical.from_length(name, value, alpha).mfp)
-    except InputError:
-        return 1.0 if np.isinf(value) else np.nan
-
-
-def _albedo(reflectance: float, light: str) -> float:
-    """Return alpha [-], or NaN where something is raised: every A in [0, 1] has one."""
-    try:
-        return float(alpha_of(reflectance, light))
-    except Exception:  # whatever comes is what is looked for
-        return np.nan
-
-
 def _colour(light: str) -> Cells:
-    at = cells.reflectance_axis(np.float64)
-    value = np.array([_albedo(one, light) for one in at.values])
+    at = cells.unit_axis("A", np.float64)
+    value = np.full(at.values.size, np.nan)  # where something is raised: every A in [0, 1] has an alpha
+    for i, reflectance in enumerate(at.values):
+        with contextlib.suppress(Exception):  # whatever comes is what is looked for
+            value[i] = alpha_of(reflectance, light)
     raised = np.isnan(value)
     error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - at.values)
     given = "convert", False, f"{cells.ALPHA_OF}, {light}", cells.FLOAT64, (at,), value, value, error, COLOUR_BOUND

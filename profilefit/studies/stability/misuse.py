@@ -25,8 +25,12 @@ SHARES: tuple[float, ...] = (-0.1, 1.1, NAN, INF, -INF)
 LENGTHS: tuple[float, ...] = (0.0, -0.0, -1.0, NAN, INF)
 RADII: tuple[float, ...] = (-1.0, NAN, -INF)
 ALBEDO, LENGTH, COLOUR = ("α", "alpha", SHARES), ("l", "mfp", LENGTHS), ("A", "reflectance", SHARES)
-FIRST = {**dict.fromkeys((cells.PROFILE, cells.CDF, cells.PDF), ("r", "r", RADII)), cells.SAMPLE: ("ξ", "xi", SHARES)}
-ORDINARY = {"r": 1.0, "xi": 0.5, "alpha": 0.5, "mfp": 1.0}
+ARGUMENTS = {
+    **dict.fromkeys((cells.PROFILE, cells.CDF, cells.PDF), (("r", "r", RADII), ALBEDO, LENGTH)),
+    cells.SAMPLE: (("ξ", "xi", SHARES), ALBEDO, LENGTH),
+    **{cells.ALPHA_OF: (COLOUR,), cells.REFLECTANCE_OF: (ALBEDO,)},
+}
+ORDINARY = {"r": 1.0, "xi": 0.5, "alpha": 0.5, "mfp": 1.0, "reflectance": 0.5}
 CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in Python does: a shader refuses nothing"
 
 
@@ -36,23 +40,22 @@ def of_law(named: LoadedLaw) -> Iterator[Cells]:
     text = RoundedText(law, np.float32)
     functions = (law.profile, law.cdf, law.sampler.sample, law.sampler.pdf)
     for name, function in zip(cells.QUANTITIES, functions, strict=True):
-        cases = cases_of(name)
-        yield refusals(named.label, law.entry.own, name, cases, _with_keyword(function, name))
-        yield _clamped(named.label, law.entry.own, name, cases, text)
+        yield _refused(named.label, law.entry.own, name, function)
+        yield _clamped(named.label, law.entry.own, name, cases_of(name), text)
 
 
 def of_map(named: LoadedLaw) -> Iterator[Cells]:
     """Yield both directions of a map."""
     law: AlbedoLaw = named.law
-    for name, argument, call in ((cells.ALPHA_OF, COLOUR, law.alpha), (cells.REFLECTANCE_OF, ALBEDO, law.reflectance)):
-        yield refusals(map_label(named), law.entry.own, name, _cases(argument), _alone(call))
+    for name, function in ((cells.ALPHA_OF, law.alpha), (cells.REFLECTANCE_OF, law.reflectance)):
+        yield _refused(map_label(named), law.entry.own, name, function)
 
 
 def of_exact() -> Iterator[Cells]:
     """Yield each function of the exact half space."""
-    for name, function in zip(cells.QUANTITIES[:3], (exact.profile, exact.cdf, exact.quantile), strict=True):
-        yield refusals("exact", True, name, cases_of(name), _with_keyword(function, name))
-    yield refusals("exact", True, cells.REFLECTANCE_OF, _cases(ALBEDO), _alone(exact.reflectance))
+    functions: tuple[Callable[..., Any], ...] = (exact.profile, exact.cdf, exact.quantile, exact.reflectance)
+    for name, function in zip((*cells.QUANTITIES[:3], cells.REFLECTANCE_OF), functions, strict=True):
+        yield _refused("exact", True, name, function)
 
 
 def of_convert() -> Iterator[Cells]:
@@ -70,41 +73,34 @@ def of_convert() -> Iterator[Cells]:
     yield from (refusals("convert", False, *call) for call in calls)
 
 
-def _with_keyword(function: Callable[..., Any], name: str) -> Call:
-    return lambda key, value: function(**_given(name, key, value))
-
-
-def _alone(function: Callable[..., Any]) -> Call:
-    return lambda _, value: function(value)
-
-
 def _cases(*arguments: tuple[str, str, tuple[float, ...]]) -> list[Case]:
     return [(symbol, key, value) for symbol, key, values in arguments for value in values]
 
 
 def cases_of(name: str) -> list[Case]:
-    """Return what is tried of a function of radius or uniform number, albedo and length."""
-    return _cases(FIRST[name], ALBEDO, LENGTH)
+    """Return what is tried of each argument of a function."""
+    return _cases(*ARGUMENTS[name])
 
 
 def _given(name: str, key: str, value: float) -> dict[str, float]:
-    return {word: ORDINARY[word] for word in (FIRST[name][1], "alpha", "mfp")} | {key: value}
+    return {word: ORDINARY[word] for _, word, _ in ARGUMENTS[name]} | {key: value}
+
+
+def _refused(subject: str, own: bool, name: str, function: Callable[..., Any]) -> Cells:
+    return refusals(subject, own, name, cases_of(name), lambda key, value: function(**_given(name, key, value)))
 
 
 def refusals(subject: str, own: bool, name: str, cases: list[Case], call: Call) -> Cells:
     """Return cells that are red where no error comes, or another than InputError that names the argument."""
-    codes = np.array([_outcome(call, key, value) for _, key, value in cases], np.int8)
+    codes = np.full(len(cases), Verdict.INACCURATE, np.int8)
+    for i, (_, key, value) in enumerate(cases):
+        try:
+            call(key, value)
+        except InputError as error:
+            codes[i] = Verdict.OUTSIDE if key in str(error) else Verdict.RAISES
+        except Exception:  # whatever else comes is what is looked for
+            codes[i] = Verdict.RAISES
     return _cells(subject, own, name, cells.FLOAT64, cases, codes, np.full(len(cases), np.nan))
-
-
-def _outcome(call: Call, key: str, value: float) -> Verdict:
-    try:
-        call(key, value)
-    except InputError as error:
-        return Verdict.OUTSIDE if key in str(error) else Verdict.RAISES
-    except Exception:  # whatever else comes is what is looked for
-        return Verdict.RAISES
-    return Verdict.INACCURATE
 
 
 def _clamped(subject: str, own: bool, name: str, cases: list[Case], text: RoundedText) -> Cells:

@@ -8,7 +8,7 @@ known, a ball lit from one side, and an edge of light on a plane, with errors of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -32,19 +32,8 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Mesh, Part, Scene, unit
 from profilefit.shader import opened
-from profilefit.studies.stability.cells import (
-    FLOAT32,
-    FLOAT64,
-    NAME,
-    TEXT32,
-    Cells,
-    Mask,
-    RoundedText,
-    absolute,
-    axis,
-    labelled,
-    relative,
-)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import Cells, Mask, RoundedText, absolute, axis, labelled, relative
 
 DIGITS = 1e-6  # relative: a few roundings in float32
 
@@ -87,14 +76,6 @@ RATES = (1e-3, 0.3, 2.0)  # c [1/m]
 BEFORE, BACK = 1.0, 0.5  # s0, t0 [m]
 
 
-def sea_cells() -> Iterator[Cells]:
-    """Yield hits over S, a narrow beam over albedo and depth, a segment over direction, length and attenuation."""
-    yield from of_hits()
-    yield of_level_floors()
-    yield of_beam()
-    yield from of_segment()
-
-
 def of_hits() -> Iterator[Cells]:
     """Yield the share of rays whose hit misses by more than 1 % of the depth, by our searches and published ones."""
     ways, limits = zip(*SEARCHES.values(), strict=True)
@@ -103,14 +84,14 @@ def of_hits() -> Iterator[Cells]:
         axes = labelled("way", tuple(SEARCHES)[rows]), axis("S", STEEPNESSES)
         inside = np.array(STEEPNESSES) < np.array(limits)[rows, None]
         given = shares[rows], np.zeros(()), shares[rows], WRONG, inside
-        yield Cells(name, own, HITS, FLOAT64, axes, *given, advice=OF_HITS)
+        yield Cells(name, own, HITS, cells.FLOAT64, axes, *given, advice=OF_HITS)
 
 
 def of_level_floors() -> Cells:
     """Return the share of views whose hit on a level or nearly level floor is wrong in float32."""
     axes = axis("slope", SLOPES), axis("depth", FLOORS, "m"), axis("eye above the floor", EYES, "m")
     value = np.array([[[_missed(slope, depth, eye) for eye in EYES] for depth in FLOORS] for slope in SLOPES])
-    return Cells("level floors", True, HITS, FLOAT32, axes, value, np.zeros(()), value, WRONG, advice=OF_HITS)
+    return Cells("level floors", True, HITS, cells.FLOAT32, axes, value, np.zeros(()), value, WRONG, advice=OF_HITS)
 
 
 def _missed(slope: float, depth: float, eye: float) -> float:
@@ -133,21 +114,21 @@ def of_beam() -> Cells:
     value = np.broadcast_to(np.exp(-depth), share.shape)
     inside = albedo * depth < failing_depth(albedo, BEAM_RADIUS, lobes, DARKER)
     given = value, share, relative(value, share), DARKER / (1.0 + DARKER), inside  # of all that is there
-    return Cells("e^-ct", True, BEAM, FLOAT64, (axis("ω", ALBEDOS), axis("ct", DEPTHS)), *given, advice=OF_BEAM)
+    return Cells("e^-ct", True, BEAM, cells.FLOAT64, (axis("ω", ALBEDOS), axis("ct", DEPTHS)), *given, advice=OF_BEAM)
 
 
 def of_segment() -> Iterator[Cells]:
     """Yield the integral in float32: by its shader source, the function in Python, and the usual formula."""
-    text = RoundedText(segment_text("python", NAME), np.float32)
+    text = RoundedText(segment_text("python", cells.NAME), np.float32)
     axes = axis("1+m", TURNS), axis("c t1", LENGTHS), axis("c", RATES, "1/m")
     m, far, c = np.meshgrid(np.array(TURNS) - 1.0, LENGTHS, RATES, indexing="ij")
     given = c, np.full(c.shape, BEFORE), np.full(c.shape, BACK), m, far / c
     at: list[Any] = [one.astype(np.float32) for one in given]
     exactly = segment_integral(*(one.astype(float) for one in at))
     for name, own, arithmetic, value in (
-        (SEGMENT, True, TEXT32, text.call("integral", *at)),
-        (SEGMENT, True, FLOAT32, segment_integral(*at)),
-        ("segment, plain", False, FLOAT32, plain_integral(*at)),
+        (SEGMENT, True, cells.TEXT32, text.call("integral", *at)),
+        (SEGMENT, True, cells.FLOAT32, segment_integral(*at)),
+        ("segment, plain", False, cells.FLOAT32, plain_integral(*at)),
     ):
         value = np.asarray(value, float)
         judged = value, exactly, relative(value, exactly), DIGITS
@@ -193,13 +174,6 @@ ASIDES = (
 ROOTS = (1e-3, 0.5, 1e3)  # any unit
 
 
-def fur_cells() -> Iterator[Cells]:
-    """Yield shells and slabs over angle and layers, and a cone's shadow over where its tip is seen."""
-    yield from of_shells()
-    yield of_slabs()
-    yield from of_shadow()
-
-
 def filled(way: LayerTechnique, degrees: Floats, layers: Floats) -> Mask:
     """Return where shells are promised to hide what a cone does."""
     tangent = np.tan(np.radians(degrees))
@@ -216,7 +190,7 @@ def of_shells() -> Iterator[Cells]:
         inside = np.array([filled(way, np.array(DEGREES)[:, None], np.array(SHELL_LAYERS)) for way in ways])
         axes = labelled("way", (way.name for way in ways)), axis("θ", DEGREES, "degrees"), axis("N", SHELL_LAYERS)
         given = value, np.ones(()), relative(value, np.ones_like(value)), SHADOW_BOUND, inside
-        yield Cells(name, own, UNION, FLOAT64, axes, *given, advice=OF_SHELLS)
+        yield Cells(name, own, UNION, cells.FLOAT64, axes, *given, advice=OF_SHELLS)
 
 
 def of_slabs() -> Cells:
@@ -230,14 +204,25 @@ def of_slabs() -> Cells:
     inside = moved < np.array(list(SLABS.values()))[:, None, None]
     axes = labelled("way", (way.name for way in SLABS)), axis("θ", DEGREES, "degrees"), axis("N", SLAB_LAYERS)
     given = value, np.zeros(()), value, HIT_BOUND, inside
-    return Cells("slabs", True, STRAND_HITS, FLOAT64, axes, *given, advice=OF_SLABS)
+    return Cells("slabs", True, STRAND_HITS, cells.FLOAT64, axes, *given, advice=OF_SLABS)
 
 
 def of_shadow() -> Iterator[Cells]:
     """Yield a cone's shadow in float32: by its shader source, and by the formula as textbooks have it."""
-    text = RoundedText(strand_text("python", NAME), np.float32)
-    yield _shadow("cone's shadow", True, TEXT32, lambda *given: text.call("shadow", *given))
-    yield _shadow("cone's shadow, by acos", False, FLOAT32, by_acos)
+    text = RoundedText(strand_text("python", cells.NAME), np.float32)
+    aside, radius = np.meshgrid(ASIDES, ROOTS, indexing="ij")
+    root = radius.astype(np.float32)
+    away = (aside * root.astype(float)).astype(np.float32)
+    # A tip that leans by the length is seen that far aside from above, to the last digit.
+    exactly = np.asarray(shadow(root.astype(float), away.astype(float), 0.0, (1.0, 0.0)))
+    axes = axis("d/r0", ASIDES), axis("r0", ROOTS, "length")
+    for name, own, arithmetic, value in (
+        ("cone's shadow", True, cells.TEXT32, text.call("shadow", root, away)),
+        ("cone's shadow, by acos", False, cells.FLOAT32, by_acos(root, away)),
+    ):
+        value = np.asarray(value, float)
+        judged = value, exactly, relative(value, exactly), DIGITS
+        yield Cells(name, own, SHADOW, arithmetic, axes, *judged, advice=OF_SHADOW)
 
 
 def by_acos(radius: Floats, aside: Floats) -> Floats:
@@ -246,17 +231,6 @@ def by_acos(radius: Floats, aside: Floats) -> Floats:
     with np.errstate(all="ignore"):
         beyond = radius**2 * (one(np.pi) - np.arccos(radius / aside)) + radius * np.sqrt(aside**2 - radius**2)
     return np.where(aside <= radius, one(np.pi) * radius**2, beyond)
-
-
-def _shadow(name: str, own: bool, arithmetic: str, function: Callable[..., Floats]) -> Cells:
-    aside, radius = np.meshgrid(ASIDES, ROOTS, indexing="ij")
-    root = radius.astype(np.float32)
-    away = (aside * root.astype(float)).astype(np.float32)
-    value = np.asarray(function(root, away), float)
-    # A tip that leans by the length is seen that far aside from above, to the last digit.
-    exactly = np.asarray(shadow(root.astype(float), away.astype(float), 0.0, (1.0, 0.0)))
-    axes, given = (axis("d/r0", ASIDES), axis("r0", ROOTS, "length")), (value, exactly, relative(value, exactly))
-    return Cells(name, own, SHADOW, arithmetic, axes, *given, DIGITS, advice=OF_SHADOW)
 
 
 WITHIN = 2.0  # sigma from a pole that are not promised: lines of the atlas turn there
@@ -302,7 +276,7 @@ def of_ball(context: moderngl.Context) -> Cells:
     axes = axis("σ/R", SIGMAS), axis("latitude", LATITUDES, "degrees"), axis("from the seam", FROM_SEAM, "texels")
     away = np.radians(90.0 - np.array(LATITUDES))[:, None] >= WITHIN * np.array(SIGMAS)[:, None, None]
     given = value, reference, absolute(value, reference), BOUND, away
-    return Cells("atlas of a ball", True, "light, blurred", TEXT32, axes, *given, advice=AT_POLES)
+    return Cells("atlas of a ball", True, "light, blurred", cells.TEXT32, axes, *given, advice=AT_POLES)
 
 
 def of_stretch(context: moderngl.Context) -> Cells:
@@ -326,7 +300,7 @@ def of_stretch(context: moderngl.Context) -> Cells:
     axes = axis("column / row", RATIOS), axis("σ", WIDTHS, "rows"), labelled("edge", ("across columns", "across rows"))
     fine = np.array(WIDTHS)[:, None] >= FINE * np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0])
     given = value, reference, absolute(value, reference), BOUND, fine
-    return Cells("atlas that is stretched", True, "light, blurred", TEXT32, axes, *given, advice=COARSE)
+    return Cells("atlas that is stretched", True, "light, blurred", cells.TEXT32, axes, *given, advice=COARSE)
 
 
 def of_view(context: moderngl.Context) -> Cells:
@@ -348,7 +322,7 @@ def of_view(context: moderngl.Context) -> Cells:
             value[i], reference[i] = mean[at], _edge(across[at], SIGMA)
     axes = axis("angle", ANGLES, "degrees"), axis("from the edge", PLACES, "σ")
     given = value, reference, absolute(value, reference), BOUND
-    return Cells("screen seen aslant", True, "light, blurred", TEXT32, axes, *given, advice=COARSE)
+    return Cells("screen seen aslant", True, "light, blurred", cells.TEXT32, axes, *given, advice=COARSE)
 
 
 def _edge(along: Floats, sigma: float) -> Floats:

@@ -84,10 +84,7 @@ ONCE_BOUNDS = {FLOAT64: 1e-9, TEXT32: 1e-5}
 
 @dataclass(frozen=True)
 class StackCase:
-    """Law of a stack.
-
-    errors  rel, ks and the error of A that the law states of itself [-];  own  whether it was fitted to its layers
-    """
+    """Law of a stack: errors rel, ks and of A, as it states of itself [-]; own, whether it was fitted to its layers."""
 
     label: str
     law: StackLaw
@@ -115,7 +112,9 @@ class StackCase:
     def judged(self, name: str, arithmetic: str, *given: Any, **more: Any) -> Cells:
         """Return cells over the arguments of a quantity, given value, reference, error, bound and inside."""
         advice = OF_LAWS if self.own else OF_BORROWER
-        return Cells(self.label, self.own, name, arithmetic, _axes(name), *given, **{"advice": advice, **more})
+        across = axis("ξ", SHARE) if name == SAMPLE else axis("r/l", RADIUS)
+        axes = (axis("d/l", THICKNESS), *(() if name in (TOTAL, ENERGY) else (across,)))
+        return Cells(self.label, self.own, name, arithmetic, axes, *given, **{"advice": advice, **more})
 
 
 def cells_of(folder: Path) -> Iterator[Cells]:
@@ -239,13 +238,6 @@ def _cells(
     elif name == TOTAL:
         more["wrong_way"] = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
     return case.judged(name, arithmetic, *triple, case.bound(name), inside, **more)
-
-
-def _axes(name: str) -> tuple[cells.ArgumentAxis, ...]:
-    first = axis("d/l", THICKNESS)
-    if name in (TOTAL, ENERGY):
-        return (first,)
-    return first, axis("ξ", SHARE) if name == SAMPLE else axis("r/l", RADIUS)
 
 
 def _misplaced(reference: RoundedText, value: Floats, xi: Floats, d: Floats) -> Floats:

@@ -103,18 +103,22 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             profiles = Profiles.from_orders(run, ALPHAS)
             light = time.perf_counter() - begin
             for name in [name for name in ways if name != EMCEE or photons in sizes.chained]:
-                trial = _trial(ways[name], profiles, seed, light, limits[name], start)
+                begin = time.perf_counter()
+                result = ways[name](profiles, seed)
+                seconds = time.perf_counter() - begin
                 if seed == 0:
-                    compiling[name] = max(compiling.get(name, 0.0), trial.fit_seconds)
-                else:
-                    trials.setdefault((name, photons), []).append(trial)
-    panels = tuple(_panel(trials, *words) for words in PANELS)
-    return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
-
-
-def _panel(trials: Mapping[tuple[str, int], Sequence[Trial]], name: str, title: str, timed: str) -> Panel:
-    points = tuple(point_of(name, *key, group) for key, group in trials.items())
-    return Panel(name, title, f"time of {timed}, one core [s]", ERROR, points, joined=True)
+                    compiling[name] = max(compiling.get(name, 0.0), seconds)
+                    continue
+                fitted, limit = (with_constants(start, each.constants) for each in (result, limits[name]))
+                away, done = standardised(result, limits[name]), result.result == "converged"
+                trial = Trial(seconds, light, *change(fitted, limit), away, done)
+                trials.setdefault((name, photons), []).append(trial)
+    panels = []
+    for panel, heading, timed in PANELS:
+        points = tuple(point_of(panel, *key, group) for key, group in trials.items())
+        panels.append(Panel(panel, heading, f"time of {timed}, one core [s]", ERROR, points, joined=True))
+    title, notes = "Fits: time against the law's error by noise", notes_of(trials, compiling)
+    return TradeoffPart("fits", title, tuple(panels), notes)
 
 
 def _ways(start: Any, max_chain: int) -> dict[str, Way]:
@@ -151,14 +155,6 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
 
 def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
     return dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
-def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: FittedConstants, start: Any) -> Trial:
-    begin = time.perf_counter()
-    result = way(profiles, seed)
-    seconds = time.perf_counter() - begin
-    rms, worst = change(with_constants(start, result.constants), with_constants(start, limit.constants))
-    return Trial(seconds, light, rms, worst, standardised(result, limit), result.result == "converged")
 
 
 def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:

@@ -29,15 +29,9 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.fitting.quality import profile_quality
+from profilefit.laws import burley
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.burley import (
-    XIE,
-    Burley,
-    BurleyApproximateSampler,
-    BurleyDiffuseMfp,
-    BurleySampler,
-    NormalizedDiffusion,
-)
+from profilefit.laws.burley import Burley, BurleyDiffuseMfp
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
@@ -82,8 +76,11 @@ SPECS: tuple[LawSpec, ...] = (
 )
 
 
-class Fast(NormalizedDiffusion):
+class Fast(burley.NormalizedDiffusion):
     """Normalized diffusion as a shader has it: one exponential, its cube, and no guard at x = 0."""
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
 
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
         rate = self.falloff_rate(alpha)
@@ -91,25 +88,23 @@ class Fast(NormalizedDiffusion):
         return self.albedo.reflectance(alpha) * rate / (8.0 * jnp.pi) * (e + e * e * e) / x
 
     @property
-    def sampler(self) -> BurleySampler:
+    def sampler(self) -> burley.BurleySampler:
         return FastBurleySampler(self)
+
+    def setup(self, alpha: Array) -> tuple[Array, Array]:
+        """Return what depends on alpha only."""
+        return self.albedo.reflectance(alpha), self.falloff_rate(alpha)
 
 
 class FastBurley(Fast, Burley):
     """Fast normalized diffusion in units of the mean free path."""
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
-
 
 class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
     """Fast normalized diffusion in units of the diffuse mean free path."""
 
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
 
-
-class FastBurleySampler(BurleySampler):
+class FastBurleySampler(burley.BurleySampler):
     """Golubev's inverse with its cube root as e^{ln(G) / 3}: on XLA's CPU jnp.cbrt takes ten times as long."""
 
     law: Fast
@@ -123,7 +118,7 @@ class FastBurleySampler(BurleySampler):
         return self.law.scaled_profile(x, alpha) * (2.0 * jnp.pi) * x / self.law.albedo.reflectance(alpha)
 
 
-class FastApproximateSampler(BurleyApproximateSampler):
+class FastApproximateSampler(burley.BurleyApproximateSampler):
     """Xie's inverse with ln(1 - xi): on XLA's CPU jnp.log1p takes five times as long."""
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
@@ -205,10 +200,7 @@ class TableContender(Contender):
 
 
 def contenders(folder: Path | None = None, specs: Sequence[LawSpec] | None = None) -> tuple[list[Contender], list[str]]:
-    """Return all laws that load, by default of `SPECS`, with the constants in `folder`, and a line for each other.
-
-    Raises InputError where the yardstick itself is missing.
-    """
+    """Return all laws that load, by default of `SPECS`, and a line for each other; InputError without the yardstick."""
     loaded: list[Contender] = []
     left_out = []
     for one in specs or SPECS:
@@ -229,11 +221,10 @@ def with_samplers(label: str, law: ProfileLaw) -> Iterator[Contender]:
     if isinstance(law, Burley | BurleyDiffuseMfp):
         kind: Any = FastBurley if isinstance(law, Burley) else FastBurleyDiffuseMfp
         fast = kind(law.setting, law.albedo, **law.constants())
-        setup = partial(_burley_setup, fast)
-        yield Contender(label, fast, fast.sampler, setup, law.sampler)
+        yield Contender(label, fast, fast.sampler, fast.setup, law.sampler)
         if label == YARDSTICK:
-            sampler = FastApproximateSampler(fast, XIE)
-            yield Contender(f"{label}, Xie's sampler", fast, sampler, setup, law.samplers["xie"], another=True)
+            sampler = FastApproximateSampler(fast, burley.XIE)
+            yield Contender(f"{label}, Xie's sampler", fast, sampler, fast.setup, law.samplers["xie"], another=True)
     elif isinstance(law, Hazard | TwoPartHazard):
         of_alpha = law.shape if isinstance(law, Hazard) else law.parts
         yield Contender(label, law, law.sampler, of_alpha)
@@ -244,10 +235,6 @@ def with_samplers(label: str, law: ProfileLaw) -> Iterator[Contender]:
         yield QuantileContender(label, law, law.sampler, law.curve)
     else:
         yield Contender(label, law, law.sampler, partial(_liang_setup, law) if isinstance(law, Liang) else None)
-
-
-def _burley_setup(law: Fast, alpha: Array) -> tuple[Array, Array]:
-    return law.albedo.reflectance(alpha), law.falloff_rate(alpha)
 
 
 def _liang_setup(law: Liang, alpha: Array) -> tuple[Array, ...]:
@@ -494,17 +481,16 @@ def _row(contender: Contender, counted: dict[str, FunctionCounts], rates: Rates,
 
 def points_of(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
     """Return one point per law: error against the time of one part."""
-    return tuple(_point(row, part) for row in rows if part in row.times)
-
-
-def _point(row: ContenderResult, part: str) -> Point:
-    facts = {
-        "times_yardstick": row.ratios[part].median,
-        "constants": sum(row.contender.constants),
-        "functions": row.counts[part].transcendental,
-        "setup_nanoseconds": "" if row.setup is None else row.setup,
-        "ks": float(row.ks.mean()),
-        "worst_ks": float(row.ks.max()),
-    }
-    error, worst = WithSpread.exactly(row.rel.mean()), WithSpread.exactly(row.rel.max())
-    return Point(part, row.contender.name, "", row.times[part], error, worst, facts)
+    points = []
+    for row in (row for row in rows if part in row.times):
+        facts = {
+            "times_yardstick": row.ratios[part].median,
+            "constants": sum(row.contender.constants),
+            "functions": row.counts[part].transcendental,
+            "setup_nanoseconds": "" if row.setup is None else row.setup,
+            "ks": float(row.ks.mean()),
+            "worst_ks": float(row.ks.max()),
+        }
+        error, worst = WithSpread.exactly(row.rel.mean()), WithSpread.exactly(row.rel.max())
+        points.append(Point(part, row.contender.name, "", row.times[part], error, worst, facts))
+    return tuple(points)

@@ -27,14 +27,8 @@ from mcml_sim.media.arrays import Floats
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
-from profilefit.scenes.stage.step_edge import (
-    UNIFORM_SHARE,
-    EdgeGather,
-    by_law,
-    by_quantile,
-    edge_estimate,
-    random_points,
-)
+from profilefit.scenes.stage import step_edge
+from profilefit.scenes.stage.step_edge import EdgeGather, by_law
 from profilefit.studies.tradeoff import laws, stopwatch
 from profilefit.studies.tradeoff.laws import SPECS, YARDSTICK, Contender, contenders, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
@@ -83,7 +77,7 @@ class UniformSampler(Sampler):
 
     def farthest(self, alpha: Array) -> Array:
         """Return the radius x within which `UNIFORM_SHARE` of the light leaves [mfp]."""
-        return self.law.sampler.scaled_sample(jnp.full_like(alpha, UNIFORM_SHARE), alpha)
+        return self.law.sampler.scaled_sample(jnp.full_like(alpha, step_edge.UNIFORM_SHARE), alpha)
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         return xi * self.farthest(alpha)
@@ -167,15 +161,14 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
     """Return a gather weighted by the law's own density: all weights are 1."""
-    drawn = by_law(law, alpha, sampler)
-    return EdgeGather(drawn.sample, np.ones_like)
+    return EdgeGather(by_law(law, alpha, sampler).sample, np.ones_like)
 
 
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Return square error by the edge and variance, over those of the exact quantile (2, m, blocks)."""
     rows = []
     for alpha in unreduced(np.array(sizes.alphas), sampler.law.setting.g).tolist():
-        ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)
+        ways = gathered(sampler.law, alpha, sampler), step_edge.by_quantile(alpha, sampler.law.setting)
         rows.append([error_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
     return np.moveaxis(np.array(rows), 2, 0)
 
@@ -184,9 +177,9 @@ def error_ratios(
     way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
 ) -> tuple[float, float]:
     """Return the mean square error and the variance of a gather at an edge, over those of another."""
-    points = random_points(SAMPLES, trials, seed=block + 1)
+    points = step_edge.random_points(SAMPLES, trials, seed=block + 1)
     places = PLACES * law.similar(alpha, 1.0)[1]
-    mine, best = (edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
+    mine, best = (step_edge.edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
     square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
     return float(square), float(mine.variance.mean() / best.variance.mean())
 

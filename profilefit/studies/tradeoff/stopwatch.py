@@ -24,7 +24,6 @@ Track = Callable[[range, str], Iterable[int]]
 
 def silent(turns: range, title: str) -> Iterable[int]:
     """Return the turns, without any progress shown."""
-    del title
     return turns
 
 
@@ -55,10 +54,7 @@ def on_one_core() -> Iterator[bool]:
 
 @dataclass(frozen=True)
 class Rates:
-    """Photons a second in each turn, of several works that took turns.
-
-    first  seconds of the untimed time before the first turn, which compiles
-    """
+    """Photons a second in each turn, by work; first, seconds of the untimed time before them, which compiles."""
 
     by_name: dict[str, list[float]]
     first: dict[str, float] = field(default_factory=dict)

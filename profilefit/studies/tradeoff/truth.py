@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import jax
 import numpy as np
@@ -75,9 +76,11 @@ class Annuli:
         return float(np.sqrt(np.mean(relative**2))), float(relative.max())
 
 
-def half_spaces(setting: Setting, rule: Rule) -> Floats:
-    """Return the energy within EDGES at ALPHAS from the table of n alone: no transform is kept between calls."""
-    by_albedo.forget()
+def half_spaces(setting: Setting, rule: Rule, anew: bool = False) -> Floats:
+    """Return the energy within EDGES at ALPHAS from the table of n alone, which is kept unless made `anew`."""
+    if anew:
+        refracting.new_table(float(setting.n), rule)
+    by_albedo.forget()  # no transform is kept between calls
     return by_albedo.by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
 
 
@@ -93,10 +96,9 @@ def stack(nodes: Nodes) -> Floats:
 
 def _of_half_space(panel: str, setting: Setting, finest: float) -> Annuli:
     title = f"{EDGES.size - 1} annuli of a half space with n = {setting.n:g}, g = 0"
-    reference = partial(half_spaces, setting, STANDARD.scaled(finest))
     media = tuple(half_space(float(alpha), n=float(setting.n)) for alpha in ALPHAS)
-    whole = partial(exact.reflectance, ALPHAS, setting)
-    return Annuli(panel, title, media, setting, reference, lambda: np.asarray(whole())[:, None])
+    within = partial(half_spaces, setting, STANDARD.scaled(finest))
+    return Annuli(panel, title, media, setting, within, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None])
 
 
 MATCHED = _of_half_space("rings", exact.SEARCHLIGHT, FINEST[0])
@@ -162,11 +164,16 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
     rates = stopwatch.take_turns({one.key: partial(run, one) for one in every}, sizes.turns, track, "truths")
     points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in every)
-    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(every, rates).items())
+    first: dict[str, float] = {}  # what a method's very first call took longer than later ones: it compiles for all
+    for one in every:
+        more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
+        name = f"{one.method} ({one.annuli.panel})"
+        first[name] = first.get(name, 0.0) + max(more, 0.0)
+    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in first.items())
     title = f"Energies of annuli at {ALPHAS.size} albedos, and of a stack: seconds against error"
     panels = [
-        Panel(one.panel, one.title, *axes, tuple(p for p in points if p.panel == one.panel), joined=True)
-        for one, axes in ((MATCHED, AXES), (REFRACTING, AXES), (STACK, STACK_AXES))
+        Panel(case.panel, case.title, *axes, tuple(p for p in points if p.panel == case.panel), joined=True)
+        for case, axes in ((MATCHED, AXES), (REFRACTING, AXES), (STACK, STACK_AXES))
     ]
     traced = tuple(replace(point, panel="tracers") for point in panels[0].points if point.method != EXACT)
     panels.insert(1, Panel("tracers", "the same without the exact solution", *AXES, traced, joined=True))
@@ -182,10 +189,11 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     cases = (MATCHED, REFRACTING, STACK)
     each += [(case, SIMULATE, n, partial(_simulated, case, n)) for case in cases for n in sizes.simulate]
     each += [(case, ORDERS, n, partial(by_orders, case, n)) for case in cases[:2] for n in sizes.orders]
-    each += [(MATCHED, EXACT, rule, _exact(MATCHED, STANDARD.scaled(RULES[rule]))) for rule in sizes.rules]
-    each += [(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD))]
-    each += [(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True))]
-    each += [(STACK, EXACT, label, partial(_exact_stack, nodes)) for label, nodes in STACK_NODES.items()]
+    rules = {rule: STANDARD.scaled(RULES[rule]) for rule in sizes.rules}
+    each += [(MATCHED, EXACT, name, _exact(half_spaces, MATCHED.setting, rule)) for name, rule in rules.items()]
+    each += [(REFRACTING, EXACT, AS_IS, _exact(half_spaces, REFRACTING.setting, STANDARD))]
+    each += [(REFRACTING, EXACT, "and the table of n", _exact(half_spaces, REFRACTING.setting, STANDARD, True))]
+    each += [(STACK, EXACT, label, _exact(stack, nodes)) for label, nodes in STACK_NODES.items()]
     found = []
     for case, method, effort, run in each:
         number = 0 if isinstance(effort, str) else effort * (1 if method == ORDERS else len(case.media))
@@ -207,16 +215,6 @@ def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], e
     }
     seconds = WithSpread.of(rates.seconds(contestant.key))
     return Point(case.panel, method, label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
-
-
-def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
-    """Return what a method's very first call took longer than later ones [s]: the first effort compiles for all."""
-    first: dict[str, float] = {}
-    for one in contestants:
-        more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
-        name = f"{one.method} ({one.annuli.panel})"
-        first[name] = first.get(name, 0.0) + max(more, 0.0)
-    return first
 
 
 def scalar_tracer(trace: Callable, photons: int, seed: int) -> RingEnergies:
@@ -244,16 +242,6 @@ def by_orders(case: Annuli, photons: int, seed: int) -> RingEnergies:
     return np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference
 
 
-def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
-    """Return the exact solution; `anew` makes the table of n, too, that is otherwise kept."""
-
-    def run(_: int) -> RingEnergies:
-        if anew:
-            refracting.new_table(float(case.setting.n), rule)
-        return np.diff(half_spaces(case.setting, rule), axis=1), None
-
-    return run
-
-
-def _exact_stack(nodes: Nodes, _: int) -> RingEnergies:
-    return np.diff(stack(nodes), axis=1), None
+def _exact(within: Callable[..., Floats], *given: Any) -> Method:
+    """Return the exact solution, by a function of the energy within EDGES: the same whatever the seed."""
+    return lambda _: (np.diff(within(*given), axis=1), None)

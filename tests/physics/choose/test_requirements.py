@@ -94,32 +94,17 @@ def test_defaults(written):
     assert math.isinf(scene.radius)
     assert (scene.pixel, scene.resolution) == ((0.5, 0.5), (80, 60))
     assert (scene.unit, scene.budget.ms, scene.layers) == ("mm", None, None)
-
-
-def test_layers_beside_a_material_have_colours(written):
-    stack = "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"
-    scene = read(written("", stack))
+    scene = read(written("", "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"))  # they have colours
     assert [medium.layers[0].mu_a for medium in scene.layers.media] == [1.0, 2.0, 3.0]
-
-
-OLD = """\
-[view]
-pixel = [0.15, 0.8]
-world = 1.0
-[material]
-light = "diffuse"
-index = 1.4
-name = "skin1"
-[tolerance]
-error = 0.02
-[budget]
-ms = 5.0
-"""
 
 
 def test_an_older_file_is_told_what_to_write(tmp_path):
     path = tmp_path / "old.toml"
-    path.write_text(OLD, encoding="utf-8")
+    path.write_text(
+        "[view]\npixel = [0.15, 0.8]\nworld = 1.0\n[tolerance]\nerror = 0.02\n[budget]\nms = 5.0\n"
+        '[material]\nlight = "diffuse"\nindex = 1.4\nname = "skin1"\n',
+        encoding="utf-8",
+    )
     with pytest.raises(InputError) as caught:
         read(path)
     assert str(caught.value) == (
@@ -154,11 +139,7 @@ WRONG = [
     ("mfp = 0.5", 'mfp = "0.5"', r"\[material.blue\] mfp must be .* got '0.5'"),
     ("mfp = 0.5", "mfp = 0.5\ncolour = 1", r"\[material.blue\] keys must be of reflectance, mfp, got 'colour'"),
     ("mfp = 0.5", "mfp = 1e-300", r"\[material.blue\] mfp must be a number > 0 and >= 1e-09"),
-    (
-        "[technique]",
-        "[technique]\nillumination = 'sun'",
-        r"\[technique\] illumination must be one of searchlight, diff",
-    ),
+    ("tolerance = 0.01", "illumination = 'sun'", r"\[technique\] illumination must be one of searchlight, diff"),
     ("n = 1.0", "n = 1.7", r"toml: n must be a refractive index in \[1, 1.6\], got 1.7"),
     ("n = 1.0", 'n = 1.0\nunit = "cm"', r"toml: unit must be one of mm, got 'cm'"),
     ("n = 1.0", 'n = 1.0\nunit = "\\u001b[31m"', r"unit must be one of mm, got '\\x1b\[31m'"),
@@ -172,11 +153,7 @@ WRONG = [
     ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0.* got -1"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
     ("", "[[layers]]\nn = 1\nmu_a = [1, 2]\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .* or three .* got \[1, 2\]"),
-    (
-        "",
-        f"[[layers]]\nn = {10**400}\nmu_a = 1\nmu_s = 1\ng = 0",
-        r"a whole number of 401 digits, of 300 at most, of 'n' \(at line",
-    ),
+    ("", f"[[layers]]\nn = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'n' \(at line"),
     ("", "[[layers]]\nn = 1\nmu_a = '1'\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .*, got '1'"),
     ("n = 1.0", "n = 1.0\nlayers = []", r"toml: layers must be tables \[\[layers\]\], got \[\]"),
     ("[choose]", "[choose", "is not TOML: "),

@@ -5,49 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit.studies.stability.cells import (
-    ADVICE,
-    ARITHMETICS,
-    FLOAT64,
-    LENGTHS,
-    TEXT16,
-    ArgumentGrid,
-    Cells,
-    Verdict,
-    absolute,
-    axis,
-    judged,
-    labelled,
-    regions_of,
-    relative,
-    shown,
-    steps_down,
-    steps_up,
-)
-
-DTYPES = (np.float16, np.float32, np.float64)
+from profilefit.studies.stability import cells
+from profilefit.studies.stability.cells import ArgumentGrid, Cells, Verdict, axis, judged, regions_of, relative
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
 def test_every_cell_is_a_number_of_its_format(dtype):
+    """Lengths reach both ends of what is accepted, and beyond."""
     grid = ArgumentGrid.of(dtype)
     for at in (grid.alpha, grid.x, grid.xi, grid.mfp):
         np.testing.assert_array_equal(at.values.astype(dtype).astype(float), at.values)
         assert np.all(np.diff(at.values) > 0)
     limits = np.finfo(dtype)
-    assert grid.alpha.values[0] == 0
-    assert grid.alpha.values[-1] == 1
+    assert (grid.alpha.values[0], grid.alpha.values[-1]) == (0, 1)
     assert {float(limits.smallest_subnormal), float(limits.tiny)} <= set(grid.alpha.values)
     assert {float(limits.max), np.inf} <= set(grid.x.values)
     assert 1.0 - float(limits.epsneg) in grid.xi.values
-
-
-@pytest.mark.parametrize("dtype", DTYPES)
-def test_lengths_reach_both_ends_of_what_is_accepted_and_beyond(dtype):
-    low, high = LENGTHS[dtype]
-    grid = ArgumentGrid.of(dtype)
-    assert np.min(grid.mfp.values[grid.accepted]) == dtype(low)
-    assert np.max(grid.mfp.values[grid.accepted]) == dtype(high)
+    low, high = cells.LENGTHS[dtype]
+    accepted = grid.mfp.values[grid.accepted]
+    assert (np.min(accepted), np.max(accepted)) == (dtype(low), dtype(high))
     assert not np.all(grid.accepted)
     assert np.all(ArgumentGrid.of(dtype, beyond=False).mfp.values <= max(high, 1e3))
 
@@ -57,25 +33,13 @@ def test_lengths_reach_both_ends_of_what_is_accepted_and_beyond(dtype):
     [(0.0, "0"), (2.0**-24, "2^-24"), (1 - 2.0**-53, "1-2^-53"), (0.25, "0.25"), (np.inf, "inf"), (1.0, "1")],
 )
 def test_numbers_as_a_person_writes_them(value, text):
-    assert shown(value) == text
+    assert cells.shown(value) == text
 
 
 def test_a_span_says_all_where_it_is_all():
-    alpha = axis("α", [0.0, 0.5, 1.0])
-    assert alpha.span(0, 2) == "all α"
-    assert alpha.span(1, 2) == "α 0.5 … 1"
-    assert alpha.span(1, 1) == "α 0.5"
-    assert labelled("of", ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"
-
-
-BOUND = 1e-3
-
-
-def verdict(value, reference, inside=True, dtype=np.float64, dim=False, wrong_way=False):
-    value, reference = np.array([value]), np.array([reference])
-    error = relative(value, reference)
-    codes = judged(value, reference, error, BOUND, np.array([inside]), dtype, np.array([dim]), np.array([wrong_way]))
-    return Verdict(codes[0])
+    spans = [axis("α", [0.0, 0.5, 1.0]).span(*ends) for ends in ((0, 2), (1, 2), (1, 1))]
+    assert spans == ["all α", "α 0.5 … 1", "α 0.5"]
+    assert cells.labelled("of", ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"
 
 
 @pytest.mark.parametrize(
@@ -102,7 +66,11 @@ def verdict(value, reference, inside=True, dtype=np.float64, dim=False, wrong_wa
     ],
 )
 def test_class_of_a_cell(given, expected):
-    assert verdict(**given) == expected
+    of = {"dtype": np.float64, "inside": True, "dim": False, "wrong_way": False, **given}
+    dtype = of.pop("dtype")
+    of = {name: np.array([one]) for name, one in of.items()}
+    error = relative(of["value"], of["reference"])
+    assert judged(**of, error=error, bound=1e-3, dtype=dtype)[0] == expected
 
 
 @pytest.mark.parametrize("bound", [np.inf, np.nan])
@@ -110,10 +78,7 @@ def test_without_a_bound_nothing_is_right(bound):
     one = np.ones(2)
     codes = judged(one, one, 0.0 * one, bound, np.array([True, False]), np.float64)
     np.testing.assert_array_equal(codes, [Verdict.NOT_JUDGED, Verdict.OUTSIDE])
-
-
-def test_what_is_not_judged_shows_beside_what_is_right():
-    """A figure shows the largest class over all lengths."""
+    # A figure shows the largest class over all lengths: what is not judged beside what is right.
     assert max(Verdict.RIGHT, Verdict.OUTSIDE, Verdict.BEYOND, Verdict.NOT_JUDGED) == Verdict.NOT_JUDGED
     assert not Verdict.NOT_JUDGED.is_red
 
@@ -123,28 +88,29 @@ def test_failures_are_the_red_classes_inside():
     one = np.ones(codes.shape)
     at = axis("x", np.arange(codes.size))
     for inside in (True, False):
-        cells = Cells("f", True, "cdf", FLOAT64, (at,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
-        np.testing.assert_array_equal(cells.failures, [inside and each.is_red for each in Verdict])
+        tensor = Cells("f", True, "cdf", cells.FLOAT64, (at,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
+        np.testing.assert_array_equal(tensor.failures, [inside and each.is_red for each in Verdict])
 
 
 def test_steps_count_beyond_rounding_only():
     rising = np.array([[1.0, 2.0, 2.0 - 1e-15, 1.9, np.inf, np.nan]])
-    np.testing.assert_array_equal(steps_down(rising, 1, np.float64), [[False, False, False, True, False, False]])
-    np.testing.assert_array_equal(steps_up(-rising, 1, np.float64), steps_down(rising, 1, np.float64))
-    assert not steps_down(rising, 1, np.float16)[0, 3] or 16 * np.finfo(np.float16).eps * 2.0 < 0.1
+    down = cells.steps_down(rising, 1, np.float64)
+    np.testing.assert_array_equal(down, [[False, False, False, True, False, False]])
+    np.testing.assert_array_equal(cells.steps_up(-rising, 1, np.float64), down)
+    assert not cells.steps_down(rising, 1, np.float16)[0, 3] or 16 * np.finfo(np.float16).eps * 2.0 < 0.1
 
 
 def test_errors_of_equal_infinities_are_none():
     value, right = np.array([np.inf, 0.0, 1.0]), np.array([np.inf, 0.0, 2.0])
     np.testing.assert_array_equal(relative(value, right), [0.0, 0.0, 0.5])
-    np.testing.assert_array_equal(absolute(value, right), [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(cells.absolute(value, right), [0.0, 0.0, 1.0])
 
 
 def small_cells(codes, **changed):
     """A tensor of half precision over l."""
     axes, one = (axis("α", [0.5]), axis("l", [1.0, 2.0, 2.0**-14], "length")), np.ones((1, 3))
-    cells = Cells("f", False, "cdf", TEXT16, axes, one, one, one, 0.1, one > 0, np.array([codes], np.int8))
-    return replace(cells, **changed)
+    tensor = Cells("f", False, "cdf", cells.TEXT16, axes, one, one, one, 0.1, one > 0, np.array([codes], np.int8))
+    return replace(tensor, **changed)
 
 
 def test_neighbours_of_one_class_are_one_region():
@@ -155,20 +121,17 @@ def test_neighbours_of_one_class_are_one_region():
     assert regions_of(small_cells([fine, Verdict.OUTSIDE, Verdict.BEYOND])) == []
 
 
-def test_a_region_has_its_worst_cell():
+def test_a_region_has_its_worst_cell_and_says_why_it_is_not_judged():
     (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3, error=np.array([[0.2, 0.5, 0.3]])))
     assert (region.place, region.error, region.where) == ("α 0.5; l 2", 0.5, "α 0.5; all l")
-
-
-def test_what_is_not_judged_is_a_region_that_says_why():
     (region,) = regions_of(small_cells([Verdict.NOT_JUDGED] * 3, unjudged="no text"))
     assert (region.verdict, region.advice) == (Verdict.NOT_JUDGED, "no text")
     assert not region.is_failure
 
 
 def test_every_arithmetic_has_its_advice():
-    assert set(ADVICE) == set(ARITHMETICS)
+    assert set(cells.ADVICE) == set(cells.ARITHMETICS)
     (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3))
-    assert region.advice == ADVICE[TEXT16]
+    assert region.advice == cells.ADVICE[cells.TEXT16]
     (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3, advice="mend it"))
     assert region.advice == "mend it"

@@ -13,20 +13,9 @@ from profilefit.studies.stability.cells import Verdict, regions_of
 from profilefit.studies.stability.scenes import FILLED, FULL, SLENDER, filled
 
 
-@pytest.fixture(scope="module")
-def hits():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "RAYS", 200)
-        return list(scenes.of_hits())
-
-
-@pytest.fixture(scope="module")
-def segments():
-    return list(scenes.of_segment())
-
-
-def test_steps_hold_and_iterations_fail_where_rays_cross_twice(hits):
-    ours, published = hits
+def test_steps_hold_and_iterations_fail_where_rays_cross_twice(monkeypatch):
+    monkeypatch.setattr(scenes, "RAYS", 200)
+    ours, published = scenes.of_hits()
     sixteen, eight, newton = ours.value
     assert np.all(sixteen <= 0.01)
     assert np.all(eight[:-1] <= 0.01)
@@ -42,11 +31,11 @@ def test_steps_hold_and_iterations_fail_where_rays_cross_twice(hits):
 def test_level_floors_are_hit_from_every_depth(monkeypatch):
     """No view of a level or nearly level floor misses it in float32; views that miss are counted."""
     assert scenes.of_level_floors().verdicts == {Verdict.RIGHT}
-    monkeypatch.setattr(
-        scenes,
-        "first_hit",
-        lambda *given, precision: np.nan * first_hit(*given) if precision == np.float32 else first_hit(*given),
-    )
+
+    def missing(*given, precision):
+        return np.nan * first_hit(*given) if precision == np.float32 else first_hit(*given)
+
+    monkeypatch.setattr(scenes, "first_hit", missing)
     assert scenes.of_level_floors().verdicts == {Verdict.INACCURATE}
 
 
@@ -59,8 +48,8 @@ def test_e_to_the_minus_ct_fails_from_the_depth_that_is_told():
     assert np.max(beam.error) > 0.5
 
 
-def test_the_segment_holds_from_against_the_beam_to_along_it(segments):
-    text, library, plain = segments
+def test_the_segment_holds_from_against_the_beam_to_along_it():
+    text, library, plain = scenes.of_segment()
     for one in (text, library):
         assert one.verdicts == {Verdict.RIGHT}
         assert np.max(one.error) < 1e-6
@@ -73,49 +62,40 @@ def test_the_segment_holds_from_against_the_beam_to_along_it(segments):
     assert np.any(plain.codes[(x > 0) & (x < 0.1)] == Verdict.INACCURATE)
 
 
-def test_the_plain_segment_as_ours_would_be_a_failure(monkeypatch):
-    """Negative control."""
-    monkeypatch.setattr(scenes, "segment_text", lambda *_: PLAIN_SEGMENT)
-    text = next(scenes.of_segment())
-    assert any(one.is_failure for one in regions_of(text))
-
-
 PLAIN_SEGMENT = """\
 def law_integral(c, s0, t0, m, t1):
     x = c * (1.0 + m) * t1
     return np.exp(-c * (s0 + t0)) * (1.0 - np.exp(-x)) / x * t1
 """
+PLAIN_SHADOW = """\
+def law_shadow(r, d):
+    beyond = r * r * (3.14159265 - np.arccos(np.minimum(r / d, 1.0))) + r * np.sqrt(np.maximum(d * d - r * r, 0.0))
+    return np.where(d <= r, 3.14159265 * r * r, beyond)
+"""
 
 
-@pytest.fixture(scope="module")
-def shells():
-    return list(scenes.of_shells())
+@pytest.mark.parametrize(
+    ("of", "text", "plain"),
+    [(scenes.of_segment, "segment_text", PLAIN_SEGMENT), (scenes.of_shadow, "strand_text", PLAIN_SHADOW)],
+    ids=["segment", "shadow, by acos"],
+)
+def test_a_plain_formula_as_ours_would_be_a_failure(monkeypatch, of, text, plain):
+    """Negative control."""
+    monkeypatch.setattr(scenes, text, lambda *_: plain)
+    assert any(one.is_failure for one in regions_of(next(of())))
 
 
-@pytest.fixture(scope="module")
-def slabs():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "PATCH_RAYS", 1200)
-        return scenes.of_slabs()
-
-
-@pytest.fixture(scope="module")
-def shadows():
-    return list(scenes.of_shadow())
-
-
-def test_shells_hold_where_they_are_promised_and_else_have_gaps_or_are_another_strand(shells):
-    ours, published = shells
+def test_shells_hold_where_they_are_promised_and_else_have_gaps_or_are_another_strand():
+    ours, published = scenes.of_shells()
     assert np.mean(ours.inside) > 0.4
     assert not any(one.is_failure for one in regions_of(ours))
     for one in (ours, published):  # gaps hide too little, another strand too much
         red = one.value[one.codes == Verdict.INACCURATE]
         assert np.min(red) < 1.0 < np.max(red)
+        assert one.verdicts == {Verdict.RIGHT, Verdict.INACCURATE}
     linear, quadratic = published.value
     assert np.all(linear <= 1.0 + 1e-9)
     assert np.all(quadratic[3:, -1] == pytest.approx(1.3, abs=0.03))
-    for one in (ours, published):
-        assert one.verdicts == {Verdict.RIGHT, Verdict.INACCURATE}
 
 
 @pytest.mark.parametrize("degrees", [20.0, 50.0, 70.0, 82.0])
@@ -130,7 +110,9 @@ def test_where_fitted_shells_hold_is_right_at_other_angles(degrees):
 
 
 @pytest.mark.slow
-def test_slabs_hold_below_their_limits_and_a_second_strand_is_missed_beyond(slabs):
+def test_slabs_hold_below_their_limits_and_a_second_strand_is_missed_beyond(monkeypatch):
+    monkeypatch.setattr(scenes, "PATCH_RAYS", 1200)
+    slabs = scenes.of_slabs()
     one, two = slabs.value
     assert not any(region.is_failure for region in regions_of(slabs))
     assert {one.verdict for one in regions_of(slabs)} == {Verdict.INACCURATE}
@@ -147,8 +129,8 @@ def test_a_higher_limit_would_be_a_failure(monkeypatch):
     assert any(one.is_failure for one in regions_of(scenes.of_slabs()))
 
 
-def test_a_cones_shadow_keeps_its_digits_next_to_the_root_and_at_grazing_angles(shadows):
-    text, plain = shadows
+def test_a_cones_shadow_keeps_its_digits_next_to_the_root_and_at_grazing_angles():
+    text, plain = scenes.of_shadow()
     assert text.verdicts == {Verdict.RIGHT}
     assert np.max(text.error) < 1e-6
     red = plain.codes == Verdict.INACCURATE
@@ -156,20 +138,6 @@ def test_a_cones_shadow_keeps_its_digits_next_to_the_root_and_at_grazing_angles(
     assert plain.verdicts == {Verdict.RIGHT, Verdict.INACCURATE}
     assert np.all(np.isfinite(plain.value))
     assert np.max(plain.error) > 2e-6
-
-
-def test_the_formula_by_acos_as_ours_would_be_a_failure(monkeypatch):
-    """Negative control."""
-    monkeypatch.setattr(scenes, "strand_text", lambda *_: PLAIN_SHADOW)
-    text = next(scenes.of_shadow())
-    assert any(one.is_failure for one in regions_of(text))
-
-
-PLAIN_SHADOW = """\
-def law_shadow(r, d):
-    beyond = r * r * (3.14159265 - np.arccos(np.minimum(r / d, 1.0))) + r * np.sqrt(np.maximum(d * d - r * r, 0.0))
-    return np.where(d <= r, 3.14159265 * r * r, beyond)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +149,7 @@ def cells():
 
 
 @pytest.mark.slow  # an instrument
-def test_poles_and_coarse_texels_fail_and_nothing_else(cells):
+def test_poles_and_coarse_texels_fail_and_nothing_else_nor_a_seam(cells):
     regions = [one for each in cells for one in regions_of(each)]
     assert {one.advice for one in regions} == {scenes.AT_POLES, scenes.COARSE}
     assert {(one.subject, one.verdict) for one in regions} == {
@@ -193,13 +161,7 @@ def test_poles_and_coarse_texels_fail_and_nothing_else(cells):
     assert np.max(ball.error[ball.inside]) < 0.02 < np.max(ball.error) < 0.1
     assert np.max(stretch.error[stretch.inside]) < 0.01
     assert np.max(view.error) < 0.01
-
-
-@pytest.mark.slow  # an instrument
-def test_a_seam_is_no_place_of_its_own(cells):
-    """A column from the seam is off by what others of its latitude are."""
-    ball = cells[0]
-    away = np.max(ball.error[:, :4, 1:], axis=2)
+    away = np.max(ball.error[:, :4, 1:], axis=2)  # a column from the seam is off by what others of its latitude are
     assert np.all(ball.error[:, :4, 0] < 2.0 * away + 1e-3)
 
 

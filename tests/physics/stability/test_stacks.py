@@ -55,9 +55,8 @@ def test_laws_in_python(albedos, is_negative):
     found = reds(*stacks.of_law(one, FLOAT64, stacks.UNDRAWN))
     assert wrong(found) == []
     assert one.holds != is_negative
-    assert {each.verdict for each in found if each.quantity == PROFILE} == (
-        {Verdict.NEGATIVE} if is_negative else set()
-    )
+    profiles = {each.verdict for each in found if each.quantity == PROFILE}
+    assert profiles == ({Verdict.NEGATIVE} if is_negative else set())
 
 
 def test_constants_of_other_layers_are_a_failure():
@@ -93,7 +92,5 @@ def test_light_scattered_once(monkeypatch, n):
     assert all("g -0.95" in one.where for one in found)
     assert np.mean(single.inside) > 0.8
     scatter = stacks.single_scattering  # negative control: a direction that is off in the ninth digit
-    monkeypatch.setattr(
-        stacks, "single_scattering", lambda medium, *of: scatter(medium, of[0], of[1] * (1 - 1e-8), of[2])
-    )
+    monkeypatch.setattr(stacks, "single_scattering", lambda of, i, o, turned: scatter(of, i, o * (1 - 1e-8), turned))
     assert Verdict.INACCURATE in stacks.once(n, FLOAT64).verdicts

@@ -1,4 +1,4 @@
-"""Profile laws: the forms that are timed are those that are judged, functions counted by hand, times and errors."""
+"""Laws: what is timed is what is judged, functions counted by hand, times and errors; noise and bias of samplers."""
 
 from collections import Counter
 
@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 
 import profilefit
-from mcml_sim import exact
+from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.burley import BurleySampler
-from profilefit.studies.tradeoff import laws
+from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
+from profilefit.studies.tradeoff import laws, samplers
 from profilefit.studies.tradeoff.laws import YARDSTICK, LawSpec, count, described, with_samplers
 from profilefit.studies.tradeoff.stopwatch import Rates
 
+BURLEY = profilefit.load("burley", "published")
 SMALL = laws.LawSizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
 
 
@@ -24,39 +26,33 @@ def test_fast_forms_are_the_laws():
     """In float32, as they are timed."""
     alpha = jnp.array([[0.1], [0.8], [0.99]])
     x, xi = jnp.geomspace(0.01, 5.0, 50), jnp.linspace(0.01, 0.99, 50)
-    law = profilefit.load("burley", "published")
-    for contender, sampler in zip(with_samplers(YARDSTICK, law), ("exact", "xie"), strict=True):
+    for contender, name in zip(with_samplers(YARDSTICK, BURLEY), ("exact", "xie"), strict=True):
         profile, drawn = jax.jit(lambda c=contender: (c.profile(x, alpha), c.sample(xi, alpha)))()
-        np.testing.assert_allclose(profile, law.scaled_profile(x, alpha), rtol=1e-5)
-        np.testing.assert_allclose(drawn, law.samplers[sampler].scaled_sample(xi, alpha), rtol=2e-5, atol=1e-6)
-        assert type(contender.judged) is type(law.samplers[sampler])
+        np.testing.assert_allclose(profile, BURLEY.scaled_profile(x, alpha), rtol=1e-5)
+        sampler = BURLEY.samplers[name]
+        np.testing.assert_allclose(drawn, sampler.scaled_sample(xi, alpha), rtol=2e-5, atol=1e-6)
+        assert type(contender.judged) is type(sampler)
     (quantile,) = with_samplers("quantile", profilefit.load("quantile"))
     drawn, profile = jax.jit(lambda: quantile.both(xi, alpha))()
     np.testing.assert_allclose(drawn, jax.jit(lambda: quantile.sample(xi, alpha))(), rtol=1e-6)
     np.testing.assert_allclose(profile, jax.jit(lambda: quantile.profile(drawn, alpha))(), rtol=1e-5)
 
 
-def test_fast_form_in_diffuse_mean_free_paths():
-    law = profilefit.load("burley_diffuse_mfp", "published")
+def test_fast_form_in_diffuse_mean_free_paths_and_fast_pdf():
+    law, r = profilefit.load("burley_diffuse_mfp", "published"), np.geomspace(0.01, 5.0, 9)
     (fast,) = with_samplers("own", law)
-    r = np.geomspace(0.01, 5.0, 9)
     np.testing.assert_allclose(fast.law.profile(r, 0.8), law.profile(r, 0.8), rtol=1e-12)
     assert fast.constants == (3, 0)
-
-
-def test_fast_pdf_is_that_of_the_law():
-    law = profilefit.load("burley", "published")
-    fast = next(with_samplers(YARDSTICK, law))
-    r = np.geomspace(0.01, 5.0, 9)
-    np.testing.assert_allclose(fast.sampler.pdf(r, 0.8), law.sampler.pdf(r, 0.8), rtol=1e-12)
+    fast = next(with_samplers(YARDSTICK, BURLEY))
+    np.testing.assert_allclose(fast.sampler.pdf(r, 0.8), BURLEY.sampler.pdf(r, 0.8), rtol=1e-12)
 
 
 def test_what_cannot_be_had_is_left_out_by_name():
     specs = (LawSpec(YARDSTICK, "burley", "published"), LawSpec("absent", "gaussians", "no-such-set"))
     found, left_out = laws.contenders(specs=specs)
     assert [one.name for one in found] == [YARDSTICK, f"{YARDSTICK}, Xie's sampler"]
-    assert len(left_out) == 1
-    assert left_out[0].startswith("absent: constants must be one of")
+    (line,) = left_out
+    assert line.startswith("absent: constants must be one of")
     with pytest.raises(InputError, match="laws must have normalized diffusion among them"):
         laws.contenders(specs=specs[1:])
 
@@ -94,25 +90,21 @@ def test_counts_each_step_of_a_loop():
         count(lambda x, _: jax.lax.while_loop(lambda y: y.sum() > 1, lambda y: y / 2, x))
 
 
-def test_normalized_diffusion_takes_two_exponentials_or_one():
-    law = profilefit.load("burley", "published")
-    assert count(law.scaled_profile).point == Counter(exp=2)
-    assert count(BurleySampler(law).scaled_sample).point == Counter(cbrt=1, log=1, sqrt=1)
-    exact, xie = with_samplers("normalized diffusion", law)
-    assert count(exact.profile).point == Counter(exp=1)
-    assert count(exact.sample).point == Counter(exp=1, log=2, sqrt=1)
-    assert count(xie.sample).point == Counter(log=1)
-
-
-def test_hazard_takes_what_its_docstring_says():
+def test_functions_of_normalized_diffusion_and_of_hazard():
+    """Two exponentials or one; what hazard's docstring says."""
+    exact, xie = with_samplers("normalized diffusion", BURLEY)
     one, two = with_samplers("hazard", profilefit.load("hazard"))
-    assert count(one.profile).point == Counter(exp=1, log=1)
-    assert count(one.sample).point == Counter(log=3)
-    assert count(two.sample).point == Counter(log=5)
-
-
-def test_described():
-    assert described(Counter(log=2, exp=1)) == "exp, 2 log"
+    for function, text in (
+        (BURLEY.scaled_profile, "2 exp"),
+        (BurleySampler(BURLEY).scaled_sample, "cbrt, log, sqrt"),
+        (exact.profile, "exp"),
+        (exact.sample, "exp, 2 log, sqrt"),
+        (xie.sample, "log"),
+        (one.profile, "exp, log"),
+        (one.sample, "3 log"),
+        (two.sample, "5 log"),
+    ):
+        assert described(count(function).point) == text
     assert described(Counter()) == "–"
 
 
@@ -147,3 +139,60 @@ def test_rows_become_points():
     assert liang.worst.value >= liang.error.value > 0.05
     assert liang.cost.low <= liang.cost.value <= liang.cost.high
     assert np.isfinite(liang.cost.value)
+
+
+ALPHA, EDGE = 0.8, 1.0
+FEW = samplers.SamplerSizes((ALPHA,), (EDGE,), 40)
+
+
+UNIFORM = samplers.UniformSampler(BURLEY)
+
+
+@pytest.mark.slow
+def test_bias_is_what_drawing_finds():
+    """With the right density and with a wrong one, which shows: radii are uniform, and the law's are not.
+
+    Drawn are thousands of samples, whose bias by the ratio of sums is next to none.
+    """
+    own, by_law_density = samplers.asymptotic_bias(UNIFORM, ALPHA, EDGE)
+    for bias, gather in ((own, by_law), (by_law_density, samplers.unweighted)):
+        of = gather(BURLEY, ALPHA, UNIFORM)
+        found = edge_estimate(of, random_points(4000, 12, 1), [-EDGE], ALPHA, BURLEY.setting)
+        assert abs(found.mean[0] - found.truth[0] - bias) < 3.3 * found.standard_error[0]  # 1e-3 two-sided
+    assert abs(own) < 0.01 < 0.1 < abs(by_law_density)
+
+
+def test_an_exact_inverse_has_its_laws_bias_only():
+    own, by_law_density = samplers.asymptotic_bias(BURLEY.sampler, ALPHA, EDGE)
+    of_law = step_response(-EDGE, ALPHA, law=BURLEY) - step_response(-EDGE, ALPHA)
+    assert own == pytest.approx(of_law, abs=samplers.ROUNDING)
+    assert by_law_density == pytest.approx(own, abs=samplers.ROUNDING)
+
+
+@pytest.mark.slow
+def test_a_law_with_g_is_judged_by_light_that_scatters_forwards():
+    law = profilefit.load("hazard", setting=Setting(n=1.4, g=0.8))
+    own, by_law_density = samplers.asymptotic_bias(law.sampler, ALPHA, EDGE)
+    assert abs(own) < 1e-3  # .08 where its own albedo and the reduced one are mixed
+    assert by_law_density == pytest.approx(own, abs=1e-5)  # one step of the inverse, not two
+
+
+@pytest.mark.slow
+def test_noise_is_over_that_of_the_exact_quantile():
+    best = by_quantile(ALPHA)
+    assert samplers.error_ratios(best, best, ALPHA, BURLEY, 0, 20) == (1.0, 1.0)
+    ratios = samplers.noise_ratios(by_law, UNIFORM, FEW)
+    assert ratios.shape == (2, 1, samplers.BLOCKS)
+    assert ratios.min() > 1.3
+    assert np.ptp(ratios) > 0.0
+
+
+@pytest.mark.slow
+def test_wrong_densities_come_twice():
+    exactly, _ = with_samplers(YARDSTICK, BURLEY)
+    (found,) = samplers.ways_of(exactly, FEW)
+    assert found.name == YARDSTICK
+    noise, bias = samplers.points_of(found, samplers.WithSpread.exactly(2.0))
+    assert (noise.panel, bias.panel) == ("noise", "bias")
+    assert noise.error.low < noise.error.value < noise.error.high
+    assert bias.error.value == pytest.approx(abs(found.bias[0, 0]))
