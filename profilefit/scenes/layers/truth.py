@@ -78,37 +78,29 @@ def stack_table(
     low = max(least, LEAST * shortest)
     count = max(THICKNESSES, 1 + int(np.ceil(np.log(most / low) / WIDEST)))
     u, y = np.linspace(np.log(low), np.log(most), count), knots()
-    profile, cdf, reflectance, kappa = [], [], [], []
     # Far off light decays as in the layer in which it is slowest; rates in 1 / l. Equal channels are solved once.
     rates = {
         medium: min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * medium.layers[0].mfp
         for medium in media
     }
     solved = {one: _rows(one, np.exp(u), illumination, y, rate) for one, rate in rates.items()}
+    found = []
     for medium in media:
-        rate = rates[medium]
         known, within, whole = (np.array(column) for column in zip(*solved[medium], strict=True))
-        profile.append(RectBivariateSpline(u, y, known))
-        cdf.append(RectBivariateSpline(u, y, within))
-        reflectance.append(CubicSpline(u, whole))
-        kappa.append(rate)
-    return StackTable(least, most, u, tuple(profile), tuple(cdf), tuple(reflectance), tuple(kappa))
+        splines = RectBivariateSpline(u, y, known), RectBivariateSpline(u, y, within), CubicSpline(u, whole)
+        found.append((*splines, rates[medium]))
+    return StackTable(least, most, u, *zip(*found, strict=True))
 
 
 def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
     """Return a row for each thickness of the first layer."""
-    shapes: dict[float, tuple[Floats, Floats]] = {}
 
     def under(d: float) -> exact.Solution:
         return exact.solve(medium.with_first(d), illumination, NODES)
 
-    rows = []
-    for d in thicknesses.tolist():
-        seen = max(d, THINNEST * medium.layers[0].mfp)
-        if seen not in shapes:
-            shapes[seen] = _shape(under(seen), y, rate)
-        rows.append((*shapes[seen], under(d).reflectance))
-    return rows
+    seen = np.maximum(thicknesses, THINNEST * medium.layers[0].mfp).tolist()
+    shapes = {d: _shape(under(d), y, rate) for d in dict.fromkeys(seen)}
+    return [(*shapes[of], under(d).reflectance) for of, d in zip(seen, thicknesses.tolist(), strict=True)]
 
 
 def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:

@@ -69,7 +69,7 @@ class SeaPasses:
         for number, depth in enumerate(depths.tolist()):
             name, below = f"depth {number}", number * texels
             one = Caustics(renderer, world.sea, vertices, texels, depth, world.tilt, world.n, name=name)
-            rows, text = (below, below + texels), _text("stack.frag")
+            rows, text = (below, below + texels), text_beside(__name__, "glsl/stack.frag")
             stack = Pass("stack", {"light_map": one.map}, SHAFTS, text, {"below": below}, rows=rows)
             self.light["caustics in depths"] += [*one.passes(splats[1]), stack]
         self._lobes = _four(np.array(world.lobes)[None])
@@ -124,7 +124,9 @@ class SeaPasses:
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
         }
-        source = "".join((*map(read_text, ("common", "near_zero")), *map(_text, SOURCES)))
+        source = "".join(
+            (*map(read_text, ("common", "near_zero")), *(text_beside(__name__, f"glsl/{one}") for one in SOURCES))
+        )
         return Pass("view", reads, VIEW, source, given)
 
     def _irradiance(self, kind: str) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -242,7 +244,3 @@ def _four(array: NDArray) -> NDArray[np.float32]:
     found = np.zeros((*array.shape[:2], 4), np.float32)
     found[..., : array.shape[2]] = array
     return found
-
-
-def _text(file: str) -> str:
-    return text_beside(__name__, f"glsl/{file}")

@@ -191,7 +191,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
     facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
     seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
     below = 1.0 - np.sqrt(rng.random(len(way)))
-    new = np.column_stack(turn(*_columns(normal), below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
+    new = np.column_stack(turn(*normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
     new[sunny] = _turned(light.around, -beam[sunny], rng)
     lambert = np.maximum(np.sum(new * normal, axis=1), 0.0) / np.pi
@@ -244,13 +244,12 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
         start = place[often] * flip
         # What stands on a surface may be below it by a rounding.
         start[:, 2] = np.maximum(start[:, 2], -rises * surface.height(*place[often, :2].T))
-        bounds = (-rises * surface.highest, -rises * surface.lowest)
+        bounds = sorted((-rises * surface.highest, -rises * surface.lowest))
         hit = first_hit(
             lambda x, y: -rises * surface.height(x, y),
             start,
             way[often] * flip,
-            min(bounds),
-            max(bounds),
+            *bounds,
             STEPS,
             lambda x, y: (-rises * surface.slope(x, y)[0], -rises * surface.slope(x, y)[1]),
         )
@@ -261,7 +260,7 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
 def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
     """Return directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
-    return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
+    return np.column_stack(turn(*way.T, below, above, 2.0 * np.pi * rng.random(len(way))))
 
 
 def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
@@ -277,10 +276,6 @@ def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimu
     z = cosine * dz - across * sign * dx - along * dy
     norm = 1.0 / np.sqrt(x * x + y * y + z * z)
     return x * norm, y * norm, z * norm
-
-
-def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
-    return way[:, 0], way[:, 1], way[:, 2]
 
 
 def _density(phase: Phase, way: Floats, new: Floats) -> Floats:

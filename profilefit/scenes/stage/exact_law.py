@@ -19,9 +19,9 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from mcml_sim import Setting, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError, SettingError
+from profilefit.scenes.stage.buffers import Singles
 from profilefit.shader.emit import literal, text_beside
 
-Singles = NDArray[np.float32]
 DIFFUSE = Setting("diffuse")  # the light that irradiance is
 NAME = "exact"
 # Of textures.
