@@ -1,9 +1,11 @@
-"""Small scenes: balls under one light."""
+"""Small scenes, balls under one light; how triangles of a part turn; and calls that are refused."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from profilefit.errors import InputError
 from profilefit.scenes.skin import material
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
@@ -21,3 +23,17 @@ def scene(direction, *parts, kind="orthographic"):
     camera = Camera(eye=(0.0, 0.0, 100.0), height=30.0, kind=kind)
     light = Light(direction, (1.0, 1.0, 1.0))
     return Scene(parts or (ball(),), light, (0.1, 0.1, 0.1), camera)
+
+
+def outward(mesh):
+    """Share of a mesh's triangles, but for those at a pole, that turn as their normals."""
+    a, b, c = (mesh.position[mesh.triangles[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a)
+    agree = np.einsum("ij,ij->i", face, mesh.normal[mesh.triangles[:, 0]])
+    return np.mean(agree[np.linalg.norm(face, axis=1) > 1e-6] > 0)
+
+
+def refused(message, call, *given, error=InputError, **named):
+    """A call that raises an error whose text has this message, a regular expression."""
+    with pytest.raises(error, match=message):
+        call(*given, **named)
