@@ -3,6 +3,10 @@
 from copy import deepcopy
 from typing import Any
 
+import pytest
+
+from profilefit.errors import InputError
+
 Content = dict[str, Any]
 
 
@@ -19,3 +23,11 @@ def changed(example: Content, place: str = "", value: Any = None) -> Content:
         else:
             part[last] = value
     return found
+
+
+def mistaken(read, file: str, content: Content, message: str) -> None:
+    """Content that is refused in one line, which begins with the file's name."""
+    with pytest.raises(InputError, match=message) as caught:
+        read(file, content)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert str(caught.value).isprintable()

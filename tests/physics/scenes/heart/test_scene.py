@@ -1,5 +1,7 @@
 """A heart of layers: what a file may say, how wrong each technique draws it, and its points and maps."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -9,14 +11,11 @@ from profilefit.errors import InputError
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.heart import chart, scene
 from tests.fixtures import slow
-from tests.physics.scenes.examples import changed
+from tests.physics.scenes.examples import changed, mistaken
 
 EXAMPLE = read_toml(shipped("examples") / "heart.toml")
 SMALL = {"camera": {"resolution": [64, 48]}, "technique": {"samples": 64, "texel": 0.5}}
-
-
-def content(place="", value=None):
-    return changed(EXAMPLE, place, value)
+content = partial(changed, EXAMPLE)
 
 
 KEYS = "keys must be of "
@@ -41,11 +40,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("place", "value", "message"), REFUSED)
 def test_a_mistake_is_one_line(place, value, message):
-    with pytest.raises(InputError, match=message) as caught:
-        scene.read("heart.toml", content(place, value))
-    text = str(caught.value)
-    assert text.startswith("heart.toml: ")
-    assert text.isprintable()
+    mistaken(scene.read, "heart.toml", content(place, value), message)
 
 
 @pytest.mark.slow
@@ -86,9 +81,8 @@ def test_the_split_is_nearest_to_the_truth(context, coarse):
 
 def test_a_picture_beside_its_truth(context, coarse):
     """By the texture alone, of a ball, with one Gaussian."""
-    told = {**content("surface", {"kind": "ball", "size": 15.0}), **SMALL}
-    told["technique"] = {"kind": "texture", "gaussians": 1, "samples": 4}
-    told["camera"] = {"resolution": [32, 24]}
+    told = content("surface", {"kind": "ball", "size": 15.0}) | {"camera": {"resolution": [32, 24]}}
+    told |= {"technique": {"kind": "texture", "gaussians": 1, "samples": 4}}
     found = scene.draw(context, scene.read("ball.toml", told))
     assert found.picture.shape == found.truth.shape == (24, 32, 3)
     assert found.point.label == "texture"
