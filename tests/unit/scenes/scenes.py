@@ -34,6 +34,7 @@ def outward(mesh):
 
 
 def refused(message, call, *given, error=InputError, **named):
-    """A call that raises an error whose text has this message, a regular expression."""
-    with pytest.raises(error, match=message):
+    """A call that raises an error of one line, in which this message is found, a regular expression."""
+    with pytest.raises(error, match=message) as caught:
         call(*given, **named)
+    assert "\n" not in str(caught.value)

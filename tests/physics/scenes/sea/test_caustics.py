@@ -279,7 +279,7 @@ def test_under_a_crest():
 
 @pytest.mark.parametrize(("depth", "tilt"), [(1.5, 0.0), (5.0, 0.4), (5.0, 1.2)])
 def test_no_light_is_lost(depth, tilt):
-    """A period of the floor has what entered through a period of the ridge_height, shaded waves and folds included."""
+    """A period of the floor has what entered through a period of the sea, shaded waves and folds included."""
     x = np.arange(2**16) * PERIOD / 2**16
     across = x * np.cos(tilt) + ridge_height(x) * np.sin(tilt)
     twice = np.concatenate([across - PERIOD * np.cos(tilt), across])

@@ -17,12 +17,12 @@ from profilefit.scenes.sea.paths import Sunlight, followed, met, traced, turn
 from profilefit.scenes.sea.scene import lobes_of
 from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, dense_hit, newton_hit, random_floor, random_sea, refracted, to_plane
+from tests.unit.scenes.scenes import refused
 
 SHARP = HenyeyGreenstein(0.924)
 OMEGAS = np.array([0.2, 0.5, 0.8])
 NONE, ONE = (0.0,) * 3, (1.0,) * 3
 DEPTHS, RADII = np.array([0.3, 1.0, 2.5]), np.array([0.05, 0.5, 2.0])
-from tests.unit.scenes.scenes import refused
 
 
 def test_one_scattering_is_its_integral(sidak):
