@@ -26,7 +26,6 @@ from tests.unit.scenes.scenes import refused, scene
 
 ALPHA = 0.8
 A = exact.reflectance(ALPHA, edges.DIFFUSE)
-SKIN = (0.95, 0.84, 0.68), (4.0, 3.0, 2.5)  # alpha, mfp [pixels]
 EVERY = [(kind, channels) for kind in KINDS for channels in CHANNELS]
 
 
@@ -79,7 +78,7 @@ def test_light_does_not_cross_a_gap(stage, burley, law, gap, bleeds):
 
 def test_channels_and_kinds_agree_in_the_mean(small, burley, sidak):
     """Three albedos and lengths: every way to draw radii has the same expectation, to the ratio's bias of 1/n."""
-    fixed_alpha, mfp = SKIN
+    fixed_alpha, mfp = (0.95, 0.84, 0.68), (4.0, 3.0, 2.5)  # of skin; mfp in pixels
     small.upload(step_edge((24, 24), 1.0, 1.0))
 
     def columns(kind, channels):
@@ -262,26 +261,19 @@ def test_a_step_edge_rises_where_the_material_lets_it(context):
 
 # Brow, nose and its shadow, and a band before it; of 60 rows one shows 0.6 mm, half of skin's mean free paths.
 CLOSE = replace(FACE, target=(14.0, 24.0, 50.0), height=36.0)
-POINTS, SEEDS = 32, 12
+POINTS = 32
 LAW_BIAS = 0.003  # of the light that A leaves: what the law is allowed at a step edge
 # 4.4 for 96 normal deviates at a chance of 1e-3 together; for t with 11 degrees of freedom 8.2.
 STUDENT = 1.9
 
 
-@pytest.fixture(scope="module")
-def hazard():
-    return profilefit.load("hazard", setting=edges.DIFFUSE)
-
-
-def errors(context, law, drawn, size, mfp, seeds=SEEDS, area=True, stretch=1.0):
+def errors(context, law, drawn, size, mfp, seeds=12, area=True, stretch=1.0):
     """Of 32 pixels and three channels (32, 3), as shares of A times the mean light, and their standard errors."""
     with Stage(context, size, shadow_side=512) as stage:
         stage.draw(drawn)
         buffers = stage.buffers()
-        runs = [
-            stage.scatter(law, stretch * np.array(mfp), Sampling(256, "importance", area=area, seed=seed))
-            for seed in range(seeds)
-        ]
+        draws = [Sampling(256, "importance", area=area, seed=seed) for seed in range(seeds)]
+        runs = [stage.scatter(law, stretch * np.array(mfp), one) for one in draws]
     surface, camera = seen(buffers)
     visible = np.argwhere(surface.mask)
     pixels = visible[np.random.default_rng(1).choice(len(visible), POINTS, replace=False)]
@@ -301,9 +293,9 @@ def view(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "head"])
-def test_a_scene_is_the_exact_profile_over_what_is_seen(context, hazard, sidak, name):
+def test_a_scene_is_the_exact_profile_over_what_is_seen(context, sidak, name):
     """Every pixel within its standard errors and the law's bias; half as much over all of them together."""
-    drawn = view(name)
+    hazard, drawn = profilefit.load("hazard", setting=edges.DIFFUSE), view(name)
     difference, error = errors(context, hazard, *drawn)
     assert np.all(np.abs(difference) < STUDENT * sidak(difference.size) * error + LAW_BIAS)
     assert np.sqrt(np.mean(difference**2)) < 1.2 * np.sqrt(np.mean(error**2)) + 0.5 * LAW_BIAS

@@ -165,12 +165,10 @@ def test_one_gaussian_is_an_error_function(normalisation):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "law", [None, ("hazard", "regenerated"), ("liang", "corrected"), ("gaussians:4", "regenerated")]
-)
+@pytest.mark.parametrize("law", [(), ("hazard",), ("liang", "corrected"), ("gaussians:4",)])
 def test_more_nodes_change_nothing(law, monkeypatch):
-    alphas = np.array([[1e-6], [0.5], [0.95], [1.0]] if law is None or law[0] != "liang" else [[0.05], [0.95], [1.0]])
-    chosen = law and profilefit.load(*law)
+    alphas = np.array([[0.05], [0.95], [1.0]] if "liang" in law else [[1e-6], [0.5], [0.95], [1.0]])
+    chosen = profilefit.load(*law) if law else None
     coarse = step_response(PLACES, alphas, law=chosen)
     monkeypatch.setattr(step_edge, "NODES", 2 * step_edge.NODES)
     np.testing.assert_allclose(coarse, step_response(PLACES, alphas, law=chosen), atol=1e-8)
@@ -180,9 +178,7 @@ def test_more_nodes_change_nothing(law, monkeypatch):
 
 @pytest.mark.slow
 def test_ends_symmetry_and_units():
-    assert step_response(0.0, 0.8) == 0.5
-    assert step_response(-1e6, 0.8) == 0.0
-    assert step_response(1e6, 0.8) == 1.0
+    assert [step_response(x, 0.8) for x in (-1e6, 0.0, 1e6)] == [0.0, 0.5, 1.0]
     # White light falls off as x^-3: beyond 1e7 mfp its last 1e-7 is given up.
     assert step_response(-1e5, 1.0) * 1e5 == pytest.approx(step_response(-1e4, 1.0) * 1e4, rel=1e-3)
     x = np.linspace(-3.0, 3.0, 7)
@@ -220,8 +216,6 @@ def test_misuse():
 
 ALPHA = 0.8
 A = exact.reflectance(ALPHA, edges.DIFFUSE)
-
-
 EXACT = ExactLaw((ALPHA,))
 
 
@@ -263,14 +257,13 @@ def rmse(light, truth):
     return np.sqrt(np.mean((light - truth) ** 2))
 
 
-# White-ish light goes far: the screen must hold it.
-EDGES = [(0.8, (128, 96), 8), pytest.param(0.95, (512, 512), 32, marks=pytest.mark.slow)]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("alpha", "size", "seeds"), EDGES)
+@pytest.mark.parametrize(("alpha", "size", "seeds"), [(0.8, (128, 96), 8), (0.95, (512, 512), 32)])
 def test_our_law_is_as_good_as_the_exact_quantile(context, alpha, size, seeds):
-    """The same points: noise at most 1.1 times as large, and a bias of at most 0.3 % of A; uniform radii have more."""
+    """The same points: noise at most 1.1 times as large, and a bias of at most 0.3 % of A; uniform radii have more.
+
+    White-ish light goes far: the screen must hold it.
+    """
     exact_light, truth = gathered(context, ExactLaw((alpha,)), alpha, size, seeds)
     hazard, other = (profilefit.load("hazard", setting=setting) for setting in (edges.DIFFUSE, Setting()))
     ours, _ = gathered(context, hazard, alpha, size, seeds)
@@ -331,10 +324,8 @@ def bias(context, degrees, depth, area=True, seeds=4):
     truth = edges.answer(distance[MIDDLE] / LONG, ALPHA)
     with Stage(context, ASLANT, shadow_side=16) as stage:
         stage.upload(buffers)
-        runs = [
-            stage.scatter(EXACT, LONG, Sampling(256, area=area, seed=seed))[MIDDLE][..., 0] for seed in range(seeds)
-        ]
-    return np.abs(np.mean(np.array(runs) / A - truth, axis=(0, 1))).max()
+        runs = [stage.scatter(EXACT, LONG, Sampling(256, area=area, seed=seed)) for seed in range(seeds)]
+    return np.abs(np.mean(np.array(runs)[:, *MIDDLE, 0] / A - truth, axis=(0, 1))).max()
 
 
 @pytest.mark.slow

@@ -38,13 +38,10 @@ def test_footprint_joins_the_corners_of_a_pixel(view):
         assert np.linalg.norm(np.cross(across, along)) == pytest.approx(0.25 / NORMAL[2])
 
 
-def test_an_outline_has_a_bounded_footprint():
+def test_footprints_of_an_outline_and_of_the_background():
+    """One is bounded. A render's positions and normals are 0 in the other; a 0 / 0 would warn, an error here."""
     across, along = View(2.0).footprint(np.zeros(3), np.array([1.0, 0.0, 0.0]))
     assert np.linalg.norm(np.cross(across, along)) <= 1.01 * 4.0 / LEAST_COSINE
-
-
-def test_background_at_the_eye_has_no_footprint():
-    """A render's positions and normals are 0 there; a 0 / 0 would warn, which is an error here."""
     position, normal = np.stack([THROUGH, np.zeros(3)]), np.stack([NORMAL, np.zeros(3)])
     view = View(0.002, True)
     across, along = view.footprint(position, normal)
@@ -53,9 +50,7 @@ def test_background_at_the_eye_has_no_footprint():
 
 
 def _plane(h, w, **changed):
-    fields = {name: np.full((h, w, 3), 0.5) for name in ("position", "irradiance", "reflectance")}
-    fields["normal"] = np.broadcast_to([0.0, 0.0, 1.0], (h, w, 3))
-    return Surface(**{**fields, "mask": np.ones((h, w), bool), **changed})
+    return flat(h, w, 0.5)._replace(**changed)
 
 
 def test_coarsened_is_the_mean_of_blocks():
@@ -69,15 +64,13 @@ def test_coarsened_is_the_mean_of_blocks():
 
 
 def test_seen_is_the_render_in_view_space():
+    """And what the shaders take for inside."""
     surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
     np.testing.assert_allclose(along[1, 2], surface.position[2, 2] - surface.position[1, 2])
     assert surface.mask.all()
     assert not view.is_perspective
-
-
-def test_seen_is_what_the_shaders_take_for_inside():
     plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
@@ -184,9 +177,8 @@ def test_step_edge_is_the_integral():
 def test_short_mean_free_path_is_lambert():
     surface = hill(4, 6)
     found = gathered(surface, VIEW, np.full(3, 1e-3))
-    np.testing.assert_allclose(
-        found.light[surface.mask], (surface.reflectance * surface.irradiance)[surface.mask], rtol=1e-3
-    )
+    lambert = surface.reflectance * surface.irradiance
+    np.testing.assert_allclose(found.light[surface.mask], lambert[surface.mask], rtol=1e-3)
     assert not found.light[1, 2].any()
 
 
@@ -222,7 +214,10 @@ def test_refined_says_what_coarse_pixels_cost():
 
 
 def test_a_table_of_ones_own():
-    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself.
+
+    In a picture, where nothing scatters inside, the map is A all the same.
+    """
 
     def stretched(values):
         assert values.size % 3 == 0
@@ -235,10 +230,6 @@ def test_a_table_of_ones_own():
     np.testing.assert_array_equal(found.light, truth.light)
     np.testing.assert_array_equal(found.share, truth.share)
     assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
-
-
-def test_a_table_of_ones_own_in_a_picture():
-    """Where nothing scatters inside, the map is A all the same."""
     half = SimpleNamespace(curves=lambda values: exact_table(DIFFUSE).curves(0.5 * values))
     mask = np.ones((4, 6), np.float32)
     mask[:, 0] = 0.0

@@ -1,6 +1,8 @@
-"""Small scenes, balls under one light; how triangles of a part turn; and calls that are refused."""
+"""Small scenes, balls under one light; scenes' files with one thing changed; and what is refused."""
 
+from copy import deepcopy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +36,28 @@ def outward(mesh):
 
 
 def refused(message, call, *given, error=InputError, **named):
-    """A call that raises an error of one line, in which this message is found, a regular expression."""
+    """Text of the error that a call raises: one line, in which this message is found, a regular expression."""
     with pytest.raises(error, match=message) as caught:
         call(*given, **named)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
+    return str(caught.value)
+
+
+def changed(example: dict[str, Any], place: str = "", value: Any = None) -> dict[str, Any]:
+    """A copy, with another value at a dotted place, lists counted from 1; None takes what is there away."""
+    found = deepcopy(example)
+    if place:
+        *above, last = place.split(".")
+        part = found
+        for name in above:
+            part = part[int(name) - 1 if isinstance(part, list) else name]
+        if value is None:
+            del part[last]
+        else:
+            part[last] = value
+    return found
+
+
+def mistaken(read, file: str, content: dict[str, Any], message: str) -> None:
+    """Content that is refused in one line, which begins with the file's name."""
+    assert refused(message, read, file, content).startswith(f"{file}: ")

@@ -234,9 +234,7 @@ def test_links_of_a_sphere():
     np.testing.assert_allclose(over[..., 0], opposite, atol=0.1)
     np.testing.assert_allclose(over[..., 1], 2 * margin - 1 - own[:margin, margin : margin + columns, 1], atol=0.4)
     cut = inside & (own[..., 0] < margin + columns // 2)
-    alone = links(
-        np.where(cut[..., None], position, 0.0), cut, margin
-    )  # of half a sphere: beyond its rim nothing goes on
+    alone = links(np.where(cut[..., None], position, 0.0), cut, margin)  # half a sphere, that ends at its rim
     assert np.all(alone[margin + 6 : margin + rows - 6, :margin, 2] == 0.0)
 
 
@@ -292,27 +290,24 @@ def test_a_heart_is_blurred_as_its_sum(stage, apart):
         refused(f"charts must lie {6 * margin + 1} texels apart, .* some of 6 that", wide.draw, stage, part)
 
 
-def flawed(**changes) -> Part:
-    return Part(replace(bumps(10.0, 0.0, 20.0, 8), **changes), WHITE)
-
-
 SHEET = bumps(10.0, 0.0, 20.0, 8)
 COLLAPSED = np.where(SHEET.uv == SHEET.uv.max(), SHEET.uv[-2, 0], SHEET.uv)
 
 
 @pytest.mark.parametrize(
-    ("part", "message"),
+    ("uv", "message"),
     [
-        (flawed(uv=np.zeros((81, 0))), r"mesh must have a finite uv at each of 81 vertices, got an array of \(81, 0\)"),
-        (flawed(uv=SHEET.uv * np.nan), "mesh must have a finite uv at each of 81 vertices"),
-        (flawed(uv=2.0 * SHEET.uv), r"uv must be in \[0, 1\], got "),
-        (flawed(uv=0.0 * SHEET.uv), "triangles must have an area in the atlas, got 0 of triangle 0 of 128"),
-        (flawed(uv=COLLAPSED), "triangles must have an area in the atlas, got 0 of triangle 7 of 128"),
-        (flawed(uv=np.abs(SHEET.uv - 0.5)), "charts must not overlap, nor triangles turn over: they cover 6400 texels"),
+        (np.zeros((81, 0)), r"mesh must have a finite uv at each of 81 vertices, got an array of \(81, 0\)"),
+        (SHEET.uv * np.nan, "mesh must have a finite uv at each of 81 vertices"),
+        (2.0 * SHEET.uv, r"uv must be in \[0, 1\], got "),
+        (0.0 * SHEET.uv, "triangles must have an area in the atlas, got 0 of triangle 0 of 128"),
+        (COLLAPSED, "triangles must have an area in the atlas, got 0 of triangle 7 of 128"),
+        (np.abs(SHEET.uv - 0.5), "charts must not overlap, nor triangles turn over: they cover 6400 texels"),
     ],
 )
-def test_a_mesh_that_cannot_be_laid_out(stage, part, message):
+def test_a_mesh_that_cannot_be_laid_out(stage, uv, message):
     """Refused in one line, before links are made."""
+    part = Part(replace(SHEET, uv=uv), WHITE)
     stage.draw(Scene((part,)))
     with Atlas(stage.context, (100, 100), 10) as atlas:
         refused(message, atlas.draw, stage, part)

@@ -25,17 +25,11 @@ def nodes(count: int, low: float, high: float):
     return low + (high - low) * (x + 1) / 2, weight * (high - low) / 2
 
 
-def exitance(medium: Medium, cos_in: float) -> float:
-    """Share of what the beam brings to the surface that leaves after one scattering."""
-    cosine, weight = nodes(80, 0.0, 1.0)
-    turn = np.pi * (np.arange(64) + 0.5) / 64
-    radiance = single_scattering(medium, cos_in, cosine[:, None], turn)
-    return float(2 * np.pi * np.sum(weight[:, None] * cosine[:, None] * radiance) / 64 / cos_in)
-
-
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_its_total_under_a_searchlight_is_that_of_the_half_space(n):
-    total = exitance(half_space(0.9, n=n), 1.0)
+    cosine, weight = nodes(80, 0.0, 1.0)
+    radiance = single_scattering(half_space(0.9, n=n), 1.0, cosine[:, None], np.pi * (np.arange(64) + 0.5) / 64)
+    total = 2 * np.pi * np.sum((weight * cosine)[:, None] * radiance) / 64
     once = ring_shares(np.array([0.0, 1e3]), Setting(n=n))
     assert total == pytest.approx(0.9 * entered(Setting(n=n)) * float(np.sum(once)), rel=2e-6)
 
@@ -248,12 +242,16 @@ def test_dipole():
     np.testing.assert_array_equal(paper.dipole(STACK, r), paper.dipole(deeper, r))  # the first layer only
 
 
-def test_extinction():
+def test_extinction_surface_and_weights():
     """(6) and (9) by their names: exactly twice too bright at normal incidence, where nothing refracts."""
     medium = half_space(0.9)
     wrong = replace(CORRECTED, extinction=False)
     ratio = [paper.single_sum(medium, 1.0, 1.0, np.pi, 4096, 30.0, corrections) for corrections in (wrong, CORRECTED)]
     assert ratio[0] / ratio[1] == pytest.approx(2.0, rel=1e-4)
+    # (9): neither cosine nor Fresnel nor the narrowing of the beam.
+    beam = half_space(0.9, n=1.3), 1.0, 1.0, 0.0, 64, 6.0
+    passed = (1 - (0.3 / 2.3) ** 2) ** 2 / 1.3**2 * paper.single_sum(*beam, replace(CORRECTED, surface=False))
+    assert paper.single_sum(*beam) == pytest.approx(passed, rel=1e-9)
     # (2): the five weights sum to 1, though what they weigh is in one unit already, where each of them is 1.
     assert sum(paper.WEIGHTS) == pytest.approx(1.0)
     assert len(paper.WEIGHTS) == 5
@@ -274,14 +272,6 @@ def test_steps():
     # The step along the ray, refracted with its cosine.
     out = np.sqrt(1 - (1 - 0.5**2) / 1.3**2)
     assert (1 + error(16, step=False)) / (1 + error(16)) == pytest.approx(16 * out / 1.4)
-
-
-def test_surface():
-    """(9): neither cosine nor Fresnel nor the narrowing of the beam."""
-    medium, (cos_in, cos_out) = half_space(0.9, n=1.3), (1.0, 1.0)
-    bare = paper.single_sum(medium, cos_in, cos_out, 0.0, 64, 6.0, replace(CORRECTED, surface=False))
-    passed = (1 - (0.3 / 2.3) ** 2) ** 2 / 1.3**2
-    assert paper.single_sum(medium, cos_in, cos_out, 0.0, 64, 6.0) == pytest.approx(passed * bare, rel=1e-9)
 
 
 def test_every_misprint_has_a_switch_that_changes_something():

@@ -15,8 +15,7 @@ from profilefit.scenes.layers import scene
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from tests.physics.scenes.examples import changed, mistaken
-from tests.unit.scenes.scenes import outward, refused
+from tests.unit.scenes.scenes import changed, mistaken, outward, refused
 
 EXAMPLE = read_toml(shipped("examples") / "layers-head.toml")
 FOOT, WHOLE = -170.0, -40.0  # y below which nothing moves, and above which the head does as one [mm]

@@ -408,10 +408,10 @@ def test_error_over_samples():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("phase", [Isotropic(), SHARP])
 @pytest.mark.parametrize("bundle", [OVERHEAD, TILTED])
-def test_slices(bundle):
-    for phase in (Isotropic(), SHARP):
-        assert rms(by_slices, 64, bundle, phase) < 0.01
+def test_slices(bundle, phase):
+    assert rms(by_slices, 64, bundle, phase) < 0.01
 
 
 def test_flux_is_kept():

@@ -19,7 +19,7 @@ from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.renderer import Renderer
-from profilefit.scenes.stage.world import Camera
+from profilefit.scenes.stage.world import Camera, unit
 from tests.fixtures import EXAMPLES, slow
 
 TILE, N, DEPTH = 5.0, 1.34, 4.0
@@ -81,14 +81,9 @@ def optics(world, eye, way, to_and_fro=True):
 
 def directions(camera, size):
     """(rows, columns, 3) through the middles of pixels, row 0 at the bottom."""
-    forward = np.subtract(camera.target, camera.eye)
-    distance = np.linalg.norm(forward)
-    forward = forward / distance
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    x, y = (0.5 * camera.height / distance * (2.0 * np.arange(n) + 1.0 - n) / size[1] for n in size)
-    found = forward + x[None, :, None] * right + y[:, None, None] * np.cross(right, forward)
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+    right, up, forward = axes(camera, size)  # which `test_axes` holds
+    x, y = ((2.0 * np.arange(n) + 1.0) / n - 1.0 for n in size)
+    return unit(forward + x[None, :, None] * right + y[:, None, None] * up)
 
 
 @contextmanager
@@ -299,10 +294,8 @@ def test_errors_leave_the_truths_own_noise_out():
     spoiled = truth.copy()
     spoiled[40:60, 50:80] += 2.0
     where = found.relative_error(spoiled)
-    assert where[50, 65] > 1.8
-    assert np.median(where) < 0.3
-    error = found.truth_error
-    np.testing.assert_allclose(error.rms, 0.8 / np.sqrt(2.0), rtol=0.02)
+    assert np.median(where) < 0.3 < 1.8 < where[50, 65]
+    np.testing.assert_allclose(found.truth_error.rms, 0.8 / np.sqrt(2.0), rtol=0.02)
 
 
 @pytest.mark.slow
