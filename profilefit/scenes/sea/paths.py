@@ -94,21 +94,12 @@ class Event(NamedTuple):
     way: Floats
 
 
-class Traced(NamedTuple):
-    """Radiance of red, green and blue by each ray's paths, of two independent halves of them (2, n, 3)."""
-
-    halves: Floats
-
-    @property
-    def radiance(self) -> Floats:
-        """Mean radiance (n, 3) of both halves."""
-        return np.asarray(self.halves.mean(axis=0))
-
-
 def traced(
     world: World, light: Sunlight, origin: Floats, corner: Floats, across: Floats, up: Floats, paths: int, seed: int = 0
-) -> Traced:
-    """Return the radiance of pixels (n, 3) that an eye below the waves sees, each the mean over its area.
+) -> Floats:
+    """Return radiance (2, n, 3) of pixels that an eye below the waves sees, each the mean over its area.
+
+    It is of red, green and blue, by two independent halves of the paths.
 
     origin  (3,) the eye [m];  corner  (n, 3) of pixels as seen from it;  across, up  (3,) their sides
     paths   of a pixel, an even number
@@ -127,7 +118,7 @@ def traced(
             way /= np.linalg.norm(way, axis=1)[:, None]
             start = np.broadcast_to(origin, way.shape).copy()
             found[half, first : first + at_once] = followed(world, light, start, way, rng).reshape(-1, each, 3).mean(1)
-    return Traced(found)
+    return found
 
 
 def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Floats:

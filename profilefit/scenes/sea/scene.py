@@ -272,8 +272,8 @@ def halves_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -
     corner = forward + x[None, :, None] * right + y[:, None, None] * up
     sides = 2.0 * right / columns, 2.0 * up / rows
     eye = np.array(of.camera.eye)
-    light = traced(world, Sunlight(world), eye, corner.reshape(-1, 3), *sides, paths=each, seed=seed)
-    return light.halves.reshape(2, rows, columns, 3)
+    halves = traced(world, Sunlight(world), eye, corner.reshape(-1, 3), *sides, paths=each, seed=seed)
+    return halves.reshape(2, rows, columns, 3)
 
 
 def draw(context: moderngl.Context, of: SeaRequest) -> RenderResult:

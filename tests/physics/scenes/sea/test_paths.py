@@ -395,17 +395,15 @@ def rays_of_furnace(count, seed, number=2, way=None):
 
 def test_a_seed_is_a_run_and_its_halves_err_apart(monkeypatch):
     """What one half errs by says nothing of the other; batches of rays have numbers of their own."""
-    one, other = (rays_of_furnace(1500, seed).halves for seed in (4, 5))
+    one, other = (rays_of_furnace(1500, seed) for seed in (4, 5))
     assert one.shape == (2, 1500, 3)
     for pair in (one, (one[0], other[0])):
         first, second = (np.asarray(half)[:, 1] - 1.0 for half in pair)
         assert abs(np.corrcoef(first, second)[0, 1]) < 4.0 / np.sqrt(len(first))
         assert np.mean(first != second) > 0.6  # some see the sky at once
-    again = [rays_of_furnace(5, 4) for _ in range(2)]
-    np.testing.assert_array_equal(again[0].halves, again[1].halves)
-    np.testing.assert_allclose(again[0].radiance, again[0].halves.mean(axis=0))
+    np.testing.assert_array_equal(*(rays_of_furnace(5, 4) for _ in range(2)))
     monkeypatch.setattr(paths, "TOGETHER", 8)
-    batches = rays_of_furnace(40, 0, way=[0.6, 0.0, -0.8]).halves
+    batches = rays_of_furnace(40, 0, way=[0.6, 0.0, -0.8])
     assert np.unique(batches[..., 1].round(9)).size > 50
 
 
@@ -422,8 +420,8 @@ def test_a_pixel_is_the_mean_over_its_area():
     whole = seen(corner + u[..., None] * across + v[..., None] * up)
     known, spread = whole.mean(), whole.std() / np.sqrt(10_000)
     pixel = world, coarse(world), np.array([0.0, 0.0, -2.0]), corner[None]
-    found = traced(*pixel, across, up, 20_000, 1).halves[:, 0, 0]
-    bare = traced(*pixel, 0 * up, 0 * up, 100).radiance[0, 0]
+    found = traced(*pixel, across, up, 20_000, 1)[:, 0, 0]
+    bare = traced(*pixel, 0 * up, 0 * up, 100).mean(axis=0)[0, 0]
     assert np.all(np.abs(found - known) < 4.0 * spread)
     assert abs(bare - seen(corner)) < 1e-6
     assert abs(seen(corner) - known) > 40.0 * spread
