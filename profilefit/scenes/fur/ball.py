@@ -155,7 +155,4 @@ def nearest_feet(feet: Floats, texels: int) -> list[NDArray[np.float32]]:
     _, found = cKDTree(feet).query(directions, 2 if len(feet) > 1 else 1)
     index = found.reshape(texels, texels, -1)
     padding = np.zeros((texels, texels, 1))
-    return [
-        np.concatenate([feet[index[..., min(i, index.shape[2] - 1)]], padding], axis=-1).astype(np.float32)
-        for i in (0, 1)
-    ]
+    return [np.concatenate([feet[index[..., i]], padding], axis=-1).astype(np.float32) for i in (0, -1)]

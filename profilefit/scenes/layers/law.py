@@ -79,10 +79,8 @@ def single_scattering(
     given = tuple(phases)
     if len(given) != len(medium.layers) or not all(isinstance(one, Phase) for one in given):
         raise InputError(f"phases must be {len(medium.layers)} phase functions, one a layer, got {shown(phases)}")
-    into, out = (
-        checked_range(name, value, "a cosine in (0, 1]", LEAST, 1.0)
-        for name, value in (("cos_in", cos_in), ("cos_out", cos_out))
-    )
+    into = checked_range("cos_in", cos_in, "a cosine in (0, 1]", LEAST, 1.0)
+    out = checked_range("cos_out", cos_out, "a cosine in (0, 1]", LEAST, 1.0)
     turn = checked_numbers("azimuth", azimuth, "a finite angle")
     if not np.all(np.isfinite(turn)):
         raise InputError("azimuth must be a finite angle, got one that is not")

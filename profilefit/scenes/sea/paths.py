@@ -7,6 +7,7 @@ of its closed forms. Lengths in metres, z up.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -231,19 +232,12 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
     k = newton_hit(surface.height, surface.slope, place[once], way[once], found[once], NEWTON)
     found[once] = np.maximum(k, 0.0)
     if len(often):
-        flip = np.array([1.0, 1.0, -rises])
-        start = place[often] * flip
+        # Waves that are met from below are a floor upside down.
+        bed = replace(surface, amplitudes=-rises * surface.amplitudes, mean=-rises * surface.mean)
+        start, along = (one[often] * (1.0, 1.0, -rises) for one in (place, way))
         # What stands on a surface may be below it by a rounding.
-        start[:, 2] = np.maximum(start[:, 2], -rises * surface.height(*place[often, :2].T))
-        bounds = sorted((-rises * surface.highest, -rises * surface.lowest))
-        hit = first_hit(
-            lambda x, y: -rises * surface.height(x, y),
-            start,
-            way[often] * flip,
-            *bounds,
-            STEPS,
-            lambda x, y: (-rises * surface.slope(x, y)[0], -rises * surface.slope(x, y)[1]),
-        )
+        start[:, 2] = np.maximum(start[:, 2], bed.height(*start[:, :2].T))
+        hit = first_hit(bed.height, start, along, bed.lowest, bed.highest, STEPS, bed.slope)
         found[often] = np.where(np.isnan(hit), np.inf, hit)
     return found
 

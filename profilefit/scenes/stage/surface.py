@@ -318,15 +318,8 @@ def _some(
     sides = ((side[:, None] / mfp[:, None]).reshape(-1, 3) for side in (across, along))
     own = own_share(curves, *sides).reshape(AT_ONCE, 3)
     with jax.enable_x64(True):
-        points = _Points(
-            scene.position[visible],
-            jnp.asarray(full),
-            jnp.asarray(around),
-            jnp.asarray(curves.profile.reshape(AT_ONCE, 3, -1, 4)),
-            jnp.asarray(curves.kappa.reshape(AT_ONCE, 3)),
-            jnp.asarray(own),
-            scene.irradiance[visible],
-        )
+        arrays = (full, around, curves.profile.reshape(AT_ONCE, 3, -1, 4), curves.kappa.reshape(AT_ONCE, 3), own)
+        points = _Points(scene.position[visible], *map(jnp.asarray, arrays), scene.irradiance[visible])
         lit, share = (np.asarray(value) for value in _sums(scene, points, mfp))
     return (curves.reflectance.reshape(AT_ONCE, 3) * lit / share)[: len(chosen)], share[: len(chosen)]
 
