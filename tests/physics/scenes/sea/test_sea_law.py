@@ -293,21 +293,16 @@ def test_the_text_on_the_gpu(context, arguments):
     """Mesa's exponential is right to 2e-7 or so, and three of them stand in it."""
     ends = np.random.default_rng(4).uniform(0, 4, (2, arguments[0].size)).astype(np.float32)
     ends[1, ::3] = ends[0, ::3]
-    found = drawn(
-        context, ways=np.stack(arguments[:4], axis=1), lengths=np.stack([arguments[4], *ends, ends[0]], axis=1)
-    )
+    reads = {"ways": np.stack(arguments[:4], axis=1), "lengths": np.stack([arguments[4], *ends, ends[0]], axis=1)}
+    reads = {name: one.reshape(HEIGHT, WIDTH, 4) for name, one in reads.items()}
+    with Renderer(context, (WIDTH, HEIGHT)) as renderer:
+        found = renderer.image(Pass("segment", reads, "found_map", TEXT + MAIN)).reshape(-1, 4)
     assert np.all(np.isfinite(found))
     assert worst(found[:, 0], exactly(*arguments)) < 2e-6
     low, x = np.min(ends, axis=0).astype(float), np.abs(np.diff(ends.astype(float), axis=0)[0])
     truth = arguments[4] * np.exp(-low) * np.where(x > 0, -np.expm1(-x) / np.where(x > 0, x, 1), 1)
     assert worst(found[:, 1], truth) < 2e-6
     assert worst(found[1:, 0], found[:-1, 0]) > 1
-
-
-def drawn(context, **reads):
-    with Renderer(context, (WIDTH, HEIGHT)) as renderer:
-        maps = {name: one.reshape(HEIGHT, WIDTH, 4) for name, one in reads.items()}
-        return renderer.image(Pass("segment", maps, "found_map", TEXT + MAIN)).reshape(-1, 4)
 
 
 def test_against_a_sum_along_the_segment():

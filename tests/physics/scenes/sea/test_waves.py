@@ -24,8 +24,6 @@ from tests.unit.scenes.scenes import refused
 
 TILE = 10.0
 STEP = 2.0 * np.pi / TILE
-
-
 SEA = random_sea(0.15, TILE, seed=3)
 
 
