@@ -94,13 +94,10 @@ def stack_table(
 
 def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
     """Return a row for each thickness of the first layer."""
-
-    def under(d: float) -> exact.Solution:
-        return exact.solve(medium.with_first(d), illumination, NODES)
-
-    seen = np.maximum(thicknesses, THINNEST * medium.layers[0].mfp).tolist()
-    shapes = {d: _shape(under(d), y, rate) for d in dict.fromkeys(seen)}
-    return [(*shapes[of], under(d).reflectance) for of, d in zip(seen, thicknesses.tolist(), strict=True)]
+    own, seen = thicknesses.tolist(), np.maximum(thicknesses, THINNEST * medium.layers[0].mfp).tolist()
+    light = {d: exact.solve(medium.with_first(d), illumination, NODES) for d in dict.fromkeys([*own, *seen])}
+    shapes = {d: _shape(light[d], y, rate) for d in dict.fromkeys(seen)}
+    return [(*shapes[of], light[d].reflectance) for d, of in zip(own, seen, strict=True)]
 
 
 def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:

@@ -21,7 +21,7 @@ from profilefit.scenes.stage.world import Camera, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 VIEW, SHAFTS = "view_map", "shaft_map"
-SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view
+SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view, in glsl
 GAUSSIANS = 4  # of the floor's light
 FADING = 512  # texels of the table of what the water leaves
 DARK = 1e-3  # of wide light, from where on nothing is seen
@@ -124,10 +124,8 @@ class SeaPasses:
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
         }
-        source = "".join(
-            (*map(read_text, ("common", "near_zero")), *(text_beside(__name__, f"glsl/{one}") for one in SOURCES))
-        )
-        return Pass("view", reads, VIEW, source, given)
+        shared, own = map(read_text, ("common", "near_zero")), (text_beside(__name__, f"glsl/{one}") for one in SOURCES)
+        return Pass("view", reads, VIEW, "".join((*shared, *own)), given)
 
     def _irradiance(self, kind: str) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Return light of red, green and blue, each (3,).

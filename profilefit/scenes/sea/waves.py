@@ -402,10 +402,10 @@ def _bracket(
         if rate is not None and ends_at is not None:
             begins_at, ends_at = ends_at, rate(here)
             # A cubic of these values and slopes at both ends, which falls and then rises, is least there.
-            begins, ends, rise = begins_at * width, ends_at * width, gap - before
-            linear, cubic = 3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise
+            left, right, rise = begins_at * width, ends_at * width, gap - before
+            linear, cubic = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
             with np.errstate(divide="ignore", invalid="ignore"):
-                share = -begins / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * begins, 0.0)))
+                share = -left / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * left, 0.0)))
             dip = here - width + width * np.clip(share, 0.0, 1.0)
             dip = np.where((gap >= 0.0) & (begins_at < 0.0) & (ends_at > 0.0), dip, np.nan)
             under = _gap(height, origin, direction, dip) < 0.0
