@@ -18,7 +18,8 @@ from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
-Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A
+# By ln d: ln(R_d l^2 / A) + kappa x, ln(cdf / x) and A; and kappa.
+Channel = tuple[RectBivariateSpline, RectBivariateSpline, CubicSpline, float]
 NODES = exact.Nodes(12, 16, 16, 10)
 THICKNESSES, WIDEST = 9, 0.5  # of the table, even in ln d: so many at least, and so far apart at most
 LEAST = 1e-3  # mean free paths that stand for no first layer
@@ -78,26 +79,21 @@ def stack_table(
     low = max(least, LEAST * shortest)
     count = max(THICKNESSES, 1 + int(np.ceil(np.log(most / low) / WIDEST)))
     u, y = np.linspace(np.log(low), np.log(most), count), knots()
-    # Far off light decays as in the layer in which it is slowest; rates in 1 / l. Equal channels are solved once.
-    rates = {
-        medium: min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * medium.layers[0].mfp
-        for medium in media
-    }
-    solved = {one: _rows(one, np.exp(u), illumination, y, rate) for one, rate in rates.items()}
-    found = []
-    for medium in media:
-        known, within, whole = (np.array(column) for column in zip(*solved[medium], strict=True))
-        splines = RectBivariateSpline(u, y, known), RectBivariateSpline(u, y, within), CubicSpline(u, whole)
-        found.append((*splines, rates[medium]))
-    return StackTable(least, most, u, *zip(*found, strict=True))
+    solved = {one: _channel(one, u, y, illumination) for one in dict.fromkeys(media)}
+    return StackTable(least, most, u, *zip(*(solved[medium] for medium in media), strict=True))
 
 
-def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
-    """Return a row for each thickness of the first layer."""
-    own, seen = thicknesses.tolist(), np.maximum(thicknesses, THINNEST * medium.layers[0].mfp).tolist()
+def _channel(medium: Medium, u: Floats, y: Floats, illumination: str) -> Channel:
+    """Return what a channel's curves are made of: equal channels are solved once."""
+    unit, own = medium.layers[0].mfp, np.exp(u).tolist()
+    # Far off light decays as in the layer in which it is slowest; rate in 1 / l.
+    rate = min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * unit
+    seen = np.maximum(own, THINNEST * unit).tolist()
     light = {d: exact.solve(medium.with_first(d), illumination, NODES) for d in dict.fromkeys([*own, *seen])}
     shapes = {d: _shape(light[d], y, rate) for d in dict.fromkeys(seen)}
-    return [(*shapes[of], light[d].reflectance) for d, of in zip(own, seen, strict=True)]
+    known, within = (np.array(column) for column in zip(*(shapes[d] for d in seen), strict=True))
+    whole = np.array([light[d].reflectance for d in own])
+    return RectBivariateSpline(u, y, known), RectBivariateSpline(u, y, within), CubicSpline(u, whole), rate
 
 
 def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:
