@@ -80,7 +80,13 @@ class Ball:
         start, way = view.rays(size)
         found = np.full((*start.shape[:2], 4), NOTHING)
         far = np.full(start.shape[:2], np.inf)
-        self._skin(start, way, found, far)
+        # The skin, where a ray meets the ball itself.
+        along = np.sum(start * way, axis=-1)
+        half = self.ball**2 - np.sum((start - along[..., None] * way) ** 2, axis=-1)
+        seen = half > 0
+        far[seen] = (-along - np.sqrt(np.maximum(half, 0.0)))[seen]
+        place = (start + np.where(seen, far, 0.0)[..., None] * way) / self.ball
+        found[seen] = np.concatenate([place, np.full((*seen.shape, 1), SKIN)], axis=-1)[seen]
         for foot, box in zip(self.feet, self._boxes(view, size), strict=True):
             rows, columns = slice(*box[1]), slice(*box[0])
             if rows.start >= rows.stop or columns.start >= columns.stop:
@@ -90,15 +96,6 @@ class Ball:
             far[rows, columns][near] = distance[near]
             found[rows, columns][near] = np.concatenate([np.tile(foot, (near.sum(), 1)), t[near, None]], axis=1)
         return found
-
-    def _skin(self, start: Floats, way: Floats, found: Floats, far: Floats) -> None:
-        along = np.sum(start * way, axis=-1)
-        aside = start - along[..., None] * way
-        half = self.ball**2 - np.sum(aside**2, axis=-1)
-        seen = half > 0
-        far[seen] = (-along - np.sqrt(np.maximum(half, 0.0)))[seen]
-        place = (start + np.where(seen, far, 0.0)[..., None] * way) / self.ball
-        found[seen] = np.concatenate([place, np.full((*seen.shape, 1), SKIN)], axis=-1)[seen]
 
     def _boxes(self, view: FurView, size: tuple[int, int]) -> NDArray[np.intp]:
         """Return columns and rows (k, 2, 2), from and to, where strands are seen: of cubes about roots, and of tips."""
@@ -158,7 +155,4 @@ def nearest_feet(feet: Floats, texels: int) -> list[NDArray[np.float32]]:
     _, found = cKDTree(feet).query(directions, 2 if len(feet) > 1 else 1)
     index = found.reshape(texels, texels, -1)
     padding = np.zeros((texels, texels, 1))
-    return [
-        np.concatenate([feet[index[..., min(i, index.shape[2] - 1)]], padding], axis=-1).astype(np.float32)
-        for i in (0, 1)
-    ]
+    return [np.concatenate([feet[index[..., i]], padding], axis=-1).astype(np.float32) for i in (0, -1)]

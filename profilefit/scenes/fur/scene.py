@@ -17,7 +17,7 @@ from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import EXPONENTS, HITS, RIM, SHIFTS, STRENGTHS, Coat, FurSurface, Shading
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
 from profilefit.scenes.stage.judge import TURNS, Judge
-from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError
+from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, averaged
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance, Samples, TechniqueTable, Viewpoint, ViewRequest
 
@@ -197,12 +197,6 @@ class FurRender(NamedTuple):
 
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:
         return self.surface.layered(self.view, by, layers), self.shade
-
-
-def averaged(fine: Floats, each: int) -> Floats:
-    """Return the means (rows, columns, c) of pixels with so many rays along a side, in linear light."""
-    rows, columns, channels = fine.shape
-    return np.asarray(fine.reshape(rows // each, each, columns // each, each, channels).mean(axis=(1, 3)))
 
 
 @contextmanager

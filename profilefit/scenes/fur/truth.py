@@ -6,6 +6,7 @@ toward -x; what it finds is the height of its first hit, 0 where it meets the sk
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,18 +94,13 @@ def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[n
 
 def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: float) -> Floats:
     """Return those heights against discs on N shells of radius r0 (1 - t^p)."""
-    count = checked_whole("layers", layers, 1, MOST_LAYERS)
-    tree, found = _tree(patch), np.zeros(len(start))
-    left = np.arange(len(start))
-    for layer in reversed(range(count)):
-        t = layer / count
-        z = t * patch.length
+    count, tree = checked_whole("layers", layers, 1, MOST_LAYERS), _tree(patch)
+
+    def heights(t: float, place: Floats) -> Floats:
         radius = patch.radius * (1.0 - t**exponent)
-        distance, _ = tree.query(_at(patch, theta, start[left], z), distance_upper_bound=radius)
-        hit = distance < radius
-        found[left[hit]] = z
-        left = left[~hit]
-    return found
+        return np.where(tree.query(place, distance_upper_bound=radius)[0] < radius, t * patch.length, 0.0)
+
+    return _from_above(patch, theta, start, [layer / count for layer in range(count)], heights)
 
 
 def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int = 1) -> Floats:
@@ -113,16 +109,24 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
     tested  strands, the nearest ones;  a cone counts wherever the ray comes into it, within the slab or not
     """
     count, near = checked_whole("layers", layers, 1, MOST_LAYERS), checked_whole("tested", tested, 1, len(patch.feet))
-    tree, found = _tree(patch), np.zeros(len(start))
-    left = np.arange(len(start))
-    for layer in reversed(range(count)):
-        middle = (layer + 0.5) / count * patch.length
-        place = _at(patch, theta, start[left], middle)
-        _, nearest = tree.query(place, near)
-        z = _heights(patch, np.repeat(place, near, axis=0), nearest.ravel(), middle, theta)
-        best = z.reshape(len(left), near).max(axis=1)
-        found[left] = best
-        left = left[best == 0]
+    tree = _tree(patch)
+
+    def heights(t: float, place: Floats) -> Floats:
+        nearest = tree.query(place, near)[1].ravel()
+        z = _heights(patch, np.repeat(place, near, axis=0), nearest, t * patch.length, theta)
+        return z.reshape(len(place), near).max(axis=1)
+
+    return _from_above(patch, theta, start, [(layer + 0.5) / count for layer in range(count)], heights)
+
+
+def _from_above(
+    patch: Patch, theta: float, start: Floats, levels: list[float], heights: Callable[[float, Floats], Floats]
+) -> Floats:
+    """Return heights (n,) that rays first find, from the last level over the length down; 0 of none goes on."""
+    found, left = np.zeros(len(start)), np.arange(len(start))
+    for t in reversed(levels):
+        found[left] = heights(t, _at(patch, theta, start[left], t * patch.length))
+        left = left[found[left] == 0]
     return found
 
 

@@ -13,9 +13,7 @@ surface ends as well. Links are places in the atlas, so those of a surface at re
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import Self
+from collections.abc import Iterator, Mapping
 
 import moderngl
 import numpy as np
@@ -30,7 +28,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements
 from profilefit.scenes.stage.buffers import INSIDE, Singles
-from profilefit.scenes.stage.renderer import Pass, Read, Renderer
+from profilefit.scenes.stage.renderer import GpuOwner, Pass, Read, Renderer
 from profilefit.scenes.stage.technique import Unwraps, maps
 from profilefit.scenes.stage.world import Mesh, Part
 from profilefit.shader.emit import text_beside
@@ -46,7 +44,7 @@ NEIGHBOURS = np.array([(0, 1), (0, -1), (1, 0), (-1, 0)])  # of a texel: rows, c
 STEP = 0.75  # of a texel, along its row and its column, and off its plane: what is farther off is another surface
 
 
-class Atlas:
+class Atlas(GpuOwner):
     """Maps of one size, over which one part of a stage's scene is laid out. Release it, or use it in a `with`."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], margin: int):
@@ -82,7 +80,7 @@ class Atlas:
             inside = place[..., 3] > INSIDE
             self._require_apart(part.mesh, inside)
             self._links = links(place[..., :3].astype(float), inside, self.margin)
-        self.renderer.run(self._filled("position_map"), self._pass("stretch", STRETCH, "position_map", FILLED))
+        self.renderer.run(self._filled("position_map"), self._pass("stretch", STRETCH, maps("position_map", FILLED)))
         if not self.texel:
             stretch = self.read(STRETCH)
             sides = stretch[stretch[..., 2] > INSIDE, :2].astype(float)
@@ -91,16 +89,15 @@ class Atlas:
 
     def blur(self, kernel: Kernel) -> None:
         """Draw `BLURRED`: sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel, with margins."""
-        self.renderer.run(self._pass("begin", LIGHT, "irradiance_map", STRETCH))
+        self.renderer.run(self._pass("begin", LIGHT, maps("irradiance_map", STRETCH)))
         weights = np.broadcast_to(np.atleast_2d(kernel.weights.T).T, (kernel.variances.size, 3))
         self.renderer.clear(SUMS[1])
         done = 0.0
         for number, (variance, weight) in enumerate(zip(kernel.variances.tolist(), weights, strict=True)):
             self.renderer.run(*self._gaussian(done, variance))
             done = variance
-            into, before = SUMS[number % 2], SUMS[1 - number % 2]
-            add = self._pass("add", into, weight=tuple(map(float, weight)))
-            self.renderer.run(replace(add, reads={LIGHT: LIGHT, "sum_map": before}))
+            into, reads = SUMS[number % 2], {LIGHT: LIGHT, "sum_map": SUMS[1 - number % 2]}
+            self.renderer.run(self._pass("add", into, reads, weight=tuple(map(float, weight))))
         self.renderer.run(self._filled(SUMS[(kernel.variances.size - 1) % 2], BLURRED))
 
     def read(self, name: str) -> Singles:
@@ -115,12 +112,6 @@ class Atlas:
 
     def release(self) -> None:
         self.renderer.release()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.release()
 
     def _require_apart(self, mesh: Mesh, inside: NDArray[np.bool_]) -> None:
         """Raise InputError where two triangles lie on one texel, or two charts nearer than their margins are wide."""
@@ -154,15 +145,14 @@ class Atlas:
             given = {"sigma": float(sigma / np.sqrt(parts)), "before": before, "widest": widest, "reach": REACH}
             for along in ((1.0, 0.0), (0.0, 1.0)):
                 yield self._filled(LIGHT)
-                yield self._pass("blur", LIGHT, FILLED, STRETCH, along=along, **given)
+                yield self._pass("blur", LIGHT, maps(FILLED, STRETCH), along=along, **given)
 
     def _filled(self, name: str, into: str = FILLED) -> Pass:
         """Return the pass that fills a map's margins."""
-        reads: dict[str, Read] = {LIGHT: name, "link_map": self.links}
-        return replace(self._pass("fill", into), reads=reads)
+        return self._pass("fill", into, {LIGHT: name, "link_map": self.links})
 
-    def _pass(self, name: str, into: str, *reads: str, **uniforms: object) -> Pass:
-        return Pass(name, maps(*reads), into, text_beside(__name__, f"glsl/{name}.frag"), uniforms)
+    def _pass(self, name: str, into: str, reads: Mapping[str, Read], **uniforms: object) -> Pass:
+        return Pass(name, reads, into, text_beside(__name__, f"glsl/{name}.frag"), uniforms)
 
 
 def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tuple[int, int], int]:
@@ -250,10 +240,11 @@ def links(position: Floats, inside: NDArray[np.bool_], margin: int) -> Singles:
             distance, nearest = tree.query(ahead)
             texel = tuple(where[nearest].T)
             offset = ahead - position[texel]
-            side, shift = np.linalg.norm(frames[texel], axis=-1).max(axis=-1), _coordinates(frames[texel], offset)
+            side = np.linalg.norm(frames[texel], axis=-1).max(axis=-1)
+            shift, along = _in_plane(frames[texel], offset)
             close = (distance < 2.0 * side) & np.all(np.abs(shift) < STEP, axis=1)
             to = np.where(good[:, None], to, where[nearest] + shift)
-            there = np.where(good[:, None], there, position[texel] + _along(frames[texel], offset))
+            there = np.where(good[:, None], there, position[texel] + along)
             good |= close
             found.append((at[good], to[good], there[good]))
         fresh = np.zeros_like(known)
@@ -299,17 +290,13 @@ def _frames(position: Floats, inside: NDArray[np.bool_]) -> Floats:
     return frames
 
 
-def _coordinates(frames: Floats, offset: Floats) -> Floats:
-    """Return rows and columns of an offset in the plane of a texel."""
+def _in_plane(frames: Floats, offset: Floats) -> tuple[Floats, Floats]:
+    """Return rows and columns of an offset in the plane of a texel, and its part there, which at a pole they lack."""
     gram = frames @ np.swapaxes(frames, -1, -2)
     scale = np.trace(gram, axis1=-2, axis2=-1)
     safe = gram + 1e-9 * np.where(scale > 0, scale, 1.0)[:, None, None] * np.eye(2)
-    return np.asarray(np.linalg.solve(safe, frames @ offset[..., None])[..., 0], float)
-
-
-def _along(frames: Floats, offset: Floats) -> Floats:
-    """Return the part of an offset in the plane of a texel, which its coordinates may not tell at a pole."""
     normal = np.cross(frames[:, 0], frames[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1.0)
-    return offset - np.sum(offset * normal, axis=1, keepdims=True) * normal
+    along = offset - np.sum(offset * normal, axis=1, keepdims=True) * normal
+    return np.asarray(np.linalg.solve(safe, frames @ offset[..., None])[..., 0], float), along

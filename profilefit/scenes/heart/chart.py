@@ -53,13 +53,8 @@ def occlusion_error(elements: Elements, seen: ArrayLike, kernel: Kernel, at: Arr
     visible = np.asarray(seen, float)[:, None]
     columns = np.concatenate([visible * light, visible * one, light, one], axis=1)
     here, unity = np.asarray(own, float), np.ones(np.shape(own))
-    gathered = summed(
-        elements._replace(irradiance=columns),
-        kernel.variances,
-        np.tile(kernel.weights, (1, 4)),
-        at,
-        np.concatenate([here, unity, here, unity], axis=1),
-    )
+    of = elements._replace(irradiance=columns), kernel.variances, np.tile(kernel.weights, (1, 4))
+    gathered = summed(*of, at, np.concatenate([here, unity, here, unity], axis=1))
     part, share, whole, energy = np.split(gathered, 4, axis=1)
     least = np.finfo(float).tiny
     return part / np.maximum(share, least) - whole / np.maximum(energy, least)

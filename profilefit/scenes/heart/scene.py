@@ -39,8 +39,6 @@ from profilefit.scenes.stage.technique import Lambert, Technique, TechniquePair,
 from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
-SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
-GAUSSIANS, TEXEL, TOLERANCE = 6, 0.4, 0.02
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
 FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
@@ -54,9 +52,9 @@ class SurfaceTable(Declared):
     """
 
     kind: Annotated[str, OneOf(*meshes.KINDS)] = meshes.KINDS[0]
-    size: Annotated[float, Field(gt=0.0, le=LARGEST)] = SIZE
-    steepness: Tolerance = STEEPNESS
-    roughness: Tolerance = WET
+    size: Annotated[float, Field(gt=0.0, le=LARGEST)] = 15.0
+    steepness: Tolerance = 0.15
+    roughness: Tolerance = 0.2
 
     @model_validator(mode="after")
     def _of_bumps(self) -> Self:
@@ -72,9 +70,9 @@ class HeartTechnique(TechniqueTable):
     """
 
     kind: Annotated[str, OneOf(*KINDS)] = SPLIT
-    gaussians: Annotated[int, Field(ge=1, le=MOST)] = GAUSSIANS
-    texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = TEXEL
-    tolerance: Tolerance = TOLERANCE
+    gaussians: Annotated[int, Field(ge=1, le=MOST)] = 6
+    texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = 0.4
+    tolerance: Tolerance = 0.02
 
 
 class HeartRequest(ViewRequest, StackRequest):
@@ -231,9 +229,7 @@ def _reference(
 def light_of(of: StackRequest, count: int) -> Scattering:
     """Return the light of a record of these very layers, in ./fits or shipped; solved and fitted now where none is."""
     for folder in (LOCAL, fits_folder()):
-        found = matching(of, folder)
-        record = None if found is None else gaussians.find(found.name, folder)
-        if record is not None:
+        if (found := matching(of, folder)) is not None and (record := gaussians.find(found.name, folder)) is not None:
             units = [medium.layers[0].similar.mfp for medium in of.media]
             kernel = kernel_of(record.laws(of.illumination, count), units)
             return _light(kernel, record.lights(of.illumination))

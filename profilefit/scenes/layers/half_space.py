@@ -74,12 +74,9 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
     alpha = float(brentq(lambda a: float(exact.reflectance(a, setting)) - whole, 0.0, 1.0 - WHITE))
     unit = max(layer.mfp for layer in medium.layers if layer.mu_t > 0)
     edges = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
+    cdfs = (unit, stack.cdf(unit * edges)), (1.0, exact.cdf(edges, alpha, setting=setting))
     of_stack, of_one = (
-        RingShares.of(length * edges, np.diff(np.append(within_edges, 1.0)), np.zeros(edges.size))
-        for length, within_edges in (
-            (unit, np.asarray(stack.cdf(unit * edges))),
-            (1.0, np.asarray(exact.cdf(edges, alpha, setting=setting))),
-        )
+        RingShares.of(length * edges, np.diff(np.append(cdf, 1.0)), np.zeros(edges.size)) for length, cdf in cdfs
     )
     mfp = nearest_length(of_stack, of_one, within)
     d = places(mfp, within)

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 
 from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
+from mcml_sim.media.checks import checked_numbers, checked_range, require_one_shape, shown
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
@@ -45,6 +45,7 @@ from profilefit.recipes.stack.fit import stack_law as stack_law
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
 PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
 STEP = 1e-6  # of ln of a constant, for derivatives
+LEAST = np.nextafter(0.0, 1.0)  # cosine > 0
 
 
 class Beam(NamedTuple):
@@ -78,7 +79,8 @@ def single_scattering(
     given = tuple(phases)
     if len(given) != len(medium.layers) or not all(isinstance(one, Phase) for one in given):
         raise InputError(f"phases must be {len(medium.layers)} phase functions, one a layer, got {shown(phases)}")
-    into, out = _cosine("cos_in", cos_in), _cosine("cos_out", cos_out)
+    into = checked_range("cos_in", cos_in, "a cosine in (0, 1]", LEAST, 1.0)
+    out = checked_range("cos_out", cos_out, "a cosine in (0, 1]", LEAST, 1.0)
     turn = checked_numbers("azimuth", azimuth, "a finite angle")
     if not np.all(np.isfinite(turn)):
         raise InputError("azimuth must be a finite angle, got one that is not")
@@ -87,9 +89,8 @@ def single_scattering(
     radiance = np.zeros(np.broadcast_shapes(into.shape, out.shape, turn.shape))
     for layer, phase, one, other in zip(medium.layers, given, arriving, leaving, strict=True):
         if layer.mu_s > 0:
-            radiance = (
-                radiance + _of_layer(layer, phase, one, other, np.cos(turn)) * into * (medium.n_above / layer.n) ** 2
-            )
+            own = _of_layer(layer, phase, one, other, np.cos(turn))
+            radiance = radiance + own * into * (medium.n_above / layer.n) ** 2
     return float(radiance) if radiance.ndim == 0 else radiance
 
 
@@ -161,8 +162,12 @@ def beams(medium: Medium, cosine: Floats) -> list[Beam]:
         np.where(cosines[j + 1] > 0.0, fresnel(indices[j], indices[j + 1], cosines[j])[0], 1.0)
         for j in range(len(indices) - 1)
     ]
+    # Shares that cross each layer: 0 where it is infinite, or no light of that direction gets there.
+    kept = [
+        np.where(mu > 0, np.exp(-_depth(layer) / np.where(mu > 0, mu, 1.0)), 0.0)
+        for layer, mu in zip(medium.layers, cosines[1:], strict=False)
+    ]
     # Of light at a layer's bottom, and at its top on its way down, what comes up there: from below upwards.
-    kept = [_kept(layer, mu) for layer, mu in zip(medium.layers, cosines[1:], strict=False)]
     below = [np.zeros_like(cosine)] * len(medium.layers)
     for j in reversed(range(len(medium.layers))):
         if j + 1 < len(mirror):
@@ -181,19 +186,16 @@ def _passed(mirror: Floats, deeper: Floats) -> Floats:
     return np.where(mirror < 1.0, (1.0 - mirror) / np.where(mirror < 1.0, 1.0 - mirror * deeper, 1.0), 0.0)
 
 
-def _kept(layer: Layer, cosine: Floats) -> Floats:
-    """Return the share that crosses the layer [-]; 0 where it is infinite, or no light of that direction gets there."""
-    if np.isinf(layer.thickness):
-        return np.zeros_like(cosine)
-    depth = layer.mu_t * layer.thickness
-    return np.where(cosine > 0, np.exp(-depth / np.where(cosine > 0, cosine, 1.0)), 0.0)
+def _depth(layer: Layer) -> float:
+    """Return the optical depth of a layer [-], which may be infinite."""
+    return layer.mu_t * layer.thickness if np.isfinite(layer.thickness) else np.inf
 
 
 def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) -> Floats:
     """Return alpha / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
     reached = (one.cosine > 0) & (other.cosine > 0)
     into, out = np.where(reached, one.cosine, 1.0), np.where(reached, other.cosine, 1.0)
-    depth = layer.mu_t * layer.thickness if np.isfinite(layer.thickness) else np.inf
+    depth = _depth(layer)
     across, along = np.where(reached, one.sine * other.sine, 0.0) * turn, into * out
     back, onward = (np.clip(across + sign * along, -1.0, 1.0) for sign in (-1.0, 1.0))
     turned = (one.down * other.down + one.up * other.up) * phase.pdf(back) * _spent(depth, 1.0 / into + 1.0 / out)
@@ -212,11 +214,3 @@ def _spent(depth: float, rate: Floats) -> Floats:
         return 1.0 / rate
     fast = np.where(rate > 0, rate, 1.0)
     return np.where(rate > 0, -np.expm1(-fast * depth) / fast, depth)
-
-
-def _cosine(name: str, value: ArrayLike) -> Floats:
-    numbers = checked_numbers(name, value, "a cosine in (0, 1]")
-    outside = ~((numbers > 0) & (numbers <= 1))
-    if np.any(outside):
-        raise InputError(f"{name} must be a cosine in (0, 1], got {float(numbers[outside].flat[0])!r}")
-    return numbers

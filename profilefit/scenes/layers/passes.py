@@ -9,25 +9,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim import Medium
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.scenes.layers.law import Plate, single_scattering
+from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import single_text, stack_text
 
-Singles = NDArray[np.float32]
 SCATTERED = "scattered_map"
 COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4
 LEAST = 1e-9  # mean free paths that stand for no first layer
 GRAZING = 1e-3  # cosine that stands for 0, where a quadrature is of no use
-RULE = 24  # directions of its quadrature, for slope and azimuth each
+# Quadratures over directions: cosines in (0, 1) and azimuths in (0, pi), since both sides of the plane are alike.
+NODE, WEIGHT = np.polynomial.legendre.leggauss(24)
+MU, TURN = 0.5 * (NODE + 1.0), 0.5 * np.pi * (NODE + 1.0)
 
 
 def thickness_text(least: float, most: float) -> str:
@@ -120,18 +121,13 @@ def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
 
 def once(medium: Medium, cosine: Floats) -> Floats:
     """Return the share of the light of each direction, cosines (m,), that leaves above after one scattering [-]."""
-    node, weight = np.polynomial.legendre.leggauss(RULE)
-    mu, of_mu = 0.5 * (node + 1.0), 0.5 * weight
-    turn, of_turn = 0.5 * np.pi * (node + 1.0), np.pi * weight  # both sides of the plane are alike
-    radiance = single_scattering(medium, cosine[:, None, None], mu[:, None], turn)
-    return np.einsum("moa,o,a->m", np.asarray(radiance), of_mu * mu, of_turn) / cosine
+    radiance = single_scattering(medium, cosine[:, None, None], MU[:, None], TURN)
+    return np.einsum("moa,o,a->m", np.asarray(radiance), 0.5 * WEIGHT * MU, np.pi * WEIGHT) / cosine
 
 
 def diffusely_once(medium: Medium) -> float:
     """Return the share of diffuse light that leaves above after one scattering [-]."""
-    node, weight = np.polynomial.legendre.leggauss(RULE)
-    cosine = 0.5 * (node + 1.0)
-    return float(np.sum(weight * cosine * once(medium, cosine)))
+    return float(np.sum(WEIGHT * MU * once(medium, MU)))
 
 
 def alike_error(medium: Medium) -> float:
@@ -140,8 +136,7 @@ def alike_error(medium: Medium) -> float:
     Mean over diffuse light and diffusely placed eyes of |pi L - its exitance|, as a share of white [-]. No root mean
     square: where nothing refracts a few grazing directions would be all of it.
     """
-    node, weight = np.polynomial.legendre.leggauss(RULE)
-    mu, of_mu = 0.5 * (node + 1.0), weight * 0.5 * (node + 1.0)  # 2 mu dmu on (0, 1)
-    radiance = np.asarray(single_scattering(medium, mu[:, None, None], mu[:, None], 0.5 * np.pi * (node + 1.0)))
-    apart = np.pi * radiance / mu[:, None, None] - once(medium, mu)[:, None, None]
-    return float(np.einsum("ioa,i,o,a->", np.abs(apart), of_mu, of_mu, 0.5 * weight))
+    radiance = np.asarray(single_scattering(medium, MU[:, None, None], MU[:, None], TURN))
+    apart = np.pi * radiance / MU[:, None, None] - once(medium, MU)[:, None, None]
+    of_mu = WEIGHT * MU  # 2 mu dmu on (0, 1)
+    return float(np.einsum("ioa,i,o,a->", np.abs(apart), of_mu, of_mu, 0.5 * WEIGHT))

@@ -18,7 +18,8 @@ from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
-Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A
+# By ln d: ln(R_d l^2 / A) + kappa x, ln(cdf / x) and A; and kappa.
+Channel = tuple[RectBivariateSpline, RectBivariateSpline, CubicSpline, float]
 NODES = exact.Nodes(12, 16, 16, 10)
 THICKNESSES, WIDEST = 9, 0.5  # of the table, even in ln d: so many at least, and so far apart at most
 LEAST = 1e-3  # mean free paths that stand for no first layer
@@ -78,37 +79,21 @@ def stack_table(
     low = max(least, LEAST * shortest)
     count = max(THICKNESSES, 1 + int(np.ceil(np.log(most / low) / WIDEST)))
     u, y = np.linspace(np.log(low), np.log(most), count), knots()
-    profile, cdf, reflectance, kappa = [], [], [], []
-    # Far off light decays as in the layer in which it is slowest; rates in 1 / l. Equal channels are solved once.
-    rates = {
-        medium: min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * medium.layers[0].mfp
-        for medium in media
-    }
-    solved = {one: _rows(one, np.exp(u), illumination, y, rate) for one, rate in rates.items()}
-    for medium in media:
-        rate = rates[medium]
-        known, within, whole = (np.array(column) for column in zip(*solved[medium], strict=True))
-        profile.append(RectBivariateSpline(u, y, known))
-        cdf.append(RectBivariateSpline(u, y, within))
-        reflectance.append(CubicSpline(u, whole))
-        kappa.append(rate)
-    return StackTable(least, most, u, tuple(profile), tuple(cdf), tuple(reflectance), tuple(kappa))
+    solved = {one: _channel(one, u, y, illumination) for one in dict.fromkeys(media)}
+    return StackTable(least, most, u, *zip(*(solved[medium] for medium in media), strict=True))
 
 
-def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
-    """Return a row for each thickness of the first layer."""
-    shapes: dict[float, tuple[Floats, Floats]] = {}
-
-    def under(d: float) -> exact.Solution:
-        return exact.solve(medium.with_first(d), illumination, NODES)
-
-    rows = []
-    for d in thicknesses.tolist():
-        seen = max(d, THINNEST * medium.layers[0].mfp)
-        if seen not in shapes:
-            shapes[seen] = _shape(under(seen), y, rate)
-        rows.append((*shapes[seen], under(d).reflectance))
-    return rows
+def _channel(medium: Medium, u: Floats, y: Floats, illumination: str) -> Channel:
+    """Return what a channel's curves are made of: equal channels are solved once."""
+    unit, own = medium.layers[0].mfp, np.exp(u).tolist()
+    # Far off light decays as in the layer in which it is slowest; rate in 1 / l.
+    rate = min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * unit
+    seen = np.maximum(own, THINNEST * unit).tolist()
+    light = {d: exact.solve(medium.with_first(d), illumination, NODES) for d in dict.fromkeys([*own, *seen])}
+    shapes = {d: _shape(light[d], y, rate) for d in dict.fromkeys(seen)}
+    known, within = (np.array(column) for column in zip(*(shapes[d] for d in seen), strict=True))
+    whole = np.array([light[d].reflectance for d in own])
+    return RectBivariateSpline(u, y, known), RectBivariateSpline(u, y, within), CubicSpline(u, whole), rate
 
 
 def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:

@@ -155,18 +155,9 @@ class Caustics:
         }
         if shape == LINES:
             given["shared_out"] = splat is Splat.WIREFRAME_ENERGY
-        deposit = Pass(
-            splat.value,
-            {"hit_map": self._hits},
-            self._splats,
-            _text(f"{fragment}.frag"),
-            given,
-            _text("lattice.glsl") + _text(f"{vertex}.vert"),
-            drawn=count * self.vertices**2,
-            shape=shape,
-            kept=SUM,
-            clear=0.0,
-        )
+        source, vertices = _text(f"{fragment}.frag"), _text("lattice.glsl") + _text(f"{vertex}.vert")
+        reads, number = {"hit_map": self._hits}, count * self.vertices**2
+        deposit = Pass(splat.value, reads, self._splats, source, given, vertices, number, shape, kept=SUM, clear=0.0)
         folding = {"margin": self._margin, "tile_side": self.pixels, "scale": 1.0}
         return self._find, deposit, Pass("fold", {"splat_map": self._splats}, self.map, _text("fold.frag"), folding)
 

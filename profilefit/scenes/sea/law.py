@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 from scipy.special import hankel1
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
+from mcml_sim.media.checks import checked_numbers, checked_range, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.phases import haltrin as haltrin
@@ -199,9 +199,7 @@ def segment_integral(c: ArrayLike, s0: ArrayLike, t0: ArrayLike, m: ArrayLike, t
     names = {"c": c, "s0": s0, "t0": t0, "t1": t1}
     is_single = all(getattr(one, "dtype", None) == np.float32 for one in (*names.values(), m))
     rate, begin, back, length = _checked(**names)
-    cosine = checked_numbers("m", m, "a cosine in [-1, 1]")
-    if not np.all(np.abs(cosine) <= 1):
-        raise InputError(f"m must be a cosine in [-1, 1], got {shown(_first(cosine, ~(np.abs(cosine) <= 1)))}")
+    cosine = checked_range("m", m, "a cosine in [-1, 1]", -1.0, 1.0)
     require_one_shape(**names, m=m)
     fading = rate * (1.0 + cosine)
     if np.any(np.isinf(length) & (fading == 0)):
@@ -294,11 +292,7 @@ def _checked(**values: ArrayLike) -> list[Floats]:
     found = []
     for name, value in values.items():
         accepted, highest = RANGES.get(name, ("a finite number >= 0", np.finfo(float).max))
-        numbers = checked_numbers(name, value, accepted)
-        fits = (numbers >= 0) & (numbers <= highest)
-        if not np.all(fits):
-            raise InputError(f"{name} must be {accepted}, got {shown(_first(numbers, ~fits))}")
-        found.append(numbers)
+        found.append(checked_range(name, value, accepted, 0.0, highest))
     require_one_shape(**values)
     return found
 
@@ -313,7 +307,3 @@ def _checked_lobes(lobes: Lobes) -> Floats:
     if not np.all(np.abs(terms[:, 1]) < 1):
         raise InputError(f"g of lobes must be in (-1, 1), got {shown(terms[:, 1].tolist())}")
     return terms
-
-
-def _first(numbers: NDArray, bad: NDArray) -> float:
-    return float(numbers[bad].flat[0])

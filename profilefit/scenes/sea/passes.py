@@ -21,7 +21,7 @@ from profilefit.scenes.stage.world import Camera, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 VIEW, SHAFTS = "view_map", "shaft_map"
-SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view
+SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view, in glsl
 GAUSSIANS = 4  # of the floor's light
 FADING = 512  # texels of the table of what the water leaves
 DARK = 1e-3  # of wide light, from where on nothing is seen
@@ -69,7 +69,7 @@ class SeaPasses:
         for number, depth in enumerate(depths.tolist()):
             name, below = f"depth {number}", number * texels
             one = Caustics(renderer, world.sea, vertices, texels, depth, world.tilt, world.n, name=name)
-            rows, text = (below, below + texels), _text("stack.frag")
+            rows, text = (below, below + texels), text_beside(__name__, "glsl/stack.frag")
             stack = Pass("stack", {"light_map": one.map}, SHAFTS, text, {"below": below}, rows=rows)
             self.light["caustics in depths"] += [*one.passes(splats[1]), stack]
         self._lobes = _four(np.array(world.lobes)[None])
@@ -124,8 +124,8 @@ class SeaPasses:
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
         }
-        source = "".join((*map(read_text, ("common", "near_zero")), *map(_text, SOURCES)))
-        return Pass("view", reads, VIEW, source, given)
+        shared, own = map(read_text, ("common", "near_zero")), (text_beside(__name__, f"glsl/{one}") for one in SOURCES)
+        return Pass("view", reads, VIEW, "".join((*shared, *own)), given)
 
     def _irradiance(self, kind: str) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Return light of red, green and blue, each (3,).
@@ -242,7 +242,3 @@ def _four(array: NDArray) -> NDArray[np.float32]:
     found = np.zeros((*array.shape[:2], 4), np.float32)
     found[..., : array.shape[2]] = array
     return found
-
-
-def _text(file: str) -> str:
-    return text_beside(__name__, f"glsl/{file}")

@@ -7,6 +7,7 @@ of its closed forms. Lengths in metres, z up.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,21 +95,12 @@ class Event(NamedTuple):
     way: Floats
 
 
-class Traced(NamedTuple):
-    """Radiance of red, green and blue by each ray's paths, of two independent halves of them (2, n, 3)."""
-
-    halves: Floats
-
-    @property
-    def radiance(self) -> Floats:
-        """Mean radiance (n, 3) of both halves."""
-        return np.asarray(self.halves.mean(axis=0))
-
-
 def traced(
     world: World, light: Sunlight, origin: Floats, corner: Floats, across: Floats, up: Floats, paths: int, seed: int = 0
-) -> Traced:
-    """Return the radiance of pixels (n, 3) that an eye below the waves sees, each the mean over its area.
+) -> Floats:
+    """Return radiance (2, n, 3) of pixels that an eye below the waves sees, each the mean over its area.
+
+    It is of red, green and blue, by two independent halves of the paths.
 
     origin  (3,) the eye [m];  corner  (n, 3) of pixels as seen from it;  across, up  (3,) their sides
     paths   of a pixel, an even number
@@ -127,7 +119,7 @@ def traced(
             way /= np.linalg.norm(way, axis=1)[:, None]
             start = np.broadcast_to(origin, way.shape).copy()
             found[half, first : first + at_once] = followed(world, light, start, way, rng).reshape(-1, each, 3).mean(1)
-    return Traced(found)
+    return found
 
 
 def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Floats:
@@ -191,7 +183,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
     facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
     seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
     below = 1.0 - np.sqrt(rng.random(len(way)))
-    new = np.column_stack(turn(*_columns(normal), below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
+    new = np.column_stack(turn(*normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
     sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
     new[sunny] = _turned(light.around, -beam[sunny], rng)
     lambert = np.maximum(np.sum(new * normal, axis=1), 0.0) / np.pi
@@ -240,20 +232,12 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
     k = newton_hit(surface.height, surface.slope, place[once], way[once], found[once], NEWTON)
     found[once] = np.maximum(k, 0.0)
     if len(often):
-        flip = np.array([1.0, 1.0, -rises])
-        start = place[often] * flip
+        # Waves that are met from below are a floor upside down.
+        bed = replace(surface, amplitudes=-rises * surface.amplitudes, mean=-rises * surface.mean)
+        start, along = (one[often] * (1.0, 1.0, -rises) for one in (place, way))
         # What stands on a surface may be below it by a rounding.
-        start[:, 2] = np.maximum(start[:, 2], -rises * surface.height(*place[often, :2].T))
-        bounds = (-rises * surface.highest, -rises * surface.lowest)
-        hit = first_hit(
-            lambda x, y: -rises * surface.height(x, y),
-            start,
-            way[often] * flip,
-            min(bounds),
-            max(bounds),
-            STEPS,
-            lambda x, y: (-rises * surface.slope(x, y)[0], -rises * surface.slope(x, y)[1]),
-        )
+        start[:, 2] = np.maximum(start[:, 2], bed.height(*start[:, :2].T))
+        hit = first_hit(bed.height, start, along, bed.lowest, bed.highest, STEPS, bed.slope)
         found[often] = np.where(np.isnan(hit), np.inf, hit)
     return found
 
@@ -261,7 +245,7 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
 def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
     """Return directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
-    return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
+    return np.column_stack(turn(*way.T, below, above, 2.0 * np.pi * rng.random(len(way))))
 
 
 def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
@@ -277,10 +261,6 @@ def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimu
     z = cosine * dz - across * sign * dx - along * dy
     norm = 1.0 / np.sqrt(x * x + y * y + z * z)
     return x * norm, y * norm, z * norm
-
-
-def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
-    return way[:, 0], way[:, 1], way[:, 2]
 
 
 def _density(phase: Phase, way: Floats, new: Floats) -> Floats:

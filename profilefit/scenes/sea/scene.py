@@ -21,19 +21,10 @@ from profilefit.scenes.sea.passes import SeaPasses, axes
 from profilefit.scenes.sea.paths import Sunlight, traced
 from profilefit.scenes.sea.water import World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
+from profilefit.scenes.stage import request
 from profilefit.scenes.stage.judge import TURNS, Judge
-from profilefit.scenes.stage.picture import ChartPoint, RenderResult
+from profilefit.scenes.stage.picture import ChartPoint, RenderResult, averaged
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import (
-    Direction,
-    Irradiances,
-    LightTable,
-    Resolution,
-    ResolutionTable,
-    Samples,
-    TechniqueTable,
-    ViewRequest,
-)
 from profilefit.scenes.stage.world import Camera
 
 PHASE = "petzold"
@@ -114,7 +105,7 @@ class FloorTable(Declared):
     seed: Seed = 2
 
 
-class SeaTechnique(TechniqueTable):
+class SeaTechnique(request.TechniqueTable):
     """Table [technique]: kind;  splat  of the maps of light, by its name;  vertices, texels  of a side of these.
 
     slices  maps in depths;  steps  of a search for a hit;  supersampling  views of a pixel along a side, averaged
@@ -122,7 +113,7 @@ class SeaTechnique(TechniqueTable):
 
     kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
     splat: Annotated[str, OneOf(AUTO, *SPLATS)] = AUTO
-    samples: Samples = 12
+    samples: request.Samples = 12
     vertices: Side = 128
     texels: Side = 256
     slices: Annotated[int, Field(ge=2, le=32)] = 6
@@ -136,11 +127,11 @@ class SeaTechnique(TechniqueTable):
         return self
 
 
-class SeaCamera(ResolutionTable):
+class SeaCamera(request.ResolutionTable):
     """Table [camera]: eye and target [m];  angle  the picture's height [rad]."""
 
     limit: ClassVar[str] = "whose truth is traced"
-    resolution: Resolution = (128, 96)
+    resolution: request.Resolution = (128, 96)
     eye: Point = (6.0, 2.5, -2.2)
     target: Point = (0.0, 2.5, -2.4)
     angle: Annotated[
@@ -155,12 +146,12 @@ class SeaCamera(ResolutionTable):
         return self
 
 
-class SeaLight(LightTable):
+class SeaLight(request.LightTable):
     """Table [light]: direction toward the sun."""
 
-    direction: Direction = (-0.5, 0.0, 0.9)
-    irradiance: Irradiances = (3.0, 2.9, 2.7)
-    ambient: Irradiances = (0.25, 0.32, 0.42)
+    direction: request.Direction = (-0.5, 0.0, 0.9)
+    irradiance: request.Irradiances = (3.0, 2.9, 2.7)
+    ambient: request.Irradiances = (0.25, 0.32, 0.42)
 
     @model_validator(mode="after")
     def _along(self) -> Self:
@@ -171,7 +162,7 @@ class SeaLight(LightTable):
         return self
 
 
-class SeaRequest(ViewRequest):
+class SeaRequest(request.ViewRequest):
     """Picture of a sea that a file requests; lengths are metres, and z is up."""
 
     scene: Annotated[str, OneOf("sea")] = "sea"
@@ -240,9 +231,8 @@ class SeaRender(NamedTuple):
 
     def picture(self, kind: str, samples: int) -> Floats:
         """Return the radiance (h, w, 3) of pixels by a technique."""
-        (columns, rows), fine = self.request.size, self.request.technique.supersampling
         views = self.passes.renderer.image(self._view(kind, samples))[..., :3].astype(float)
-        return views.reshape(rows, fine, columns, fine, 3).mean(axis=(1, 3))
+        return averaged(views, self.request.technique.supersampling)
 
     def time(self, kind: str, samples: int) -> float:
         """Return the milliseconds of a view's pass, which was drawn before."""
@@ -282,8 +272,8 @@ def halves_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -
     corner = forward + x[None, :, None] * right + y[:, None, None] * up
     sides = 2.0 * right / columns, 2.0 * up / rows
     eye = np.array(of.camera.eye)
-    light = traced(world, Sunlight(world), eye, corner.reshape(-1, 3), *sides, paths=each, seed=seed)
-    return light.halves.reshape(2, rows, columns, 3)
+    halves = traced(world, Sunlight(world), eye, corner.reshape(-1, 3), *sides, paths=each, seed=seed)
+    return halves.reshape(2, rows, columns, 3)
 
 
 def draw(context: moderngl.Context, of: SeaRequest) -> RenderResult:

@@ -108,11 +108,8 @@ def export_blur(
 
 def _by_channel(blurs: Sequence[WaterGaussians], c: Sequence[float]) -> list[dict[str, Any]]:
     """Return weights [-] and standard deviations [m] of each colour."""
-    return [
-        {
-            "unscattered": float(one.unscattered),
-            "weight": one.weights.tolist(),
-            "sigma": (np.sqrt(one.variances) / rate).tolist(),
-        }
-        for one, rate in zip(blurs, c, strict=True)
-    ]
+    found: list[dict[str, Any]] = []
+    for one, rate in zip(blurs, c, strict=True):
+        sigma = (np.sqrt(one.variances) / rate).tolist()
+        found.append({"unscattered": float(one.unscattered), "weight": one.weights.tolist(), "sigma": sigma})
+    return found

@@ -270,7 +270,8 @@ def caustic_photons(waves: Waves, depth: float, tilt: float, n: float, pixels: i
     x = np.asarray((np.arange(-1, fine + 1) + 0.5) * step, np.float64)
     for first in range(0, fine, rows):
         sent = photons(waves, x, x[first : min(first + rows, fine) + 2], depth, tilt, n)
-        found += _spread(sent, columns, columns / waves.tile)
+        flux, each = sent.flux[1:-1, 1:-1].ravel(), boxes(sent, columns, columns / waves.tile)
+        found += sum(np.bincount(at, flux * share, found.size) for at, share in each)
     return found.reshape(columns, columns) * (columns / fine) ** 2
 
 
@@ -293,11 +294,3 @@ def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np
         for above, share in ((0, 1.0 - up), (1, up)):
             at = np.mod(row + above, pixels) * pixels + np.mod(column + aside, pixels)
             yield at.ravel(), (part * share).ravel()
-
-
-def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
-    """Spread all but the outermost photons of a lattice over their boxes (pixels^2,) [photons]; scale  [pixels/m]."""
-    flux, found = sent.flux[1:-1, 1:-1].ravel(), np.zeros(pixels * pixels)
-    for at, share in boxes(sent, pixels, scale):
-        found += np.bincount(at, flux * share, pixels * pixels)
-    return found

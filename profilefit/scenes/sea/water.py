@@ -14,8 +14,8 @@ from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
+from profilefit.scenes.stage.world import Rgb
 
-Rgb = tuple[float, float, float]
 ROUNDING = 1e-6  # by which weights may miss a sum of 1
 
 

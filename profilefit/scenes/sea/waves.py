@@ -401,7 +401,12 @@ def _bracket(
         end, ahead = here, gap
         if rate is not None and ends_at is not None:
             begins_at, ends_at = ends_at, rate(here)
-            dip = here - width + width * _least(before, gap, begins_at * width, ends_at * width)
+            # A cubic of these values and slopes at both ends, which falls and then rises, is least there.
+            left, right, rise = begins_at * width, ends_at * width, gap - before
+            linear, cubic = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = -left / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * left, 0.0)))
+            dip = here - width + width * np.clip(share, 0.0, 1.0)
             dip = np.where((gap >= 0.0) & (begins_at < 0.0) & (ends_at > 0.0), dip, np.nan)
             under = _gap(height, origin, direction, dip) < 0.0
             end, ahead = np.where(under, dip, here), np.where(under, -1.0, gap)
@@ -413,14 +418,6 @@ def _bracket(
         if not np.any(np.isnan(first) & ~np.isnan(near)):
             break
     return first, last
-
-
-def _least(start: Floats, end: Floats, begins: Floats, ends: Floats) -> Floats:
-    """Return where in [0, 1] a cubic of these values and slopes at 0 and 1 is least, if it falls and then rises."""
-    linear, cubic = 3.0 * (end - start) - 2.0 * begins - ends, begins + ends - 2.0 * (end - start)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = -begins / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * begins, 0.0)))
-    return np.asarray(np.clip(found, 0.0, 1.0))
 
 
 def _safeguarded(

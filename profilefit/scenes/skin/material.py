@@ -75,9 +75,13 @@ def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
 def skin(reflectance: ArrayLike, columns: int = 2048, seed: int = 7) -> NDArray[np.float32]:
     """Return (columns / 2, columns, 3) A in (0, 1) [-] around the given one of red, green and blue."""
     rng = np.random.default_rng(seed)
-    rows = columns // 2
-    texture = np.asarray(reflectance, float) * (1.0 + _blotches(rng, rows, columns))
-    texture = _blend(texture, LIPS, _lips(rows, columns))
+    rows, pixel = columns // 2, AROUND / columns
+    blotches = _noise(rng, rows, columns, 9.0 / pixel)[..., None] * [0.05, 0.11, 0.12]  # large and reddish
+    blotches += _noise(rng, rows, columns, 0.5 / pixel)[..., None] * [0.05, 0.06, 0.06]  # small and grey
+    texture = np.asarray(reflectance, float) * (1.0 + blotches)
+    v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij")
+    lips = np.exp(-((((u - 0.5) / 0.038) ** 2 + ((v - 0.345) / 0.021) ** 2) ** 2))
+    texture = _blend(texture, LIPS, lips)
     texture = _blend(texture, FRECKLE, _dots(rng, rows, columns, FRECKLES, _freckled, (0.5, 1.5)))
     texture = _blend(texture, HAIR, _dots(rng, rows, columns, HAIRS, _bearded, (0.16, 0.24)))
     return np.clip(texture, 0.005, 0.98).astype(np.float32)
@@ -91,14 +95,6 @@ def plain(reflectance: ArrayLike) -> NDArray[np.float32]:
 def _blend(texture: Floats, left: Floats, share: Floats) -> Floats:
     """Multiply A by `left` where share is 1, by 1 where it is 0."""
     return texture * (1.0 + (left - 1.0) * share[..., None])
-
-
-def _blotches(rng: np.random.Generator, rows: int, columns: int) -> Floats:
-    """Return relative deviations of A, (rows, columns, 3): large and reddish, small and grey."""
-    pixel = AROUND / columns
-    large = _noise(rng, rows, columns, 9.0 / pixel)[..., None] * [0.05, 0.11, 0.12]
-    small = _noise(rng, rows, columns, 0.5 / pixel)[..., None] * [0.05, 0.06, 0.06]
-    return large + small
 
 
 def _noise(rng: np.random.Generator, rows: int, columns: int, width: float) -> Floats:
@@ -132,8 +128,3 @@ def _bearded(u: Floats, v: Floats) -> Floats:
     """Return the chance of stubble, on chin, jaw and upper lip, not the lips."""
     jaw = np.exp(-(((u - 0.5) / 0.22) ** 4) - ((v - 0.27) / 0.10) ** 4)
     return jaw * (np.hypot((u - 0.5) / 0.045, (v - 0.345) / 0.025) > 1.0)
-
-
-def _lips(rows: int, columns: int) -> Floats:
-    v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij")
-    return np.exp(-((((u - 0.5) / 0.038) ** 2 + ((v - 0.345) / 0.021) ** 2) ** 2))

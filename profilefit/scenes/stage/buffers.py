@@ -48,22 +48,17 @@ class Buffers:
         if not 0 < self.pixel < np.inf:
             raise InputError(f"pixel must be a length > 0 [mm], got {self.pixel!r}")
         rows, columns = np.shape(self.mask)[:2]
-        for name in VECTORS + NUMBERS:
-            array = getattr(self, name)
+        given = {name: array for name in VECTORS + NUMBERS if (array := getattr(self, name)) is not None}
+        for name, array in given.items():
             accepted = (rows, columns, 3) if name in VECTORS else (rows, columns)
-            if array is not None and np.shape(array) != accepted:
+            if np.shape(array) != accepted:
                 raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
-        self._check_inside()
-
-    def _check_inside(self) -> None:
         mask = np.asarray(self.mask)
         require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
         inside = mask > INSIDE
-        for name in VECTORS + NUMBERS:
-            array = getattr(self, name)
-            if array is not None:
-                value = np.asarray(array)[inside]
-                require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+        for name, array in given.items():
+            value = np.asarray(array)[inside]
+            require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
         albedo = np.asarray(self.reflectance)[inside]
         good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
         require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")

@@ -19,9 +19,9 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from mcml_sim import Setting, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError, SettingError
+from profilefit.scenes.stage.buffers import Singles
 from profilefit.shader.emit import literal, text_beside
 
-Singles = NDArray[np.float32]
 DIFFUSE = Setting("diffuse")  # the light that irradiance is
 NAME = "exact"
 # Of textures.
@@ -116,16 +116,14 @@ def row(radius: Floats, ring: Floats, share: Floats) -> tuple[Singles, Singles]:
 @cache
 def _tables(alpha: tuple[float, ...], setting: Setting) -> tuple[Singles, Singles]:
     """Return a row for each albedo; the same arrays each time, which are sent once."""
-    drawn, known = zip(*(_table(one, setting) for one in alpha), strict=True)
-    return np.stack(drawn), np.stack(known)
-
-
-@cache
-def _table(alpha: float, setting: Setting) -> tuple[Singles, Singles]:
     t, x = columns()
-    ring = 2.0 * np.pi * x * exact.profile(x, alpha, setting=setting) / exact.reflectance(alpha, setting)
-    radius = np.asarray(exact.quantile(-np.expm1(-t), alpha, setting=setting))
-    return row(radius, ring, np.asarray(exact.cdf(x, alpha, setting=setting)))
+    rows = []
+    for one in alpha:
+        ring = 2.0 * np.pi * x * exact.profile(x, one, setting=setting) / exact.reflectance(one, setting)
+        radius = np.asarray(exact.quantile(-np.expm1(-t), one, setting=setting))
+        rows.append(row(radius, ring, np.asarray(exact.cdf(x, one, setting=setting))))
+    drawn, known = zip(*rows, strict=True)
+    return np.stack(drawn), np.stack(known)
 
 
 @dataclass(frozen=True)

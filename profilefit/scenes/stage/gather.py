@@ -9,7 +9,6 @@ from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.exact_law import NAME, ExactLaw
-from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
 from profilefit.shader.emit import law_text, prefix, text_beside
@@ -46,7 +45,14 @@ class Gather(Technique):
         }
         surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map")
         reads = {**surface, "noise_map": pattern.shifts(), **self.law.tables}
-        source = _switches(sampling) + self.law.before(text_beside(__name__, "glsl/scatter.frag"))
+        switches = {
+            "UNIFORM": sampling.kind == "uniform",
+            "BLUE": sampling.kind == "importance blue",
+            "MIXTURE": sampling.channels == "mixture",
+            "AREA": sampling.area,
+        }
+        source = "".join(f"#define {name} {int(is_on)}\n" for name, is_on in switches.items())
+        source += self.law.before(text_beside(__name__, "glsl/scatter.frag"))
         return [Pass(f"scatter {self.law.name}", reads, EXITANCE, source, uniforms)]
 
     def through(self) -> LawText:
@@ -60,13 +66,3 @@ def technique(by: Law | Technique) -> Technique:
     if isinstance(by, Law):
         return Gather.of(by)
     raise InputError(f"law must be a profile law, an ExactLaw or a technique, got {by!r}")
-
-
-def _switches(sampling: Sampling) -> str:
-    on = {
-        "UNIFORM": sampling.kind == "uniform",
-        "BLUE": sampling.kind == "importance blue",
-        "MIXTURE": sampling.channels == "mixture",
-        "AREA": sampling.area,
-    }
-    return "".join(f"#define {name} {int(value)}\n" for name, value in on.items())

@@ -47,7 +47,13 @@ def head(detail: int = 1) -> Mesh:
     points = direction * box * SKULL
     points[..., 0] *= 1.0 - 0.28 * _rise(-points[..., 1], -5.0, 90.0)  # towards the chin
     points[..., 2] *= 1.0 - 0.12 * _rise(-points[..., 1], 30.0, 100.0)
-    points[..., 2] += _face(points)
+    x, y, z = np.moveaxis(points, -1, 0)
+    push = np.zeros_like(x)  # of the face along z; the back of the head is left alone
+    for bump in ONCE:
+        push += _bump(x, y, *bump)
+    for bump in TWICE:
+        push += _bump(x, y, *bump) + _bump(-x, y, *bump)
+    points[..., 2] += push * _rise(z, 5.0, 45.0)
     return sheet(points, u, v, closed=True)
 
 
@@ -94,17 +100,6 @@ def ball(u: Floats, v: Floats) -> Floats:
     """Return the unit vectors; u around y from the back, so that its seam is there, and v from the lowest point up."""
     around, up = 2.0 * np.pi * (u - 0.5), np.pi * (v - 0.5)
     return np.stack([np.cos(up) * np.sin(around), np.sin(up), np.cos(up) * np.cos(around)], axis=-1)
-
-
-def _face(points: Floats) -> Floats:
-    """Return the push of each point of the skull along z [mm]; the back of the head is left alone."""
-    x, y, z = np.moveaxis(points, -1, 0)
-    push = np.zeros_like(x)
-    for bump in ONCE:
-        push += _bump(x, y, *bump)
-    for bump in TWICE:
-        push += _bump(x, y, *bump) + _bump(-x, y, *bump)
-    return push * _rise(z, 5.0, 45.0)
 
 
 def _bump(x: Floats, y: Floats, at_x: float, at_y: float, width: float, height: float, amount: float) -> Floats:

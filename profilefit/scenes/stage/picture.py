@@ -73,6 +73,12 @@ class RenderResult:
     passes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
+def averaged(fine: Floats, each: int) -> Floats:
+    """Return the means (rows, columns, c) of pixels with so many rays along a side, in linear light."""
+    rows, columns, channels = fine.shape
+    return np.asarray(fine.reshape(rows // each, each, columns // each, each, channels).mean(axis=(1, 3)))
+
+
 def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:
     """Return linear light (h, w, 3) times `exposure` as 8-bit values of a screen (IEC 61966-2-1), rows as they are."""
     if not exposure > 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Self
@@ -68,7 +69,21 @@ class Pass:
     mipmaps: bool = False
 
 
-class Renderer:
+class GpuOwner(ABC):
+    """Owner of things on the GPU, which it releases at the end of a `with`."""
+
+    @abstractmethod
+    def release(self) -> None:
+        """Free all that it has on the GPU; the context is its owner's."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.release()
+
+
+class Renderer(GpuOwner):
     """Float maps by name, and the shaders that fill them. Release it, or use it in a `with`."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
@@ -131,19 +146,12 @@ class Renderer:
         return 1e3 * seconds(self.context, lambda: self.run(*passes))
 
     def release(self) -> None:
-        """Free all that the renderer has on the GPU; the context is its owner's."""
         for target in self._targets.values():
             _release_target(target)
         for one in (*self._maps.values(), *self._shaders.values(), *(sent for _, sent in self._sent.values())):
             one.release()
         for known in (self._targets, self._maps, self._shaders, self._sent):
             known.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.release()
 
     def _run(self, one: Pass) -> None:
         shader = self._shader(one)

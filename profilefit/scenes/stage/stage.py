@@ -11,7 +11,7 @@ of the searchlight setting may be passed as well, to see the difference.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,7 +23,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
 from profilefit.scenes.stage.gather import Law, technique
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import NEAREST, Pass, Read, Renderer, Smooth
+from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Technique, combination
 from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
 from profilefit.shader.context import seconds
@@ -40,7 +40,7 @@ MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
 LEAST, MOST = np.nextafter(0.0, 1.0), np.finfo(float).max  # lengths > 0, finite
 
 
-class Stage:
+class Stage(GpuOwner):
     """Four passes over maps of one size, in one context. Release it, or use it in a `with`."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], shadow_side: int = SHADOW_SIDE):
@@ -148,15 +148,8 @@ class Stage:
         return [1e3 * seconds(self.context, work) for _ in range(repeats)]
 
     def release(self) -> None:
-        """Free all that the stage has on the GPU; the context is its owner's."""
         self.renderer.release()
         self._released = True
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.release()
 
     def _surface(self, scene: Scene) -> list[Pass]:
         """Return passes 1 and 2: into the shadow map, then into the maps of a G-buffer."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import Setting, exact
@@ -58,7 +58,15 @@ def step_response(
     require("x", places, np.isfinite(places), "a finite place")
     require("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
     require("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
-    target = target_of(setting, law)
+    target: Target
+    if law is None:
+        target = ExactTarget(setting or Setting())
+        if not target.setting.is_solved:
+            raise SettingError(f"exact light is not solved for {target.setting}: give a law of that setting")
+    elif setting not in (None, law.setting):
+        raise SettingError(f"the law belongs to {law.setting}, got a request for {setting}")
+    else:
+        target = LawTarget(law)
     scaled = np.abs(places) / length
     dark = np.empty(places.shape)
     for value in np.unique(albedos):
@@ -66,18 +74,6 @@ def step_response(
         dark[here] = _beyond(target, scaled[here], float(value))
     share = np.where(places > 0, 1.0 - dark, dark)
     return float(share) if share.ndim == 0 else share
-
-
-def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
-    """Return the light of a law, or of the exact half space; SettingError where there is none."""
-    if law is not None:
-        if setting is not None and setting != law.setting:
-            raise SettingError(f"the law belongs to {law.setting}, got a request for {setting}")
-        return LawTarget(law)
-    where = setting or Setting()
-    if not where.is_solved:
-        raise SettingError(f"exact light is not solved for {where}: give a law of that setting")
-    return ExactTarget(where)
 
 
 def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
@@ -88,19 +84,16 @@ def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
     found[distance >= last] = 0.0
     if some.any():
         d = distance[some]
-        u, du = _rule(np.arccosh(last / d))
+        # Nodes and weights from 0 to each last u, (n, nodes): as many equal panels as the longest needs.
+        farthest = np.arccosh(last / d)
+        panels = int(np.ceil(np.max(farthest) / PANEL))
+        width = farthest[:, None, None] / panels
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        u = ((np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) * width).reshape(d.size, -1)
+        du = np.repeat(0.5 * width * weights, panels, axis=1).reshape(d.size, -1)
         left = 1.0 - target.cdf((d[:, None] * np.cosh(u)).ravel(), alpha).reshape(u.shape)
         found[some] = np.sum(du * left / np.cosh(u), axis=1) / np.pi
     return found
-
-
-def _rule(last: Floats) -> tuple[Floats, Floats]:
-    """Return nodes and weights from 0 to each last u, (n,) -> (n, nodes): as many equal panels as the longest needs."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    panels = int(np.ceil(np.max(last) / PANEL))
-    width = last[:, None, None] / panels
-    u = (np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) * width
-    return u.reshape(last.size, -1), np.broadcast_to(0.5 * width * weights, u.shape).reshape(last.size, -1)
 
 
 def _last_radius(target: Target, alpha: float) -> float:
@@ -196,17 +189,13 @@ def edge_estimate(gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float
     r = gather.sample(points[..., 0].ravel())
     weight = gather.weight(r).reshape(points.shape[:2])
     across = r.reshape(weight.shape) * np.cos(2.0 * np.pi * points[..., 1])
-    found = np.stack([_ratio(weight, place + across > 0, float(place > 0)) for place in places])
+    total = weight.sum(axis=1)
+    some = total > 0
+    gathered = [np.sum(weight * (place + across > 0), axis=1) / np.where(some, total, 1.0) for place in places]
+    found = np.where(some, gathered, (places > 0)[:, None].astype(float))  # (22) of each trial
     variance = found.var(axis=1, ddof=1)
     rmse = np.sqrt(np.mean((found - truth[:, None]) ** 2, axis=1))
     return EdgeEstimate(truth, found.mean(axis=1), np.sqrt(variance / points.shape[0]), variance, rmse)
-
-
-def _ratio(weight: Floats, lit: NDArray[np.bool_], own: float) -> Floats:
-    """Return (22) for each trial (trials,)."""
-    total = weight.sum(axis=1)
-    some = total > 0
-    return np.where(some, np.sum(weight * lit, axis=1) / np.where(some, total, 1.0), own)
 
 
 def _depth(xi: Floats) -> Floats:

@@ -34,7 +34,7 @@ from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, STEP, Curves, CurveTable, exact_table
-from profilefit.scenes.stage.picture import TruthError
+from profilefit.scenes.stage.picture import TruthError, averaged
 from profilefit.scenes.stage.world import Camera
 
 FORWARD = np.array([0.0, 0.0, -1.0])
@@ -102,14 +102,12 @@ class Surface(NamedTuple):
         if factor < 1 or h % factor or w % factor:
             raise InputError(f"factor must divide {h} and {w}, got {factor}")
 
-        def mean(value: ArrayLike) -> Floats:
-            return np.asarray(value, float).reshape(h // factor, factor, w // factor, factor, -1).mean(axis=(1, 3))
-
-        normal = mean(self.normal)
+        position, normal, irradiance, reflectance, share = (
+            averaged(np.asarray(value, float), factor) for value in (*self[:-1], self.mask[..., None])
+        )
         length = np.linalg.norm(normal, axis=-1, keepdims=True)
-        mask = mean(self.mask)[..., 0] == 1.0
         unit = normal / np.where(length > 0, length, 1.0)
-        return Surface(mean(self.position), unit, mean(self.irradiance), mean(self.reflectance), mask)
+        return Surface(position, unit, irradiance, reflectance, share[..., 0] == 1.0)
 
 
 def seen(buffers: Buffers) -> tuple[Surface, View]:
@@ -175,10 +173,16 @@ def gathered(
     lengths = np.asarray(mfp, float)
     if lengths.shape != (3,) or not np.all((lengths > 0) & np.isfinite(lengths)):
         raise InputError(f"mfp must be three lengths > 0, got {mfp!r}")
-    curves = _table(table)
+    curves: CurveTable = exact_table(table) if isinstance(table, Setting) else table
+    if not callable(getattr(curves, "curves", None)):
+        raise InputError(f"table must be a Setting, or have a method curves, got {table!r}")
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     light, share = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
-    scene, numbers = _scene(surface, view), _numbers(surface.mask)
+    # The number of the visible pixel that stands for each pixel of the image and a margin of NEAR around it.
+    scene, count = _scene(surface, view), np.count_nonzero(surface.mask)
+    numbers = np.full(surface.mask.shape, count)
+    numbers[surface.mask] = np.arange(count)
+    numbers = np.pad(numbers, NEAR, constant_values=count)
     for start in range(0, len(chosen), AT_ONCE):
         part = chosen[start : start + AT_ONCE]
         light[start : start + AT_ONCE], share[start : start + AT_ONCE] = _some(
@@ -271,14 +275,6 @@ class _Points(NamedTuple):
     irradiance: Array
 
 
-def _table(table: CurveTable | Setting) -> CurveTable:
-    if isinstance(table, Setting):
-        return exact_table(table)
-    if not callable(getattr(table, "curves", None)):
-        raise InputError(f"table must be a Setting, or have a method curves, got {table!r}")
-    return table
-
-
 def _chosen(surface: Surface, pixels: ArrayLike) -> NDArray[np.int64]:
     chosen = np.asarray(pixels)
     if chosen.ndim != 2 or chosen.shape[1] != 2 or not np.issubdtype(chosen.dtype, np.integer):
@@ -304,14 +300,6 @@ def _scene(surface: Surface, view: View) -> _Scene:
         return _Scene(position, sides, others, areas, irradiance, place)
 
 
-def _numbers(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the number of the visible pixel that stands for each pixel of the image and a margin of NEAR around it."""
-    count = np.count_nonzero(mask)
-    numbers = np.full((mask.shape[0] + 2 * NEAR, mask.shape[1] + 2 * NEAR), count)
-    numbers[NEAR:-NEAR, NEAR:-NEAR][mask] = np.arange(count)
-    return numbers
-
-
 def _some(
     surface: Surface,
     scene: _Scene,
@@ -330,15 +318,8 @@ def _some(
     sides = ((side[:, None] / mfp[:, None]).reshape(-1, 3) for side in (across, along))
     own = own_share(curves, *sides).reshape(AT_ONCE, 3)
     with jax.enable_x64(True):
-        points = _Points(
-            scene.position[visible],
-            jnp.asarray(full),
-            jnp.asarray(around),
-            jnp.asarray(curves.profile.reshape(AT_ONCE, 3, -1, 4)),
-            jnp.asarray(curves.kappa.reshape(AT_ONCE, 3)),
-            jnp.asarray(own),
-            scene.irradiance[visible],
-        )
+        arrays = (full, around, curves.profile.reshape(AT_ONCE, 3, -1, 4), curves.kappa.reshape(AT_ONCE, 3), own)
+        points = _Points(scene.position[visible], *map(jnp.asarray, arrays), scene.irradiance[visible])
         lit, share = (np.asarray(value) for value in _sums(scene, points, mfp))
     return (curves.reflectance.reshape(AT_ONCE, 3) * lit / share)[: len(chosen)], share[: len(chosen)]
 

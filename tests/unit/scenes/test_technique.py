@@ -8,13 +8,13 @@ import pytest
 import profilefit
 from benchmarks.planes import flat, step_edge
 from mcml_sim import Setting
-from profilefit.errors import InputError, ShaderError
+from profilefit.errors import ShaderError
 from profilefit.scenes.skin import material
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, uniforms_of
 from profilefit.scenes.stage.technique import EXITANCE, Lambert, LawText, Technique, maps, through_text
-from tests.unit.scenes.scenes import ball, scene
+from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE = (128, 128)
 SOURCE = """
@@ -64,27 +64,26 @@ def test_a_technique_adds_its_passes(stage):
     assert stage.renderer.compiled == ["scaled"]
 
 
+class Unread(Lambert):
+    def passes(self, frame):
+        return [replace(one, reads=maps("irradiance_map", "position_map")) for one in super().passes(frame)]
+
+
 @pytest.mark.parametrize(
-    ("uniforms", "message"),
+    ("by", "message"),
     [
-        ({"factor": 1.0, "size": 2.0}, "shader 'scaled': uniform size is set, but stands nowhere in its source"),
-        ({}, "shader 'scaled': uniform factor stands in its source, but is never set"),
+        (
+            Scaled({"factor": 1.0, "size": 2.0}),
+            "shader 'scaled': uniform size is set, but stands nowhere in its source",
+        ),
+        (Scaled({}), "shader 'scaled': uniform factor stands in its source, but is never set"),
+        (Unread(), "uniform reflectance_map stands in its source, but is never set"),
     ],
+    ids=["a uniform too many", "a uniform too few", "a map too few"],
 )
-def test_a_uniform_without_its_other_half_is_an_error(stage, uniforms, message):
+def test_a_shader_without_its_other_half_is_an_error(stage, by, message):
     stage.upload(flat(SIZE, 1.0, 0.5))
-    with pytest.raises(ShaderError, match=message):
-        stage.scatter(Scaled(uniforms), 1.0)
-
-
-def test_a_sampler_without_a_map_is_an_error(stage):
-    class Unread(Lambert):
-        def passes(self, frame):
-            return [replace(one, reads=maps("irradiance_map", "position_map")) for one in super().passes(frame)]
-
-    stage.upload(flat(SIZE, 1.0, 0.5))
-    with pytest.raises(ShaderError, match="uniform reflectance_map stands in its source, but is never set"):
-        stage.scatter(Unread(), 1.0)
+    refused(message, stage.scatter, by, 1.0, error=ShaderError)
 
 
 @pytest.fixture(scope="module")
@@ -128,5 +127,4 @@ def test_lambert_is_the_light_that_arrives(stage):
 
 def test_what_is_no_technique_is_refused(stage):
     stage.upload(flat(SIZE, 1.0, 0.5))
-    with pytest.raises(InputError, match="law must be a profile law, an ExactLaw or a technique, got 'separable'"):
-        stage.scatter("separable", 1.0)
+    refused("law must be a profile law, an ExactLaw or a technique, got 'separable'", stage.scatter, "separable", 1.0)

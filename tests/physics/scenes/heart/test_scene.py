@@ -1,24 +1,20 @@
 """A heart of layers: what a file may say, how wrong each technique draws it, and its points and maps."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from benchmarks import heart
 from mcml_sim.files.text_file import read_toml
-from profilefit.errors import InputError
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.heart import chart, scene
 from tests.fixtures import slow
-from tests.physics.scenes.examples import changed
+from tests.unit.scenes.scenes import changed, mistaken, refused
 
 EXAMPLE = read_toml(shipped("examples") / "heart.toml")
 SMALL = {"camera": {"resolution": [64, 48]}, "technique": {"samples": 64, "texel": 0.5}}
-
-
-def content(place="", value=None):
-    return changed(EXAMPLE, place, value)
-
-
+content = partial(changed, EXAMPLE)
 KEYS = "keys must be of "
 REFUSED = [
     ("colour", 1, f"{KEYS}unit, .*, got 'colour'"),
@@ -41,11 +37,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("place", "value", "message"), REFUSED)
 def test_a_mistake_is_one_line(place, value, message):
-    with pytest.raises(InputError, match=message) as caught:
-        scene.read("heart.toml", content(place, value))
-    text = str(caught.value)
-    assert text.startswith("heart.toml: ")
-    assert text.isprintable()
+    mistaken(scene.read, "heart.toml", content(place, value), message)
 
 
 @pytest.mark.slow
@@ -86,9 +78,8 @@ def test_the_split_is_nearest_to_the_truth(context, coarse):
 
 def test_a_picture_beside_its_truth(context, coarse):
     """By the texture alone, of a ball, with one Gaussian."""
-    told = {**content("surface", {"kind": "ball", "size": 15.0}), **SMALL}
-    told["technique"] = {"kind": "texture", "gaussians": 1, "samples": 4}
-    told["camera"] = {"resolution": [32, 24]}
+    told = content("surface", {"kind": "ball", "size": 15.0}) | {"camera": {"resolution": [32, 24]}}
+    told |= {"technique": {"kind": "texture", "gaussians": 1, "samples": 4}}
     found = scene.draw(context, scene.read("ball.toml", told))
     assert found.picture.shape == found.truth.shape == (24, 32, 3)
     assert found.point.label == "texture"
@@ -100,11 +91,8 @@ def test_a_view_of_nothing_that_is_judged_is_one_line(context):
     told = {**content("surface", {"kind": "bumps", "size": 20.0}), **SMALL}
     told["camera"] = {"resolution": [8, 6], "target": [28.0, 28.0, 0.0], "height": 2.0}
     of = scene.read("sheet.toml", told)
-    with (
-        pytest.raises(InputError, match="the view must show some of the sheet that"),
-        scene.reference_render(context, of, scene.light_of(of, of.technique.gaussians)),
-    ):
-        pass
+    drawn = scene.reference_render(context, of, scene.light_of(of, of.technique.gaussians))
+    refused("the view must show some of the sheet that", drawn.__enter__)
 
 
 KEPT = 300  # pixels

@@ -1,17 +1,19 @@
 """A surface that is seen, and the gather over it: footprints, exact curves, a double loop, conservation, gaps."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks import planes
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError, SettingError
+from profilefit.errors import SettingError
 from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw, exact_table
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, own_share, refined, seen
+from tests.unit.scenes.scenes import refused
 
 FORWARD = np.array([0.0, 0.0, -1.0])
 NORMAL = np.array([0.5, -0.3, np.sqrt(1.0 - 0.34)])
@@ -36,13 +38,10 @@ def test_footprint_joins_the_corners_of_a_pixel(view):
         assert np.linalg.norm(np.cross(across, along)) == pytest.approx(0.25 / NORMAL[2])
 
 
-def test_an_outline_has_a_bounded_footprint():
+def test_footprints_of_an_outline_and_of_the_background():
+    """One is bounded. A render's positions and normals are 0 in the other; a 0 / 0 would warn, an error here."""
     across, along = View(2.0).footprint(np.zeros(3), np.array([1.0, 0.0, 0.0]))
     assert np.linalg.norm(np.cross(across, along)) <= 1.01 * 4.0 / LEAST_COSINE
-
-
-def test_background_at_the_eye_has_no_footprint():
-    """A render's positions and normals are 0 there; a 0 / 0 would warn, which is an error here."""
     position, normal = np.stack([THROUGH, np.zeros(3)]), np.stack([NORMAL, np.zeros(3)])
     view = View(0.002, True)
     across, along = view.footprint(position, normal)
@@ -51,9 +50,7 @@ def test_background_at_the_eye_has_no_footprint():
 
 
 def _plane(h, w, **changed):
-    fields = {name: np.full((h, w, 3), 0.5) for name in ("position", "irradiance", "reflectance")}
-    fields["normal"] = np.broadcast_to([0.0, 0.0, 1.0], (h, w, 3))
-    return Surface(**{**fields, "mask": np.ones((h, w), bool), **changed})
+    return flat(h, w, 0.5)._replace(**changed)
 
 
 def test_coarsened_is_the_mean_of_blocks():
@@ -67,23 +64,16 @@ def test_coarsened_is_the_mean_of_blocks():
 
 
 def test_seen_is_the_render_in_view_space():
+    """And what the shaders take for inside."""
     surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
     np.testing.assert_allclose(along[1, 2], surface.position[2, 2] - surface.position[1, 2])
     assert surface.mask.all()
     assert not view.is_perspective
-
-
-def test_seen_is_what_the_shaders_take_for_inside():
     plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
-
-
-def test_misuse():
-    with pytest.raises(InputError, match="factor must divide 2 and 3, got 2"):
-        _plane(2, 3).coarsened(2)
 
 
 VIEW = View(0.5)
@@ -187,9 +177,8 @@ def test_step_edge_is_the_integral():
 def test_short_mean_free_path_is_lambert():
     surface = hill(4, 6)
     found = gathered(surface, VIEW, np.full(3, 1e-3))
-    np.testing.assert_allclose(
-        found.light[surface.mask], (surface.reflectance * surface.irradiance)[surface.mask], rtol=1e-3
-    )
+    lambert = surface.reflectance * surface.irradiance
+    np.testing.assert_allclose(found.light[surface.mask], lambert[surface.mask], rtol=1e-3)
     assert not found.light[1, 2].any()
 
 
@@ -199,9 +188,8 @@ def test_no_light_crosses_a_gap_in_depth():
     near = np.broadcast_to(np.arange(24) < 12, (8, 24))
     position = surface.position - np.where(near, 0.0, 60.0)[..., None] * [0.0, 0.0, 1.0]
     lit = np.where(near, 0.0, 1.0)[..., None] * np.ones(3)
-    both = Surface(position, surface.normal, lit, surface.reflectance, surface.mask)
-    assert np.max(gathered(both, VIEW, np.ones(3)).light[near]) < 1e-4
-    level = Surface(surface.position, surface.normal, lit, surface.reflectance, surface.mask)
+    level = surface._replace(irradiance=lit)
+    assert np.max(gathered(level._replace(position=position), VIEW, np.ones(3)).light[near]) < 1e-4
     assert np.max(gathered(level, VIEW, np.ones(3)).light[near]) > 0.1
 
 
@@ -226,47 +214,38 @@ def test_refined_says_what_coarse_pixels_cost():
 
 
 def test_a_table_of_ones_own():
-    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself.
 
-    class Stretched:
-        def curves(self, values):
-            assert values.size % 3 == 0
-            return exact_table(DIFFUSE).curves(0.1 + 0.8 * values)
+    In a picture, where nothing scatters inside, the map is A all the same.
+    """
+
+    def stretched(values):
+        assert values.size % 3 == 0
+        return exact_table(DIFFUSE).curves(0.1 + 0.8 * values)
 
     surface = hill(4, 6)
     values = surface._replace(reflectance=(surface.reflectance - 0.1) / 0.8)
     itself = surface._replace(reflectance=0.1 + 0.8 * values.reflectance)
-    found, truth = gathered(values, VIEW, MFP, Stretched()), gathered(itself, VIEW, MFP)
+    found, truth = gathered(values, VIEW, MFP, SimpleNamespace(curves=stretched)), gathered(itself, VIEW, MFP)
     np.testing.assert_array_equal(found.light, truth.light)
     np.testing.assert_array_equal(found.share, truth.share)
     assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
-
-
-def test_a_table_of_ones_own_in_a_picture():
-    """Where nothing scatters inside, the map is A all the same."""
-
-    class Half:
-        def curves(self, values):
-            return exact_table(DIFFUSE).curves(0.5 * values)
-
+    half = SimpleNamespace(curves=lambda values: exact_table(DIFFUSE).curves(0.5 * values))
     mask = np.ones((4, 6), np.float32)
     mask[:, 0] = 0.0
     picture = replace(planes.flat((6, 4), 1.0, 0.8), mask=mask)
-    light = exitance_of(picture, np.ones(3), Half())
+    light = exitance_of(picture, np.ones(3), half)
     np.testing.assert_allclose(light[:, 1:], 0.4, rtol=1e-6)  # float32 of 0.8
     np.testing.assert_allclose(light[:, 0], 0.8, rtol=1e-6)
 
 
 def test_what_cannot_be_gathered():
     surface = flat(4, 6, 0.5)
-    with pytest.raises(InputError, match="table must be a Setting, or have a method curves, got 'diffuse'"):
-        gathered(surface, VIEW, MFP, "diffuse")
-    with pytest.raises(InputError, match="mfp must be three lengths > 0"):
-        gathered(surface, VIEW, [1.0, 0.0, 1.0])
-    with pytest.raises(InputError, match=r"pixels must be visible ones, got \(4, 0\)"):
-        gathered(surface, VIEW, MFP, pixels=[[4, 0]])
-    with pytest.raises(InputError, match="pixels must be pairs"):
-        gathered(surface, VIEW, MFP, pixels=[[1.0, 2.0]])
+    refused("table must be a Setting, or have a method curves, got 'diffuse'", gathered, surface, VIEW, MFP, "diffuse")
+    refused("mfp must be three lengths > 0", gathered, surface, VIEW, [1.0, 0.0, 1.0])
+    refused(r"pixels must be visible ones, got \(4, 0\)", gathered, surface, VIEW, MFP, pixels=[[4, 0]])
+    refused("pixels must be pairs", gathered, surface, VIEW, MFP, pixels=[[1.0, 2.0]])
+    refused("factor must divide 2 and 3, got 2", _plane(2, 3).coarsened, 2)
 
 
 REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
@@ -275,47 +254,41 @@ RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=str)
-def test_is_the_exact_half_space(setting):
-    curves = exact_table(setting).curves(REFLECTANCES)
-    np.testing.assert_allclose(exact.reflectance(curves.alpha, setting), REFLECTANCES, rtol=1e-8)
-    x, alpha = np.broadcast_to(RADII, (REFLECTANCES.size, RADII.size)), curves.alpha[:, None]
-    truth = exact.profile(RADII, alpha, setting=setting) / REFLECTANCES[:, None]
-    bright = RADII**2 * truth > 1e-10
-    assert np.max(np.abs(curves.density(x) - truth)[bright] / truth[bright]) < 1e-5
-    assert np.all(curves.density(x)[~bright] * np.broadcast_to(RADII**2, bright.shape)[~bright] < 1.01e-10)
-    np.testing.assert_allclose(curves.share(x), exact.cdf(RADII, alpha, setting=setting), rtol=1e-6)
-    shifted = exact_table(setting).curves(REFLECTANCES * 0.9999)  # the comparison can fail
-    assert np.max(np.abs(shifted.density(x) - truth)[bright] / truth[bright]) > 1e-5
-
-
-@pytest.mark.slow
-def test_is_the_exact_half_space_under_a_surface_that_refracts():
-    curves = exact_table(SKIN).curves(REFRACTED)
-    np.testing.assert_allclose(exact.reflectance(curves.alpha, SKIN), REFRACTED, rtol=1e-7)
-    x, alpha = np.broadcast_to(RADII, (REFRACTED.size, RADII.size)), curves.alpha[:, None]
-    truth = exact.profile(RADII, alpha, setting=SKIN) / REFRACTED[:, None]
-    bright = RADII**2 * truth > 1e-8
-    assert np.max(np.abs(curves.density(x) - truth)[bright] / truth[bright]) < 1e-3
-    assert np.all(np.isfinite(curves.density(x)))
-    np.testing.assert_allclose(curves.share(x), exact.cdf(RADII, alpha, setting=SKIN), atol=1e-7)
+@pytest.mark.parametrize(
+    ("setting", "values", "same", "faint", "most", "share"),
+    [
+        (Setting(), REFLECTANCES, 1e-8, 1e-10, 1e-5, {"rtol": 1e-6}),
+        (DIFFUSE, REFLECTANCES, 1e-8, 1e-10, 1e-5, {"rtol": 1e-6}),
+        (SKIN, REFRACTED, 1e-7, 1e-8, 1e-3, {"rtol": 1e-7, "atol": 1e-7}),
+    ],
+    ids=["searchlight", "diffuse", "a surface that refracts"],
+)
+def test_is_the_exact_half_space(setting, values, same, faint, most, share):
+    curves = exact_table(setting).curves(values)
+    np.testing.assert_allclose(exact.reflectance(curves.alpha, setting), values, rtol=same)
+    x, alpha = np.broadcast_to(RADII, (values.size, RADII.size)), curves.alpha[:, None]
+    truth, density = exact.profile(RADII, alpha, setting=setting) / values[:, None], curves.density(x)
+    bright = RADII**2 * truth > faint
+    assert np.max(np.abs(density - truth)[bright] / truth[bright]) < most
+    assert np.all(np.isfinite(density))
+    np.testing.assert_allclose(curves.share(x), exact.cdf(RADII, alpha, setting=setting), **share)
+    if setting.n == 1.0:
+        assert np.all(density[~bright] * np.broadcast_to(RADII**2, bright.shape)[~bright] < 1.01 * faint)
+        shifted = exact_table(setting).curves(values * 0.9999)  # the comparison can fail
+        assert np.max(np.abs(shifted.density(x) - truth)[bright] / truth[bright]) > most
 
 
 @pytest.mark.slow
 def test_ends():
-    curves = exact_table(Setting("diffuse")).curves([0.0, 1.0])
+    table = exact_table(DIFFUSE)
+    curves = table.curves([0.0, 1.0])
     np.testing.assert_array_equal(curves.alpha, [0.0, 1.0])
-    assert np.all(np.isfinite(curves.density(np.array([[0.0, 1e9], [0.0, 1e9]]))))
-    np.testing.assert_allclose(curves.share(np.array([[0.0, 1e9], [0.0, 1e9]])), [[0.0, 1.0], [0.0, 1.0]], atol=2e-4)
-
-
-@pytest.mark.slow
-def test_what_has_no_curves():
-    with pytest.raises(InputError, match=r"reflectance must be a list of numbers in \[0, 1\]"):
-        exact_table(Setting("diffuse")).curves([1.2])
+    x = np.array([[0.0, 1e9], [0.0, 1e9]])
+    assert np.all(np.isfinite(curves.density(x)))
+    np.testing.assert_allclose(curves.share(x), [[0.0, 1.0], [0.0, 1.0]], atol=2e-4)
+    refused(r"reflectance must be a list of numbers in \[0, 1\]", table.curves, [1.2])
 
 
 @pytest.mark.parametrize("made", [lambda own: ExactLaw((0.5,), own), exact_table, lambda own: Separable(setting=own)])
 def test_scattering_with_a_direction_is_refused(made):
-    with pytest.raises(SettingError, match=r"setting must have g = 0, got diffuse, n = 1\.4, g = 0\.8"):
-        made(replace(SKIN, g=0.8))
+    refused(r"setting must have g = 0, got diffuse, n = 1\.4, g = 0\.8", made, replace(SKIN, g=0.8), error=SettingError)
