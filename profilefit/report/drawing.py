@@ -28,6 +28,7 @@ ELEMENTS = ("svg", "defs", "style", "g", "path", "image", "use", "text", "tspan"
 ATTRIBUTES = (
     "height", "viewBox", "width", "version", "type", "id", "clip-path", "transform", "d", "style", "x", "y", HREF
 )  # fmt: skip
+INSIDE = ("#", "data:image/png;base64,")  # begin a link that stays in the drawing
 RULE = "*{stroke-linejoin: round; stroke-linecap: butt}"
 REACHING = re.compile(r"url\s*\(|[\\@<>&]|expression|script", re.IGNORECASE)
 POINTED_AT = re.compile(r"#([^)]+)")
@@ -70,18 +71,14 @@ def checked(svg: str) -> str:
         root.remove(part)
     for part in root.iter():
         tag = str(part.tag).removeprefix(SVG)
-        strange = [key for key, value in part.attrib.items() if key not in ATTRIBUTES or not _is_inside(key, value)]
+        strange: list[str] = []
+        for key, value in part.attrib.items():  # may point nowhere but into the drawing
+            inside = value.startswith(INSIDE) if key == HREF else not REACHING.search(value.replace("url(#", ""))
+            strange += [] if key in ATTRIBUTES and inside else [key]
         if tag not in ELEMENTS or strange or (tag == "style" and part.text != RULE):
             what = f"<{tag}>" + (f" with {strange[0]}" if strange else "")
             raise ValueError(f"a drawing with what matplotlib does not write: {what}")
     return tostring(root, encoding="unicode")
-
-
-def _is_inside(key: str, value: str) -> bool:
-    """Return whether a value points nowhere but into the drawing."""
-    if key == HREF:
-        return value.startswith(("#", "data:image/png;base64,"))
-    return not REACHING.search(value.replace("url(#", ""))
 
 
 def inline(svg: str, prefix: str, title: str, variables: Mapping[str, str] = VARIABLES) -> str:

@@ -18,17 +18,8 @@ from profilefit.recipes.evidence import digest, stale
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons
 from profilefit.report.drawing import address, checked, inline
+from profilefit.report.figures import record_figures as plots
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import (
-    OF_SUMS,
-    PAPER,
-    Plan,
-    plans,
-    record_plans,
-    sum_caption,
-    sum_figure,
-    sums_of,
-)
 from profilefit.report.kinds import stack_table, sum_tables
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Content, Source
@@ -94,7 +85,7 @@ CAPTIONS = {
 }
 
 
-def _drawn(plan: Plan, source: Source) -> str:
+def _drawn(plan: plots.Plan, source: Source) -> str:
     """Return the figure of a plan as part of a page; where it cannot be drawn, why."""
     reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
     if reason:
@@ -112,20 +103,20 @@ def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
 
 def whole_figure(source: Source, name: str) -> str:
     """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
-    (plan,) = (one for one in plans(source) if one.name == name)
+    (plan,) = (one for one in plots.plans(source) if one.name == name)
     return _drawn(plan, source)
 
 
 def paper_figures(source: Source) -> str:
     """Return the figures of the paper again, as far as there are records for them."""
-    return "\n".join(_drawn(plan, source) for plan in PAPER if set(plan.needs) <= set(source.paths))
+    return "\n".join(_drawn(plan, source) for plan in plots.PAPER if set(plan.needs) <= set(source.paths))
 
 
 def record_part(source: Source, name: str, figures: bool = True) -> str:
     """Return everything of one record, folded; without `figures` only what its .json has."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
-    plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
+    plans_of = [plan for plan in plots.record_plans(source, name) if not plan.missing] if figures else []
     corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
     drawings = "\n".join(_drawn(plan, source) for plan in plans_of if plan.name != corner)
     draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
@@ -247,8 +238,8 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
     if table is None:
         return
     yield markup(table)
-    if sums := sums_of(source.folder):
-        yield _drawing(OF_SUMS, lambda out: sum_figure(source, out), sum_caption(sums))
+    if sums := plots.sums_of(source.folder):
+        yield _drawing(plots.OF_SUMS, lambda out: plots.sum_figure(source, out), plots.sum_caption(sums))
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     yield from _pictures(evidence, OF_LAYERS)

@@ -150,10 +150,7 @@ def test_table_is_the_exact_half_space(explorer, light):
     alpha, setting = np.array([0.03, 0.5, 0.9, 0.99999, 1.0])[:, None], Setting(light)
     outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
     x = outer * np.geomspace(1e-4, 1.0, 20)
-    told = explorer.evaluate(
-        CURVES,
-        [light, 1, alpha[:, 0].tolist(), x.tolist()],
-    )
+    told = explorer.evaluate(CURVES, [light, 1, alpha[:, 0].tolist(), x.tolist()])
     profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
     np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=TABLE)
     np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=TABLE)
