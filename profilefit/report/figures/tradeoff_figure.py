@@ -65,8 +65,10 @@ def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], 
             bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
             arrowprops={"arrowstyle": "-", "color": "0.6", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 2.0},
         )
-        boxes = [_placed(note, place, renderer) for place in PLACES]
-        costs = [_crowding(box, occupied, inside) for box in boxes]
+        costs = []  # square pixels that a label would share with others, or have outside the axes
+        for box in (_placed(note, place, renderer) for place in PLACES):
+            shared = sum(_area(Bbox.intersection(box, other)) for other in occupied)
+            costs.append(shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside))))
         far = [DISTANCE * (STEP * np.hypot(*place)) ** 2 for place in PLACES]
         best = int(np.argmin(np.add(costs, far)))
         occupied.append(_placed(note, PLACES[best], renderer))
@@ -95,12 +97,6 @@ def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase
     )
     note.update_positions(renderer)
     return Text.get_window_extent(note, renderer).padded(2.0)  # an Annotation's own has its arrow, too
-
-
-def _crowding(box: Bbox, occupied: Sequence[Bbox], inside: Bbox) -> float:
-    """Return square pixels that a label would share with others, or have outside the axes."""
-    shared = sum(_area(Bbox.intersection(box, other)) for other in occupied)
-    return shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside)))
 
 
 def _area(box: Bbox | None) -> float:
@@ -135,7 +131,14 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
         draw(axes, panel, colours_of(part.points))
     used = {standing for panel in part.panels for standing in standings(panel.points)}
     joined = any(panel.joined for panel in part.panels)
-    handles = [_handle(standing, pen.GREY if joined else _colour(standing)) for standing in MARKS if standing in used]
+    handles = []
+    for standing in (standing for standing in MARKS if standing in used):
+        colour = pen.GREY if joined else _colour(standing)
+        handle = Line2D([], [], color=colour, ls="none", label=MEANINGS[standing])
+        handle.set(**{key: value for key, value in MARKS[standing].items() if key != "zorder"})
+        if standing == FRONT:
+            handle.set(color=pen.VERMILION, ls="-", lw=1.3, mfc=colour, mec=pen.VERMILION, mew=1.3)
+        handles.append(handle)
     spread = "thin: up to the worst; thick: middle 68 % of repeats"
     handles.append(Line2D([], [], color=pen.GREY, marker="_", lw=0.7, label=spread))
     title = fill(caption, CAPTION_WIDTH)
@@ -200,14 +203,6 @@ def _occupied(axes: Axes, panel: Panel) -> Iterator[Bbox]:
     for (x, y), (next_x, next_y) in pairwise(zip(*_xy(best), strict=True)):
         yield box_of(axes, [(x, y), (next_x, y)], 0.7)
         yield box_of(axes, [(next_x, y), (next_x, next_y)], 0.7)
-
-
-def _handle(standing: str, colour: str) -> Line2D:
-    handle = Line2D([], [], color=colour, ls="none", label=MEANINGS[standing])
-    handle.set(**{key: value for key, value in MARKS[standing].items() if key != "zorder"})
-    if standing == FRONT:
-        handle.set(color=pen.VERMILION, ls="-", lw=1.3, mfc=colour, mec=pen.VERMILION, mew=1.3)
-    return handle
 
 
 def colours_of(points: Sequence[Point]) -> dict[str, str]:

@@ -26,7 +26,7 @@ from profilefit.report.records import Content, Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.record_tables import photons_text, record_tables
-from profilefit.report.tables.tradeoff_tables import with_spread
+from profilefit.report.tables.tradeoff_tables import point_columns
 from profilefit.studies.stability.cells import Verdict
 
 SHOWN = 12  # letters of a SHA-256
@@ -315,13 +315,7 @@ def _numbers(part: Content) -> str:
     tables = []
     for panel in part["panels"].values():
         points = panel["points"]
-        columns = {
-            "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
-            "cost": [with_spread(**one["cost"]) for one in points],
-            "error": [with_spread(**one["error"]) for one in points],
-            "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
-            "stands": [one["standing"] for one in points],
-        }
+        columns = point_columns(points) | {"stands": [one["standing"] for one in points]}
         caption = f"cost: {panel['cost']}; error: {panel['error']}".replace("$", "")
         tables.append(markup(column_table(panel["title"].replace("$", ""), columns, caption, left=("", "stands"))))
     return "\n".join([*tables, *(paragraph(note, "dim") for note in part["notes"])])

@@ -33,16 +33,14 @@ class ConventionRow:
 
 def _rows(medium: Optical, n: float) -> list[ConventionRow]:
     """Return all quantities; a table leaves out what says the same twice."""
-    surface, matched = _surface(n, medium.g), _surface(1.0, medium.g)
     return [
         ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
         ConventionRow("alpha_unreduced", "  unreduced", "", 0, "mu_s / (mu_s + mu_a)", medium.alpha_unreduced),
         *(
-            ConventionRow(f"reflectance_{light}", "reflectance A", light, 0, surface, medium.reflectance(light, n))
-            for light in ILLUMINATIONS
-        ),
-        *(
-            ConventionRow(f"matched_{light}", "  index-matched", light, 0, matched, medium.reflectance(light))
+            ConventionRow(
+                f"{name}_{light}", title, light, 0, _surface(index, medium.g), medium.reflectance(light, index)
+            )
+            for name, title, index in (("reflectance", "reflectance A", n), ("matched", "  index-matched", 1.0))
             for light in ILLUMINATIONS
         ),
         ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
@@ -85,7 +83,12 @@ def convert_table(medium: Optical, unit: str, n: float = 1.0, sources: bool = Fa
 
     unit  that of length, or ""; n the index that A is of
     """
-    described = (Text(), Text("\n".join(map(_described, ENGINES)))) if sources else ()
+    lines = []
+    for engine in ENGINES if sources else ():
+        fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
+        lines += [engine.title, f"  fields: {'; '.join(fields)}", f"  typed: {engine.formula}"]
+        lines += [f"  source: {engine.source}", f"  checked: {engine.checked}"]
+    described = (Text(), Text("\n".join(lines))) if sources else ()
     return Group(_quantities(medium, unit, n), Text(), _engines(medium, unit, n), *described)
 
 
@@ -133,14 +136,6 @@ def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     if not unit:
         caption += ["No unit was given: convert lengths from yours to the one of the row."]
     return column_table("What to type", columns, "\n".join(caption), ("", "in"))
-
-
-def _described(engine: Engine) -> str:
-    fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
-    return (
-        f"{engine.title}\n  fields: {'; '.join(fields)}\n  typed: {engine.formula}\n"
-        f"  source: {engine.source}\n  checked: {engine.checked}"
-    )
 
 
 def _colours(values: Floats | None, places: int = COLOUR_PLACES, absent: str = ABSENT) -> str:

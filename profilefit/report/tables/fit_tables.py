@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.fitting import MediumFit
@@ -52,8 +53,9 @@ def fit_tables(result: MediumPosterior, title: str) -> list[RenderableType]:
     """Return estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
-        if len(result.identified) > 1:
-            parts.append(_correlation_table(result))
+        if len(names := result.identified) > 1:
+            joint = correlation(result.fit.gradients, result.fit.statistical, names)
+            parts.append(column_table("Correlations", {"": names, **_below_diagonal(names, joint, 3)}))
         parts.append(_advice_table(result))
     return parts
 
@@ -106,13 +108,11 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     return column_table(title, columns, caption, left=("", "unit"))
 
 
-def _correlation_table(result: MediumPosterior) -> RenderableType:
-    names = result.identified
-    joint = correlation(result.fit.gradients, result.fit.statistical, names)
-    columns = {"": list(names)}
-    for at, name in enumerate(names[:-1]):
-        columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
-    return column_table("Correlations", columns)
+def _below_diagonal(names: Sequence[str], joint: Floats, places: int) -> dict[str, list[str]]:
+    """Return the columns of a symmetric matrix by name, each pair of names once."""
+    rows = range(len(names))
+    columns = ([f"{joint[row, at]:.{places}f}" if row > at else "" for row in rows] for at in rows[:-1])
+    return dict(zip(names, columns, strict=False))
 
 
 def _advice_table(result: MediumPosterior) -> RenderableType:
@@ -363,9 +363,8 @@ def layers_tables(fit: LayersFit, title: str) -> list[RenderableType]:
             for name, ends in zip(fit.names, fit.intervals.tolist(), strict=True)
         ],
         "unit": ["" if name == "scale" else unit if name[0] == "d" else f"1/{unit}" for name in fit.names],
+        **_below_diagonal(fit.names, fit.correlation, 2),
     }
-    for at, name in enumerate(fit.names[:-1]):
-        free[name] = [f"{fit.correlation[row, at]:.2f}" if row > at else "" for row in range(len(fit.names))]
     caption = "±: from the errors of the data, wider where they do not explain the residuals; right: correlations"
     products = {
         "product": [fit.product(at) for at in range(len(fit.products))],

@@ -182,7 +182,13 @@ def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[Rendera
         yield _map_table(qualities.maps)
     for setting, of_setting in groupby(qualities.samplers, key=lambda one: one.of.setting):
         samplers = list(of_setting)
-        yield _sampler_table(setting, samplers)
+        rows = [
+            (_sampler_label(s), *map(_worst, (s.exact_error, *(getattr(s.quality, name) for name in COLUMNS.values()))))
+            for s in samplers
+        ]
+        header = ("law: sampler", "exact", *COLUMNS)
+        caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
+        yield row_table(f"Samplers, {setting}", header, rows, caption, fold=header[:1])
         if in_detail:
             yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
     if not (qualities.profiles or qualities.maps or qualities.samplers):
@@ -222,14 +228,8 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
     """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    header = (
-        "law",
-        "constants",
-        "light",
-        "n",
-        "number",
-        *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")),
-    )
+    of_measures = (f"{measure} {which}" for measure in ("rel", "ks") for which in ("mean", "worst"))
+    header = ("law", "constants", "light", "n", "number", *of_measures)
     rows = [
         (
             *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
@@ -270,15 +270,6 @@ def _map_table(measured: Sequence[tuple[LoadedLaw, AlbedoQuality]]) -> Renderabl
     ]
     caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
     return row_table("Maps between A and α", MAP_HEADERS, rows, caption, left=("light",), fold=("map",))
-
-
-def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
-    rows = [
-        (_sampler_label(s), *map(_worst, (s.exact_error, *(getattr(s.quality, name) for name in COLUMNS.values()))))
-        for s in samplers
-    ]
-    caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
-    return row_table(f"Samplers, {setting}", ("law: sampler", "exact", *COLUMNS), rows, caption, fold=("law: sampler",))
 
 
 def _sampler_label(sampler: MeasuredSampler) -> str:
