@@ -138,9 +138,8 @@ def rings_figure(photo: Photo, out: Path, name: str = RINGS) -> list[Path]:
         light, rows = (one[0][: rings.value.size] for one in (fit.shot.rows(fit.x), fit.shot.residuals(fit.x)))
         error = np.sqrt(np.diag(rings.covariance))
         seen = rings.value > 0
-        top.errorbar(
-            rings.r[seen], rings.value[seen], yerr=error[seen], label=f"{colour}: rings", **{**pen.DATA, "color": shade}
-        )
+        style = {**pen.DATA, "color": shade}
+        top.errorbar(rings.r[seen], rings.value[seen], yerr=error[seen], label=f"{colour}: rings", **style)
         top.plot(rings.r, light, label=f"{colour}: fit", **{**pen.WHOLE, "color": shade})
         below.plot(rings.r, rows, marker="o", markersize=2.6, linewidth=0.6, color=shade)
     unit = "counts" if photo.shot.seconds is None else "counts a second"

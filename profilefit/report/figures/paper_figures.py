@@ -19,30 +19,10 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.targets import albedo_values
+from profilefit.report import records
 from profilefit.report.figures import canvas as pen
-from profilefit.report.figures.canvas import (
-    DrawnLaw,
-    albedo_axis,
-    band_under,
-    canvas,
-    draw_curves,
-    legend_below,
-    plain_log,
-    save,
-    styled,
-)
-from profilefit.report.records import (
-    TOTAL,
-    Content,
-    Fitted,
-    Source,
-    coefficients,
-    converged,
-    exact_profile,
-    total_error,
-    unscaled,
-    z_score,
-)
+from profilefit.report.figures.canvas import albedo_axis, canvas, draw_curves, legend_below, plain_log, save, styled
+from profilefit.report.records import TOTAL, Content, Fitted, Source, coefficients, converged, total_error, z_score
 
 Points = tuple[Floats, ...]
 PANELS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)  # of a record's albedos, in order: more of them near alpha = 1
@@ -61,10 +41,10 @@ RECORDED_LAWS = {
 }
 
 
-def _recorded(source: Source, looks: dict[str, tuple[str, Any]]) -> dict[str, DrawnLaw]:
+def _recorded(source: Source, looks: dict[str, tuple[str, Any]]) -> dict[str, pen.DrawnLaw]:
     """Return the laws of records that converged, with their labels and looks, by the record's name."""
     usable = {name: source.usable(name) for name in looks}
-    return {name: DrawnLaw(looks[name][0], one.law, looks[name][1], one) for name, one in usable.items() if one}
+    return {name: pen.DrawnLaw(looks[name][0], one.law, looks[name][1], one) for name, one in usable.items() if one}
 
 
 @styled
@@ -86,7 +66,7 @@ def _by_albedo(
     axes = list(figure.subplots(2, 3, sharey=panel is _error_panel).flat)
     setting = data.law.setting
     laws = {
-        which: DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
+        which: pen.DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
         for which, (label, look) in PRINTED_LAWS.items()
     } | _recorded(source, RECORDED_LAWS)
     for ax, share in zip(axes, PANELS, strict=True):
@@ -99,16 +79,16 @@ def _by_albedo(
     return save(figure, out, name)
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
+def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
     radii = {name: radius for name, radius in radii.items() if radius > 0}  # a > 0 has none
     end = 1.25 * max(cut, *radii.values())
-    r_exact, profile = exact_profile(alpha, data.law.setting, NEAREST, end)
+    r_exact, profile = records.exact_profile(alpha, data.law.setting, NEAREST, end)
     source_limit = alpha / (4 * np.pi)
     r = np.linspace(0.0, end, 600)
-    draw_curves(ax, r, laws.values(), lambda law: np.maximum(unscaled(law, r, alpha), 1e-12))
+    draw_curves(ax, r, laws.values(), lambda law: np.maximum(records.unscaled(law, r, alpha), 1e-12))
     ax.plot(r_exact, r_exact * profile, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
     _rings(ax, data, row, end)
     at_foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5}
@@ -131,16 +111,16 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     ax.errorbar(r[index], energy[row][index] * to_profile, error[row][index] * to_profile, label=PHOTONS, **pen.DATA)
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
+def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
-    r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
+    r, truth = records.exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
     for one in laws.values():
         if one.fitted is not None:  # and states in which band the exact profile lies, which old records do not
             known = discrepancy.LawWithErrors.of_record(one.law, one.fitted.content, one.fitted.arrays)
             if known.discrepancy is not None:
                 low, high = discrepancy.profile(known, r, alpha).interval()
-                band_under(ax, r, (low / truth - 1.0, high / truth - 1.0), one.style["color"], TRUTH_BAND)
+                pen.band_under(ax, r, (low / truth - 1.0, high / truth - 1.0), one.style["color"], TRUTH_BAND)
         ax.plot(r, one.law.profile(r, alpha) / truth - 1.0, label=one.label, **one.style)
     edges = data.arrays["r_edges"]
     expected = np.diff(exact.cdf(edges, alpha, setting=setting)) * exact.reflectance(alpha, setting=setting)
@@ -160,9 +140,9 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     data = source.needed("albedo-liang")
     setting = data.law.setting
     printed = catalogue.albedo_law("liang", "published", setting, source.folder)
-    curves = [DrawnLaw("(8) as printed", printed, pen.PUBLISHED)]
+    curves = [pen.DrawnLaw("(8) as printed", printed, pen.PUBLISHED)]
     if data.converged:
-        curves.append(DrawnLaw("(8) regenerated", data.law, pen.WHOLE, data))
+        curves.append(pen.DrawnLaw("(8) regenerated", data.law, pen.WHOLE, data))
     rational = ("rational in √(1 − α)", {"color": pen.GREEN, "linestyle": "-."})
     curves += _recorded(source, {"albedo-rational": rational}).values()
     figure = canvas(6.4)
@@ -189,7 +169,7 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     return save(figure, out, name)
 
 
-def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw], exact_map: Points) -> None:
+def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[pen.DrawnLaw], exact_map: Points) -> None:
     reflectance, alpha = exact_map
     s = np.sqrt(1.0 - alpha)
     draw_curves(error, reflectance, curves, lambda law: law.alpha(reflectance) - alpha)
@@ -208,7 +188,7 @@ def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw]
     plain_log(ratio.yaxis)
 
 
-def _folds(panels: dict[str, Axes], curves: list[DrawnLaw]) -> None:
+def _folds(panels: dict[str, Axes], curves: list[pen.DrawnLaw]) -> None:
     """Mark where a map falls again, so that two reflectances share one albedo."""
     for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)
@@ -273,21 +253,21 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
     return save(figure, out, name or f"liang-{EQUATION[letter][1:-1]}-{letter}")
 
 
-def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[DrawnLaw]:
+def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[pen.DrawnLaw]:
     equation = EQUATION[letter]
     printed, corrected = (source.printed("liang", which, data.law.setting) for which in ("published", "corrected"))
-    lines = [DrawnLaw(f"{equation} as printed", printed, pen.PUBLISHED)]
+    lines = [pen.DrawnLaw(f"{equation} as printed", printed, pen.PUBLISHED)]
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
         label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
-        lines.append(DrawnLaw(label, corrected, pen.CORRECTED))
+        lines.append(pen.DrawnLaw(label, corrected, pen.CORRECTED))
     stage = data.content["stages"]["coefficient_laws"][letter]
     staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
     failed = "" if stage["result"] == "converged" else " (did not converge)"
-    lines.append(DrawnLaw(f"{equation} through the points{failed}", staged, STAGED))
+    lines.append(pen.DrawnLaw(f"{equation} through the points{failed}", staged, STAGED))
     return [*lines, *_recorded(source, OF_COEFFICIENTS).values()]
 
 
-def _ratios(ax: Axes, column: int, lines: list[DrawnLaw], data: Fitted) -> None:
+def _ratios(ax: Axes, column: int, lines: list[pen.DrawnLaw], data: Fitted) -> None:
     alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
     for label, law, style, _ in lines:
         ratio = coefficients(law, alpha)[column] / points
@@ -404,7 +384,7 @@ def _inverse_panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = DrawnLaw("(19) as printed", source.printed("liang", "published", setting), pen.PUBLISHED)
+    printed = pen.DrawnLaw("(19) as printed", source.printed("liang", "published", setting), pen.PUBLISHED)
     curves = [printed, *_recorded(source, OF_INVERSES).values()]
     # |g(xi)| of (19), before the clip (21) at r_max
     draw_curves(ax, xi, curves, lambda law: np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9))
@@ -439,8 +419,8 @@ def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -
     """Draw max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
     figure = canvas(4.6)
     axes = list(figure.subplots(1, 2, sharey=True))
-    for ax, (light, records) in zip(axes, RECORDS.items(), strict=True):
-        for record in records:
+    for ax, (light, names) in zip(axes, RECORDS.items(), strict=True):
+        for record in names:
             draw_inversion(ax, source, record)
         ax.axhline(REQUIRED, color=pen.BLACK, linewidth=0.8, linestyle=":", label="one in a thousand")
         albedo_axis(ax)
@@ -494,6 +474,5 @@ def inversion_caption(source: Source) -> str:
             worst = np.argmax(np.where(where, error, -np.inf))
             said.append(f"{error[worst]:.2g} at α = {alpha[worst]:.2g}")
     doubted = f"up to {error[inside].max():.2g}" if np.any(inside) else "nothing was measured"
-    return (
-        f"(19)-(21) as printed: {doubted} for α in [{low:g}, {high:g}], which the paper calls worst; {', '.join(said)}"
-    )
+    printed_as = f"(19)-(21) as printed: {doubted} for α in [{low:g}, {high:g}]"
+    return f"{printed_as}, which the paper calls worst; {', '.join(said)}"

@@ -91,10 +91,9 @@ def renderer_of(axes: Axes) -> RendererBase:
 
 def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase) -> Bbox:
     x, y = place
-    note.set(position=(STEP * x, STEP * y))
-    note.set(
-        ha="left" if x > 0 else "right" if x < 0 else "center", va="bottom" if y > 0 else "top" if y < 0 else "center"
-    )
+    ha = "left" if x > 0 else "right" if x < 0 else "center"
+    va = "bottom" if y > 0 else "top" if y < 0 else "center"
+    note.set(position=(STEP * x, STEP * y), ha=ha, va=va)
     note.update_positions(renderer)
     return Text.get_window_extent(note, renderer).padded(2.0)  # an Annotation's own has its arrow, too
 

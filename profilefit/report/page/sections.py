@@ -145,10 +145,8 @@ class EvidenceFolder:
         try:
             return "\n".join(parts(self))
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
-            given = f"{type(error).__name__}: {error}"
-            raise InputError(
-                f"{self.folder / name}.json: expected what `profilefit {name} --out` writes, got {given}"
-            ) from error
+            expected = f"{self.folder / name}.json: expected what `profilefit {name} --out` writes"
+            raise InputError(f"{expected}, got {type(error).__name__}: {error}") from error
 
     def content(self, name: str) -> Content | None:
         """Return the content of `name`.json; None if there is none. InputError on a file of another kind."""

@@ -74,13 +74,11 @@ def sea_lines(answer: SeaNeed) -> list[str]:
     off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in answer.haze.items())
     folds = "light folds" if answer.focus >= 1.0 else "no light folds"
     ways = {"sunlight": (answer.light_steps, answer.light), "views": (answer.view_steps, answer.view)}
-    steps = ", ".join(
-        f"{name} {number or 'none, Newton alone'} (S {significant(steep)})" for name, (number, steep) in ways.items()
-    )
+    each = (f"{name} {n or 'none, Newton alone'} (S {significant(steep)})" for name, (n, steep) in ways.items())
     return [
         f"terms: {answer.terms}; off the broadened haze at worst: {off} (requested: {_percent(answer.tolerance)} %)",
         f"splat: {answer.splat}; {folds} before the floor (F {significant(answer.focus)})",
-        f"steps to a hit: {steps}",
+        f"steps to a hit: {', '.join(each)}",
     ]
 
 
@@ -251,9 +249,8 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     )
     single = max(one.single for one in layers)
     needs = "needs a pass of its own" if single > choice.scene.tolerance else "needs no pass of its own"
-    text += (
-        f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on average."
-    )
+    text += f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on "
+    text += "average."
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as the file says, and these layers are not."

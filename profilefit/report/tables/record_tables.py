@@ -33,17 +33,8 @@ from profilefit.report.records import (
     measures,
     z_score,
 )
-from profilefit.report.tables.cells import (
-    ABSENT,
-    column_table,
-    interval,
-    on_the_point,
-    row_table,
-    significant,
-    span,
-    spark,
-    to_error,
-)
+from profilefit.report.tables import cells
+from profilefit.report.tables.cells import ABSENT, column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.quality_tables import quality_tables, spark_table, values_of, worst_measures
 
 if TYPE_CHECKING:
@@ -120,7 +111,7 @@ def _intervals_table(content: Content) -> RenderableType:
     for name, constant in content["constants"].items():
         for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
             levels = (constant["intervals"][kind].get(level) for level in ("68%", "95%"))
-            rows.append(("" if place else name, KINDS[kind], *map(interval, levels)))
+            rows.append(("" if place else name, KINDS[kind], *map(cells.interval, levels)))
     return row_table("Credible intervals (emcee)", ("", "from", "68 %", "95 %"), rows, left=("", "from"))
 
 
@@ -135,9 +126,8 @@ def _derived_table(derived: Content, surface: str = "") -> RenderableType:
         "± photons": on_the_point([significant(error) for error in errors[0]]),
         "± model": on_the_point([significant(error) for error in errors[1]]),
     }
-    return column_table(
-        title + surface, columns, "model: how far the law is from the truth; one standard error each", ("α",)
-    )
+    caption = "model: how far the law is from the truth; one standard error each"
+    return column_table(title + surface, columns, caption, ("α",))
 
 
 def fit_facts(content: Content) -> RenderableType:
@@ -165,10 +155,8 @@ def fit_facts(content: Content) -> RenderableType:
         size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
         lines += [("discrepancy", size), ("", f"{reach}; {off['result']}")]
     if left := content.get("left_out"):
-        facts = (
-            f"{left['rings']} radial bins and {left['albedos']} albedos left out: too few photons for a standard error"
-        )
-        lines.append(("data", facts))
+        what = f"{left['rings']} radial bins and {left['albedos']} albedos"
+        lines.append(("data", f"{what} left out: too few photons for a standard error"))
     return _facts("Fit", lines + _second_opinions(content))
 
 
@@ -184,11 +172,9 @@ def _second_opinions(content: Content) -> list[Line]:
                 cost = "" if ratio is None else f"misfit {significant(ratio)} times the best: "
                 lines.append(("", f"{other['count']}: {cost}{other['result'].split(':')[0]}"))
     if check := content.get("crosscheck"):
-        lines.append(("photons", check["result"]))
-        facts = (
-            f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions, p-value {significant(check['chance'])}"
-        )
-        lines.append(("", f"{facts}, {check['photons']:.2g} photons"))
+        facts = f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions"
+        chance = f"p-value {significant(check['chance'])}, {check['photons']:.2g} photons"
+        lines += [("photons", check["result"]), ("", f"{facts}, {chance}")]
     return lines
 
 
@@ -333,9 +319,8 @@ def _at_its_range(rows: list[Content]) -> list[Content]:
     if not known:
         return rows
     best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf)
-    return [
-        row for row in rows if all(row.get(key) == best.get(key) for key in ("channel", "range_choice", "range_mm"))
-    ]
+    its_range = ("channel", "range_choice", "range_mm")
+    return [row for row in rows if all(row.get(key) == best.get(key) for key in its_range)]
 
 
 def _ratio(row: Content) -> list[float]:
@@ -421,7 +406,7 @@ def _summary_table(measure: str, records: Records) -> RenderableType:
         columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in records.values()]
     if measure != "delta_A":
         rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in records.values()]
-        columns["over α"] = [spark(row, span(rows), SPARK) for row in rows]
+        columns["over α"] = [cells.spark(row, cells.span(rows), SPARK) for row in rows]
     return column_table(title, columns, left=("record", "over α"))
 
 
@@ -445,8 +430,8 @@ def reproduced(
         one, content = reproductions.get(name), record.read(paths[name]) if name in paths else {"fit": {"result": ""}}
         result = content["fit"]["result"] if "fit" in content else f"{len(content.get('readings', []))} readings"
         numbers = (one.moved, one.relative, one.intervals) if one else ()
-        cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
-        rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
+        shown = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
+        rows.append([name, f"{spent:.1f}", *shown[:4], (one.problem if one else "") or result])
     headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
     return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 

@@ -137,10 +137,8 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
         lines += [f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}" for one in part.fits if one.is_failure]
     ours = [part for part in parts if part.fits or any(one.own for one in part.cells)]
     broken = sum(part.failures > 0 for part in ours)
-    summary = (
-        f"{broken} of them with red cells inside their range" if broken else "none has a red cell inside its range"
-    )
-    lines.append(f"ours: {len(ours)} laws, maps and functions, {summary}")
+    red = f"{broken} of them with red cells inside their range" if broken else "none has a red cell inside its range"
+    lines.append(f"ours: {len(ours)} laws, maps and functions, {red}")
     own = [one for part in parts for one in part.cells if one.own]
     inside = sum(int(np.sum(one.inside)) for one in own)
     if aside := sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own):
