@@ -17,17 +17,15 @@ def cells(html: str, tag: str) -> list[str]:
 
 
 def test_a_table_has_its_title_headers_cells_and_caption_in_order():
-    html = markup(column_table("Title", {"": ["a<b", "c"], "x [mm]": ["1", "2"]}, "told & done"))
-    assert cells(html, "th") == ["", "x [mm]"]
-    assert cells(html, "td") == ["a<b", "1", "c", "2"]
+    """Numbers stand to the right, and long texts may wrap."""
+    columns = {"": ["a<b", "c"], "x [mm]": ["1", "2"], "long": ["many words", "more"]}
+    html = markup(column_table("Title", columns, "told & done", fold=("long",)))
+    assert cells(html, "th") == list(columns)
+    assert cells(html, "td") == ["a<b", "1", "many words", "c", "2", "more"]
     assert cells(html, "p") == ["Title", "told & done"]
     assert html.index("Title") < html.index("<table>") < html.index("told &amp; done")
-
-
-def test_numbers_stand_to_the_right_and_long_texts_may_wrap():
-    html = markup(column_table("", {"": ["a"], "n": ["1"], "long": ["many words"]}, fold=("long",)))
     found = ET.fromstring(f"<x>{html}</x>")
-    assert [one.get("class") for one in found.iter("td")] == [None, "number", "text"]
+    assert [one.get("class") for one in found.iter("td")] == [None, "number", "text"] * 2
 
 
 def test_styles_become_classes_and_lines_breaks():
