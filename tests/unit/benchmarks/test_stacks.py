@@ -31,9 +31,7 @@ def test_misprints_cost_and_corrections_converge():
     exact = [float(single_scattering(medium, 0.7, 0.5, 1.0)) for medium in every]
 
     def error(corrections, samples):
-        sums = [
-            zhao.single_sum(medium, 0.7, 0.5, 1.0, samples, 6.0 * medium.layers[0].mfp, corrections) for medium in every
-        ]
+        sums = [zhao.single_sum(one, 0.7, 0.5, 1.0, samples, 6.0 * one.layers[0].mfp, corrections) for one in every]
         return float(np.sqrt(np.mean((np.array(sums) / exact - 1) ** 2)))
 
     corrected = error(zhao.CORRECTED, 16)
@@ -46,11 +44,10 @@ def test_misprints_cost_and_corrections_converge():
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(stack_source, "RADII", np.geomspace(1e-3, 100.0, 20))
-    monkeypatch.setattr(stack_source, "DIRECTIONS", 50)
-    monkeypatch.setattr(law_cost, "ENOUGH", 0.0)
-    monkeypatch.setattr(law_cost, "TURNS", 1)
-    monkeypatch.setattr(law_cost, "SIZE", (16, 16))
+    few = {"RADII": np.geomspace(1e-3, 100.0, 20), "DIRECTIONS": 50}
+    for module, sizes in ((stack_source, few), (law_cost, {"ENOUGH": 0.0, "TURNS": 1, "SIZE": (16, 16)})):
+        for name, size in sizes.items():
+            monkeypatch.setattr(module, name, size)
 
 
 @pytest.mark.slow
