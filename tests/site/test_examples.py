@@ -21,7 +21,7 @@ def test_each_is_one_idea():
     "name", [path.name if path.name == SMOKE else pytest.param(path.name, marks=pytest.mark.slow) for path in SCRIPTS]
 )
 def test_scripts_run_and_say_nothing_but_the_answer(name, tmp_path):
-    line = [sys.executable, str(FOLDER / name)]
+    line = [sys.executable, FOLDER / name]
     done = subprocess.run(line, capture_output=True, text=True, cwd=tmp_path, timeout=250)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.count("\n") >= 1

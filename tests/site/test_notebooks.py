@@ -1,7 +1,6 @@
 """Every notebook runs as it is in the repository, stripped, and what its text says is what its cells print."""
 
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -14,6 +13,7 @@ from nbformat import NotebookNode
 
 from profilefit.errors import ShaderError
 from profilefit.shader.context import opened
+from tests.site.test_wheel import run as command
 
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -106,10 +106,7 @@ def test_notebooks_are_stripped(path):
 
 def test_nbstripout_finds_nothing_to_strip():
     pytest.importorskip("nbstripout")
-    told = subprocess.run(
-        [sys.executable, "-m", "nbstripout", "--verify", *map(str, NOTEBOOKS)], capture_output=True, text=True
-    )
-    assert told.returncode == 0, f"{told.stdout}{told.stderr}"
+    command(sys.executable, "-m", "nbstripout", "--verify", *NOTEBOOKS)
 
 
 @every
