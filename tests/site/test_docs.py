@@ -211,6 +211,29 @@ def test_the_python_that_is_printed_runs(page):
     exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
 
 
+# The numbered scripts of `examples/`: short, and they run as they stand
+
+SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
+SMOKE = "02_shader_source.py"
+LONGEST = 25  # lines
+
+
+def test_each_is_one_idea():
+    assert len(SCRIPTS) == 5
+    assert {path.name for path in SCRIPTS if len(path.read_text().splitlines()) > LONGEST} == set()
+
+
+@pytest.mark.parametrize(
+    "name", [path.name if path.name == SMOKE else pytest.param(path.name, marks=pytest.mark.slow) for path in SCRIPTS]
+)
+def test_scripts_run_and_say_nothing_but_the_answer(name, tmp_path):
+    line = [sys.executable, ROOT / "examples" / name]
+    done = subprocess.run(line, capture_output=True, text=True, cwd=tmp_path, timeout=250)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("\n") >= 1
+    assert list(tmp_path.iterdir()) == []
+
+
 # The commands
 
 

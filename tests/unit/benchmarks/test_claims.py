@@ -1,12 +1,15 @@
-"""What is promised: quick rows measured, the file of the last measurement, and a promise that is not kept."""
+"""What is promised: quick rows measured, the last measurement, a promise that is not kept; its table, and damage."""
 
 import json
+import re
 
 import pytest
 
 from benchmarks import claims
+from profilefit.errors import InputError
 from profilefit.recipes import record
-from profilefit.report.tables.claims_table import EXACT, FILE, read_claims
+from profilefit.report.page.sections import EvidenceFolder, promises
+from profilefit.report.tables.claims_table import EXACT, FILE, markdown_claims, read_claims
 
 EVIDENCE = claims.FITS / "evidence"
 BROKEN = ("broken", "≤ 0.1 %", claims.RECORDS.promises[0][2], "error of R_d by hazard")
@@ -64,3 +67,44 @@ def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, t
     for left in (["broken", "map-error"], ["map-error"]):
         assert [one.name for one in rows_after()] == left
         monkeypatch.setattr(claims, "RUNS", (kept._replace(fitted=True), claims.RUNS[1]))
+
+
+# The table
+
+ROW = {
+    **{"name": "time", "says": "time of <ours>", "value": 1.31, "low": 1.25, "high": 1.4, "noise": "least | most"},
+    **{"sense": "≤", "bound": 1.5, "unit": "", "truth": "theirs", "command": "profilefit check", "date": "today"},
+    "load": "0.2",
+}
+SHARE = {"sense": "≥", "bound": 20, "unit": "%", "value": 12.0, "low": 12.0, "high": 12.0, "noise": "exact"}
+
+
+def written(folder, *rows):
+    (folder / FILE).write_text(json.dumps({"made": {"command": "make claims"}, "rows": rows}), encoding="utf-8")
+    return folder
+
+
+def test_a_row_is_judged_by_its_numbers_and_shown_with_its_noise(tmp_path):
+    assert "".join(promises(EvidenceFolder(tmp_path, tmp_path))) == "", "no section where none was measured"
+    _, (time, share) = read_claims(written(tmp_path, ROW, {**ROW, **SHARE}))
+    assert time.cells == ("time of <ours>", "≤ 1.5", "1.31", "1.25 … 1.40: least | most")
+    assert share.cells[1:] == ("≥ 20 %", "12.0 % BROKEN", "exact")
+    page = "".join(promises(EvidenceFolder(tmp_path, tmp_path)))
+    told = ("time of &lt;ours&gt;", "1.25 … 1.40", "12.0 % BROKEN", "≥ 20 %", "held against: theirs", "make claims")
+    assert [text for text in told if text not in page] == []
+    lines = markdown_claims(tmp_path).splitlines()
+    assert {len(re.split(r"(?<!\\)\|", line)) for line in lines[:4]} == {9}
+    assert r"time of \<ours>" in lines[2]
+
+
+@pytest.mark.parametrize(
+    "spoiled", [{"value": "1"}, {"low": True}, {"says": "\x1b[31m"}, {"sense": "<"}, {"unit": None}]
+)
+def test_damage_is_named(tmp_path, spoiled):
+    (key,) = spoiled
+    with pytest.raises(InputError, match=rf"claims.json: expected what `make claims` writes, got ValueError: {key}"):
+        read_claims(written(tmp_path, {**ROW, **spoiled}))
+    with pytest.raises(InputError, match="got KeyError: 'name'"):
+        read_claims(written(tmp_path, {}))
+    with pytest.raises(InputError, match="got TypeError"):
+        read_claims(written(tmp_path, 1))

@@ -15,8 +15,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import albedo_laws, profile_laws, sampled_laws
 from profilefit.report.tables import law_tables as tables
 from profilefit.report.tables.law_tables import every_law, measured, measured_samplers
-from tests.unit.report.test_markdown import parsed
-from tests.unit.report.test_tables import rendered
+from tests.unit.report.test_tables import parsed, rendered
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])
