@@ -27,47 +27,34 @@ TABLE = 2e-5  # of the exact solution between the knots of the explorer's table
 REFRACTED = 5e-4, 5e-5  # of R_d and of the cdf from n = 1.1 up, between the knots in n, too
 NEAR_ONE = 3e-3, 3e-4  # where n is less
 # One law of each kind: the first call of a law in Python takes as long as ten in the browser.
-COMPARED = (
-    "hazard-diffuse",
-    "quantile",
-    "burley-published",
-    "liang-corrected",
-    "gaussians-4",
-    "dipole",
-    "better_dipole",
-)
+COMPARED = {"hazard-diffuse", "quantile", "burley-published", "liang-corrected", "gaussians-4"}
+COMPARED |= {"dipole", "better_dipole"}
 REFLECTANCE, MFP = [0.2, 0.6, 0.97], [0.4, 1.0, 2.5]
 CURVES = """([light, n, alphas, radii]) => alphas.map((alpha, i) => {
   const curve = explorer.state.tables[light].at(n).curve(alpha);
   return radii[i].map((x) => [curve.profile(x), curve.cdf(x), curve.edge(-x)]);
 })"""
 NO_WEBGL = "HTMLCanvasElement.prototype.getContext = () => null"
-PAGE = (
-    '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">{}'
-)
+HEAD = '<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+FITS = catalogue.fits_folder()
 
 
 @pytest.fixture(scope="module")
-def fits():
-    return catalogue.fits_folder()
-
-
-@pytest.fixture(scope="module")
-def fragment(fits):
-    return explorer_section(fits)
+def fragment():
+    return explorer_section(FITS)
 
 
 @pytest.fixture(scope="module")
 def file(fragment, tmp_path_factory):
     """A page with nothing but the explorer: its own colours, its own font size."""
     path = tmp_path_factory.mktemp("explorer") / "page.html"
-    path.write_text(PAGE.format(fragment))
+    path.write_text(f"<!DOCTYPE html>{HEAD}{fragment}")
     return path
 
 
 @pytest.fixture(scope="module")
-def laws(fits):
-    return {address(named): named.law for named in profile_laws(fits)}
+def laws():
+    return {address(named): named.law for named in profile_laws(FITS)}
 
 
 @pytest.fixture(scope="module")
@@ -170,54 +157,51 @@ def test_errors_are_those_of_quality(explorer, laws, name):
     truth = profile_quality(laws[name], found["alpha"])
     np.testing.assert_allclose(found["rel"], truth.rel, atol=TABLE)
     np.testing.assert_allclose(found["ks"], truth.ks, atol=TABLE)
-    shown = [
-        float(text.replace("−", "-"))
-        for text in explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()
-    ]
-    np.testing.assert_allclose(shown, truth.rel, rtol=0.05)  # two digits
+    texts = explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()
+    np.testing.assert_allclose([float(text.replace("−", "-")) for text in texts], truth.rel, rtol=0.05)  # two digits
 
 
+# Without a surface that refracts; a knot, near the lowest ones where the light changes fastest, and half-way between
+# two of the others.
+@pytest.mark.parametrize(
+    ("n", "white", "nearest", "bounds"),
+    [
+        (1.0, (0.99999,), 1e-4, (TABLE, TABLE)),
+        *((n, (0.99, 0.9999), 1e-3, REFRACTED) for n in (1.4, 1.34, 1.16)),
+        (1.04, (0.99, 0.9999), 1e-3, NEAR_ONE),
+    ],
+    ids=["n1", "n1.4", "n1.34", "n1.16", "n1.04"],
+)
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
-def test_table_is_the_exact_half_space(explorer, light):
-    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99999, 1.0])[:, None], Setting(light)
-    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
-    x = outer * np.geomspace(1e-4, 1.0, 20)
-    told = explorer.evaluate(CURVES, [light, 1, alpha[:, 0].tolist(), x.tolist()])
-    profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
-    np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=TABLE)
-    np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=TABLE)
-    np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
-
-
-# A knot, near the lowest ones where the light changes fastest, and half-way between two of the others.
-@pytest.mark.parametrize(("n", "bounds"), [(1.4, REFRACTED), (1.34, REFRACTED), (1.16, REFRACTED), (1.04, NEAR_ONE)])
-@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
-def test_table_is_the_exact_half_space_under_a_surface_that_refracts(explorer, light, n, bounds):
-    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99, 0.9999, 1.0])[:, None], Setting(light, n)
-    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
-    x = outer * np.geomspace(1e-3, 1.0, 20)
+def test_table_is_the_exact_half_space(explorer, light, n, white, nearest, bounds):
+    alpha, setting = np.array([0.03, 0.5, 0.9, *white, 1.0])[:, None], Setting(light, n)
+    x = np.asarray(exact.quantile(0.995, alpha, setting=setting)) * np.geomspace(nearest, 1.0, 20)
     told = explorer.evaluate(CURVES, [light, n, alpha[:, 0].tolist(), x.tolist()])
-    profile, cdf, _ = np.moveaxis(np.array(told), -1, 0)
+    profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
     np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=bounds[0])
     np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=bounds[1])
+    if n == 1.0:
+        np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
 
 
 @pytest.mark.parametrize("name", ["hazard", "hazard-diffuse"])
-def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, fits, name):
+def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, name):
     light = "diffuse" if name.endswith("diffuse") else "searchlight"
+
+    def has_text_of(named):
+        return explorer.locator("[data-part='text']").text_content() == export(named, FITS, "glsl-es", "law")
+
     for n in (1.02, 1.34, 1.6):
         found = chosen(explorer, name, n)
-        named = catalogue.find(f"{name}-refracting", fits, n=n)
-        assert explorer.locator("[data-part='text']").text_content() == export(named, fits, "glsl-es", "law")
+        named = catalogue.find(f"{name}-refracting", FITS, n=n)
+        assert has_text_of(named)
         truth = profile_quality(named.law, found["alpha"])
         np.testing.assert_allclose(found["rel"], truth.rel, atol=REFRACTED[0])
         np.testing.assert_allclose(found["ks"], truth.ks, atol=REFRACTED[1])
         assert named.setting == Setting(light, n)
         assert explorer.locator("[data-part='foreign']").is_hidden()
     chosen(explorer, name)
-    assert explorer.locator("[data-part='text']").text_content() == export(
-        catalogue.find(name, fits), fits, "glsl-es", "law"
-    )
+    assert has_text_of(catalogue.find(name, FITS))
 
 
 def test_a_law_made_for_one_index_says_so_under_another(explorer):
@@ -262,12 +246,9 @@ def test_a_lost_context_shows_the_picture_until_it_is_back(open_page, file):
 
 
 def test_a_shader_that_does_not_compile_says_where(open_page, file, tmp_path):
-    broken = tmp_path / "broken.html"
-    text = file.read_text()
-    assert "float law_density(float x, law_Shape s) {" in text
-    broken.write_text(
-        text.replace("float law_density(float x, law_Shape s) {", "float law_density(float x, law_Shape s) { int x")
-    )
+    broken, text, function = tmp_path / "broken.html", file.read_text(), "float law_density(float x, law_Shape s) {"
+    assert function in text
+    broken.write_text(text.replace(function, f"{function} int x"))
     page = open_page(broken)
     told = page.locator("[data-part='fault']").inner_text()
     assert re.match(r"hazard: values does not compile, line \d+, `float law_density.* int x`: ERROR", told)
@@ -286,13 +267,14 @@ def test_the_address_keeps_what_was_chosen(open_page, file):
 
 
 def test_an_address_that_comes_later_is_followed(explorer):
-    explorer.evaluate("location.hash = '#explorer?law=burley-published&view=constructor&samples=16'")
-    explorer.wait_for_function("explorer.values.law === 'burley-published'")
-    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["rr", 16]
-    explorer.evaluate("location.hash = '#explorer?law=dipole&view=error&l=2,1,0.5'")
-    explorer.wait_for_function("explorer.values.law === 'dipole'")
     begun_anew = 64
-    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["error", begun_anew]
+    for law, more, expected in (
+        ("burley-published", "view=constructor&samples=16", ["rr", 16]),
+        ("dipole", "view=error&l=2,1,0.5", ["error", begun_anew]),
+    ):
+        explorer.evaluate(f"location.hash = '#explorer?law={law}&{more}'")
+        explorer.wait_for_function(f"explorer.values.law === '{law}'")
+        assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == expected
     assert explorer.locator("#explorer-law").input_value() == "dipole"
     assert explorer.locator("#explorer-l-red + output").inner_text() == "2.00"
 
@@ -327,11 +309,11 @@ def test_nothing_is_wider_than_a_phone(open_page, file):
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-def test_a_folder_with_one_record_has_its_law_beside_the_printed_ones(fits, tmp_path):
+def test_a_folder_with_one_record_has_its_law_beside_the_printed_ones(tmp_path):
     bare = {law.id for law in offered(tmp_path)}
     assert {"liang-published", "burley-diffuse", "dipole"} <= bare
     for ending in ("json", "npz"):
-        shutil.copy(fits / f"quantile.{ending}", tmp_path)
+        shutil.copy(FITS / f"quantile.{ending}", tmp_path)
     found = offered(tmp_path)
     assert {law.id for law in found} - bare == {"quantile"}
     assert first(found) == "quantile"
