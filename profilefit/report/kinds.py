@@ -205,10 +205,8 @@ def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
     if sums.path.stem != "skin" or sums.stack.unit != "mm":
         return {}
     variances, weights = np.array(D_EON.variances), np.transpose(D_EON.weights)
-    return {
-        light: [quality(one, variances, own) for one, own in zip(sums.lights(light), weights, strict=True)]
-        for light in ILLUMINATIONS
-    }
+    of = {light: zip(sums.lights(light), weights, strict=True) for light in ILLUMINATIONS}
+    return {light: [quality(one, variances, own) for one, own in pairs] for light, pairs in of.items()}
 
 
 # Phase functions fitted to a table: the error of each form, and the constants with their errors.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import methodcaller
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -54,6 +55,10 @@ class Plan:
     draw: Callable[..., list[Path]]
     missing: str = ""
 
+    def drawn(self, source: Source, out: Path) -> list[Path]:
+        """Draw the figure into a folder, and return its files."""
+        return self.draw(source, out, name=self.name)
+
 
 Track = Callable[[list[Plan]], Iterable[Plan]]
 
@@ -95,15 +100,11 @@ def draw_all(
             possible.append(plan)
     drawn: dict[int, list[Path]] = {}
     with Workers(min(processes, len(possible))) as workers:
-        task = partial(_drawn, source if processes == 1 else Source(folder), out)  # what is read travels with it
-        figures = workers.each(task, possible)
+        known = source if processes == 1 else Source(folder)  # what is read travels with the task
+        figures = workers.each(methodcaller("drawn", known, out), possible)
         for _ in track(possible):
             number, drawn[number] = next(figures)
     return [path for number in range(len(possible)) for path in drawn[number]], left_out
-
-
-def _drawn(source: Source, out: Path, plan: Plan) -> list[Path]:
-    return plan.draw(source, out, name=plan.name)
 
 
 def plans(source: Source) -> tuple[Plan, ...]:

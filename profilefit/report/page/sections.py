@@ -91,7 +91,7 @@ def _drawn(plan: plots.Plan, source: Source) -> str:
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
     title = CAPTIONS.get(plan.name) or CAPTIONS[plan.name.split("-")[0]]
-    return _drawing(plan.name, lambda out: plan.draw(source, out, name=plan.name), title)
+    return _drawing(plan.name, lambda out: plan.drawn(source, out), title)
 
 
 def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:

@@ -33,26 +33,23 @@ class ConventionRow:
 
 def _rows(medium: Optical, n: float) -> list[ConventionRow]:
     """Return all quantities; a table leaves out what says the same twice."""
+    reflectances = []
+    for name, title, index in (("reflectance", "reflectance A", n), ("matched", "  index-matched", 1.0)):
+        surface = "exact, index-matched" if index == 1 else f"exact, n = {index:g}"
+        if medium.g != 0.0:
+            surface += f", g = {medium.g:g}" if index != 1 else ", g = 0 by similarity"
+        for light in ILLUMINATIONS:
+            values = medium.reflectance(light, index)
+            reflectances.append(ConventionRow(f"{name}_{light}", title, light, 0, surface, values))
     return [
         ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
         ConventionRow("alpha_unreduced", "  unreduced", "", 0, "mu_s / (mu_s + mu_a)", medium.alpha_unreduced),
-        *(
-            ConventionRow(
-                f"{name}_{light}", title, light, 0, _surface(index, medium.g), medium.reflectance(light, index)
-            )
-            for name, title, index in (("reflectance", "reflectance A", n), ("matched", "  index-matched", 1.0))
-            for light in ILLUMINATIONS
-        ),
+        *reflectances,
         ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
         ConventionRow("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
         ConventionRow("mu_s_unreduced", "  unreduced mu_s", "", -1, "mu_s' / (1 - g)", medium.mu_s / (1.0 - medium.g)),
         *(ConventionRow(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
     ]
-
-
-def _surface(n: float, g: float) -> str:
-    known = "exact, index-matched" if n == 1 else f"exact, n = {n:g}"
-    return known if g == 0.0 else f"{known}, g = {g:g}" if n != 1 else f"{known}, g = 0 by similarity"
 
 
 def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, Any]:

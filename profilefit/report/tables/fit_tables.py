@@ -18,16 +18,8 @@ from profilefit.measured.identifiability import LOOSE, REFERENCE_ERROR, REPEATS,
 from profilefit.measured.model import NEAR, QUANTITIES, correlation, unit_of
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
 from profilefit.recipes import record
-from profilefit.report.tables.cells import (
-    ABSENT,
-    SEARCHLIGHT,
-    column_table,
-    interval,
-    on_the_point,
-    row_table,
-    significant,
-    to_error,
-)
+from profilefit.report.tables import cells
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant, to_error
 
 if TYPE_CHECKING:  # which a fit of one medium does not load
     from profilefit.measured.layers import LayersFit
@@ -74,7 +66,9 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     marks = {name: (EDGE if ends[name] else ABSENT) if name in ends else HELD for name in names}
     columns = {
         "": list(names),
-        "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
+        "value": cells.on_the_point(
+            [to_error(result.value(name), data[name] if name in moving else None) for name in names]
+        ),
         "± statistical": [significant(data[name]) if name in moving else marks[name] for name in names],
     }
     caption = CAPTION
@@ -91,10 +85,9 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
         within = result.whole_interval(name) if whole else result.interval(name)
         low, high = within or (None, None)
         is_wide = low is not None and high is not None and 0 < WIDE * low < high
-        columns["95 %"].append(ANYTHING if is_wide else interval(within, 1.0 if name in SHARES else None))
-    caption += "; 95 %: interval by " + (
-        "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
-    )
+        columns["95 %"].append(ANYTHING if is_wide else cells.interval(within, 1.0 if name in SHARES else None))
+    errors = "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
+    caption += f"; 95 %: interval by {errors}"
     if any(ends.values()):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
     if fit.spec.law.setting.illumination == Setting().illumination:
@@ -299,11 +292,8 @@ def _medium(result: MediumPosterior) -> Iterator[str]:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
         yield f"known as ranges: {known}; {_narrowed(result.fit)}"
     if there is not None:
-        names = spec.assumed
-        here, other = (
-            " and ".join(f"{name} = {getattr(one, name):g}" for name in names)
-            for one in (spec.law.setting, there.setting)
-        )
+        names, settings = spec.assumed, (spec.law.setting, there.setting)
+        here, other = (" and ".join(f"{name} = {getattr(one, name):g}" for name in names) for one in settings)
         told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
         yield (
             f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
@@ -359,7 +349,7 @@ def layers_tables(fit: LayersFit, title: str) -> list[RenderableType]:
         "value": [to_error(value, value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
         "±": [significant(value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
         "95 %": [
-            UNKNOWN if name in fit.loose else interval(ends)
+            UNKNOWN if name in fit.loose else cells.interval(ends)
             for name, ends in zip(fit.names, fit.intervals.tolist(), strict=True)
         ],
         "unit": ["" if name == "scale" else unit if name[0] == "d" else f"1/{unit}" for name in fit.names],
@@ -436,7 +426,7 @@ def photo_tables(photo: Photo) -> list[RenderableType]:
             best = photo.bounds[colour].get(name)
             rows.append((
                 colour if name == MEDIUM[0] else "", name, to_error(value, error), significant(error),
-                interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+                cells.interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
             ))  # fmt: skip
     title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
     caption = (
