@@ -38,20 +38,12 @@ MARKER = 1000  # letters of a path that is a marker, drawn often and so with one
 QUALITY = 80  # of a photograph as WebP
 UNTURNED = re.compile(r"rotate\(-?0(?: [^)]*)?\)")
 # Neighbours that are one element: letters of a formula, each at its place, and lines of one style; definitions of none.
-TOGETHER = tuple(
-    (re.compile(pattern), whole)
-    for pattern, whole in (
-        (
-            r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">',
-            r'<tspan x="\1 \5" y="\2" style="\3">\4',
-        ),
-        (
-            r'<path d="([^"]*)" ((?:clip-path="[^"]*" )?style="fill:none;(?![^"]*opacity)[^"]*")/>'
-            r'<path d="([^"]*)" \2/>',
-            r'<path d="\1\3" \2/>',
-        ),
-        (r"<defs>(?:<path (?![^>]* id=)[^>]*/>)*</defs>|<defs/>", ""),
-    )
+TSPANS = r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">'
+PATHS = r'<path d="([^"]*)" ((?:clip-path="[^"]*" )?style="fill:none;(?![^"]*opacity)[^"]*")/><path d="([^"]*)" \2/>'
+TOGETHER = (
+    (re.compile(TSPANS), r'<tspan x="\1 \5" y="\2" style="\3">\4'),
+    (re.compile(PATHS), r'<path d="\1\3" \2/>'),
+    (re.compile(r"<defs>(?:<path (?![^>]* id=)[^>]*/>)*</defs>|<defs/>"), ""),
 )
 TICK = re.compile(r"M \S+ \S+\s+L \S+ \S+\s*")
 DRAWING, STYLE = re.compile(r"<svg .*?</svg>", re.DOTALL), re.compile(r' style="([^"]*)"')

@@ -34,11 +34,8 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
 
     layers  the one layer for a stack: none without one, one of a grey stack, or those of red, green and blue
     """
-    shown = {
-        "best cheaper": choice.cheaper,
-        "chosen" if choice.chosen else "nearest": choice.nearest,
-        "next dearer": choice.dearer,
-    }
+    nearest = "chosen" if choice.chosen else "nearest"
+    shown = {"best cheaper": choice.cheaper, nearest: choice.nearest, "next dearer": choice.dearer}
     rows = {name: one for name, one in shown.items() if one is not None}
     least = min(one.error.total for one in rows.values())
     places = max(1 - math.floor(math.log10(max(100.0 * least, 1e-4))), 0)  # two digits of the least
