@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -23,7 +23,7 @@ from profilefit.report.figures.canvas import only
 from profilefit.report.kinds import stack_table, sum_tables
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Content, Source
-from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.record_tables import photons_text, record_tables
 from profilefit.report.tables.tradeoff_tables import point_columns
@@ -248,9 +248,16 @@ def _check(content: Content) -> Iterator[str]:
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, measures) in GROUPS.items():
-        if content[key]:
-            columns = _columns(content[key], measures)
-            yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
+        errors = (f"{MEASURES[name].symbol}\n{of}" for name in measures for of in ("model", "float32"))
+        header, rows = ("law", "result", "light", "n", *errors, "bad\ninside", "bad\noutside"), []
+        for one in content[key]:
+            setting = (one["setting"]["illumination"], f"{one['setting']['n']:g}")
+            known = (of.get(name) for name in measures for of in (one["model"]["values"], one["rounding"]))
+            bad = (sum(v for v in one[place].values() if isinstance(v, int)) for place in ("inside", "outside"))
+            result = "FAIL" if one["broken"] else "pass"
+            rows.append((_label(one), result, *setting, *map(significant, known), *map(str, bad)))
+        if rows:
+            yield markup(row_table(title, header, rows, MEANING, left=("light", "result"), fold=("law",)))
     if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
     if costs := content["costs"]:
@@ -258,22 +265,6 @@ def _check(content: Content) -> Iterator[str]:
         for work in next(iter(costs.values()))["ns"]:
             columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
         yield markup(column_table(COSTS, columns, left=("source",)))
-
-
-def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, list[str]]:
-    columns = {
-        "law": [_label(one) for one in group],
-        "result": ["FAIL" if one["broken"] else "pass" for one in group],
-        "light": [one["setting"]["illumination"] for one in group],
-        "n": [f"{one['setting']['n']:g}" for one in group],
-    }
-    for name in measures:
-        short = MEASURES[name].symbol
-        columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
-        columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
-    for place in ("inside", "outside"):
-        columns[f"bad\n{place}"] = [str(sum(v for v in one[place].values() if isinstance(v, int))) for one in group]
-    return columns
 
 
 def _label(content: Content) -> str:

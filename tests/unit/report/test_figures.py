@@ -47,20 +47,16 @@ def drawn(source, tmp_path_factory):
     return files, before, dict(matplotlib.rcParams)
 
 
-def folder_with(tmp_path, *names):
+def folder_with(tmp_path, *names, edit=lambda content: None):
+    """A folder of these records, the content of each changed by `edit`."""
     folder = tmp_path / "records"
     folder.mkdir()
     for name in names:
-        for suffix in (".json", ".npz"):
-            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
+        content = json.loads((SHIPPED / f"{name}.json").read_text())
+        edit(content)
+        (folder / f"{name}.json").write_text(json.dumps(content))
+        shutil.copy(SHIPPED / f"{name}.npz", folder)
     return folder
-
-
-def change(folder, name, edit):
-    path = folder / f"{name}.json"
-    content = json.loads(path.read_text())
-    edit(content)
-    path.write_text(json.dumps(content))
 
 
 def test_every_kind_is_there_as_png_and_svg_and_nothing_else(drawn):
@@ -102,8 +98,8 @@ def test_svg_carries_text_and_no_date_and_is_the_same_twice_and_one_format_may_b
 
 
 def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
-    folder = folder_with(tmp_path, "albedo-liang")
-    change(folder, "albedo-liang", lambda c: [one.update(jackknife_error=None) for one in c["constants"].values()])
+    none = {"jackknife_error": None}
+    folder = folder_with(tmp_path, "albedo-liang", edit=lambda c: [one.update(none) for one in c["constants"].values()])
     with only("svg"):
         files, _ = draw_all(folder, tmp_path / "out", ["albedo-liang"])
     assert tmp_path / "out" / f"{SMALL_CORNER}.svg" in files
@@ -150,9 +146,8 @@ def test_drawing_leaves_matplotlib_as_it_was(drawn):
 
 
 def test_what_cannot_be_drawn_is_listed(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
     fit = {"result": "no fit", "steps": 9, "condition_number": 1.0, "residuals": {}}
-    change(folder, "burley-whole", lambda content: content.update(posterior={}, fit=fit))
+    folder = folder_with(tmp_path, "burley-whole", edit=lambda content: content.update(posterior={}, fit=fit))
     files, left_out = draw_all(folder, tmp_path / "out")
     assert [file.name for file in files] == ["quality.png", "quality.svg"]
     assert len(left_out) == len(PAPER) + 4
@@ -170,8 +165,11 @@ def test_names_choose_the_figures_that_show_them(tmp_path):
 
 
 def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
-    change(folder, "burley-whole", lambda content: [c.pop("regenerated") for c in content["constants"].values()])
+    def edit(content):
+        for one in content["constants"].values():
+            one.pop("regenerated")
+
+    folder = folder_with(tmp_path, "burley-whole", edit=edit)
     with pytest.raises(RecordError, match=r"is damaged: constants\.s0\.regenerated must be a number, got nothing"):
         draw_all(folder, tmp_path / "out")
     shutil.copy(SHIPPED / "burley-whole.json", folder)
@@ -204,8 +202,8 @@ def test_band_is_the_quantiles_of_laws_evaluated_one_by_one(source):
 
 
 def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
-    here = Source(folder_with(tmp_path, "burley-whole"))
-    change(here.folder, "burley-whole", lambda content: content["fit"].update(result="no convergence"))
+    failed = {"result": "no convergence"}
+    here = Source(folder_with(tmp_path, "burley-whole", edit=lambda content: content["fit"].update(failed)))
     assert here.usable("burley-whole") is None
     assert here.fitted("burley-whole").band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
     assert here.fitted("liang-whole") is None
@@ -214,8 +212,7 @@ def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
 
 
 def test_a_record_without_covariance_is_drawn_without_what_rests_on_it(tmp_path):
-    source = Source(folder_with(tmp_path, "burley-whole"))
-    change(source.folder, "burley-whole", lambda content: content.pop("covariance"))
+    source = Source(folder_with(tmp_path, "burley-whole", edit=lambda content: content.pop("covariance")))
     fitted = source.needed("burley-whole")
     assert fitted.band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
     assert LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays).discrepancy is None
