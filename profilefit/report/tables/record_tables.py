@@ -283,8 +283,8 @@ def _table1(rows: list[Content]) -> RenderableType:
     for group in _by(rows, "material").values():
         known = (row for row in group if row.get("model") == NORMALIZED_DIFFUSION)
         best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf, default=None)
-        place = ("channel", "range_choice", "range_mm")
-        shown += [row for row in group if best is None or all(row.get(key) == best.get(key) for key in place)]
+        of_best = ("channel", "range_choice", "range_mm")
+        shown += [row for row in group if best is None or all(row.get(key) == best.get(key) for key in of_best)]
     ranges = [f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT for row in shown]
     columns = {
         "material": [
