@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -25,7 +25,8 @@ LONGEST = 12  # lines of a function that a notebook may define: a longer one bel
 SMOKE = FOLDER / "04-check-the-shader.ipynb"
 FIRST = 6  # cells of it, up to the first picture: a whole notebook takes half a minute
 
-every = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+STEMS = [path.stem for path in NOTEBOOKS]
+every = pytest.mark.parametrize("path", NOTEBOOKS, ids=STEMS)
 
 
 @pytest.fixture(autouse=True)
@@ -43,19 +44,15 @@ def run(path: Path, *more: str, first: int | None = None) -> NotebookNode:
 
 
 @cache
-def executed(path: Path) -> NotebookNode:
-    """The same, once for all tests."""
-    require_opengl(path)
-    return run(path)
-
-
-def require_opengl(path: Path) -> None:
+def executed(path: Path, first: int | None = None) -> NotebookNode:
+    """The same, once for all tests, where there is the OpenGL that it needs."""
     if path.stem[:2] in NEEDS_OPENGL:
         try:
             with opened():
                 pass
         except ShaderError as error:
             pytest.skip(str(error))
+    return run(path, first=first)
 
 
 def outputs(notebook: NotebookNode, kind: str) -> list[NotebookNode]:
@@ -90,23 +87,15 @@ def numbers(pattern: str, text: str) -> list[float]:
     return [float(found) for found in re.findall(pattern, text)]
 
 
-def definitions(source: str) -> Iterator[list[str]]:
+def definitions(source: str) -> list[list[str]]:
     """The lines of each function that a cell defines."""
-    for block in re.findall(r"^def .*\n(?:(?:[ \t].*)?\n?)*", source, re.MULTILINE):
-        yield block.rstrip().splitlines()
+    blocks = re.findall(r"^def .*\n(?:(?:[ \t].*)?\n?)*", source, re.MULTILINE)
+    return [block.rstrip().splitlines() for block in blocks]
 
 
 def test_there_are_eleven_and_a_table_of_them():
     assert [path.stem[:2] for path in NOTEBOOKS] == [f"{number:02d}" for number in range(1, 12)]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
-
-
-@every
-def test_notebooks_are_stripped(path):
-    notebook = nbformat.read(path, as_version=4)
-    assert set(notebook.metadata) <= {"kernelspec", "language_info"}
-    left = [cell.id for cell in notebook.cells if cell.metadata or cell.get("outputs") or cell.get("execution_count")]
-    assert left == [], "strip outputs before committing: nbstripout notebooks/*.ipynb"
 
 
 def test_nbstripout_finds_nothing_to_strip():
@@ -115,40 +104,31 @@ def test_nbstripout_finds_nothing_to_strip():
 
 
 @every
-def test_text_stands_between_cells_and_no_helper_is_long(path):
-    cells = nbformat.read(path, as_version=4).cells
+def test_notebooks_are_stripped_with_text_between_cells_links_that_lead_and_no_long_helper(path):
+    notebook = nbformat.read(path, as_version=4)
+    cells = notebook.cells
+    assert set(notebook.metadata) <= {"kernelspec", "language_info"}
+    left = [cell.id for cell in cells if cell.metadata or cell.get("outputs") or cell.get("execution_count")]
+    assert left == [], "strip outputs before committing: nbstripout notebooks/*.ipynb"
     kinds = [cell.cell_type for cell in cells]
     assert kinds[0] == kinds[-1] == "markdown"
     assert "code code" not in " ".join(kinds)
     assert [block for cell in cells for block in definitions(cell.source) if len(block) > LONGEST] == []
     assert "**" in cells[0].source, "the question comes first"
     assert "## What was learnt" in cells[-1].source
-
-
-@every
-def test_links_lead_to_notebooks(path):
-    cells = [cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown"]
-    assert [link for link in re.findall(r"\]\(([^)#]+)\)", "\n".join(cells)) if not (FOLDER / link).exists()] == []
+    words = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    assert [link for link in re.findall(r"\]\(([^)#]+)\)", words) if not (FOLDER / link).exists()] == []
 
 
 @pytest.mark.slow
-@every
-def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(path):
+@pytest.mark.parametrize("cells", [*((path,) for path in NOTEBOOKS), (SMOKE, FIRST)], ids=[*STEMS, "the-first-of-one"])
+def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(cells):
     before = set(FOLDER.rglob("*"))
-    require_clean(executed(path))
-    assert set(FOLDER.rglob("*")) - before == set()
-
-
-@pytest.mark.slow
-def test_the_first_cells_of_one_run():
-    require_opengl(SMOKE)
-    require_clean(run(SMOKE, first=FIRST))
-
-
-def require_clean(notebook: NotebookNode) -> None:
+    notebook = executed(*cells)
     assert outputs(notebook, "error") == []
     assert [one.text for one in outputs(notebook, "stream") if one.name == "stderr"] == []
     assert pictures(notebook)
+    assert set(FOLDER.rglob("*")) - before == set()
 
 
 @prints("01-simulate-and-read-error-bars")

@@ -32,17 +32,6 @@ def wheel(tmp_path_factory) -> Path:
     return built
 
 
-@pytest.fixture(scope="module")
-def scripts(wheel, tmp_path_factory) -> Path:
-    """The folder of programs of a new environment with the wheel and its dependencies."""
-    home = tmp_path_factory.mktemp("environment")
-    venv.create(home, with_pip=True)
-    folder = home / ("Scripts" if os.name == "nt" else "bin")
-    pip = (folder / "python", "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check")
-    run(*pip, "install", wheel, cwd=home)
-    return folder
-
-
 @pytest.mark.slow
 def test_wheel_holds_the_packages_every_recipe_and_record_and_every_text_that_the_packages_read(wheel):
     """Shaders, pages, scenes: whatever lies beside the modules."""
@@ -79,7 +68,10 @@ def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
 
 @pytest.mark.slow
 @in_an_environment_of_its_own
-def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
+def test_installed_law_evaluates_away_from_the_checkout(wheel, tmp_path):
+    """In a new environment with the wheel and its dependencies."""
+    venv.create(tmp_path / "environment", with_pip=True)
+    python = tmp_path / "environment" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    run(python, "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check", "install", wheel, cwd=tmp_path)
     code = "import profilefit; law = profilefit.load('liang'); print(law.profile(0.5, 0.9))"
-    value = float(run(scripts / "python", "-I", "-c", code, cwd=tmp_path))
-    assert 0 < value < math.inf
+    assert 0 < float(run(python, "-I", "-c", code, cwd=tmp_path)) < math.inf

@@ -107,17 +107,15 @@ def _intervals_table(content: Content) -> RenderableType:
 
 def _derived_table(derived: Content, surface: str = "") -> RenderableType:
     """Return A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
-    errors = derived["statistical"], derived["model"]
-    both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
-    header, title = DERIVED[derived["quantity"]]
-    columns = {
-        "α": [f"{alpha:g}" for alpha in derived["alpha"]],
-        header: on_the_point([to_error(v, e) for v, e in zip(derived["value"], both, strict=True)]),
-        "± photons": on_the_point([significant(error) for error in errors[0]]),
-        "± model": on_the_point([significant(error) for error in errors[1]]),
-    }
+    columns = (derived[key] for key in ("alpha", "value", "statistical", "model"))
+    rows = []
+    for alpha, value, *errors in zip(*columns, strict=True):
+        largest = max((error for error in errors if error is not None), default=None)
+        rows.append((f"{alpha:g}", to_error(value, largest), *map(significant, errors)))
+    quantity, title = DERIVED[derived["quantity"]]
+    header = ("α", quantity, "± photons", "± model")
     caption = "model: how far the law is from the truth; one standard error each"
-    return column_table(title + surface, columns, caption, ("α",))
+    return row_table(title + surface, header, rows, caption, ("α",), aligned=header[1:])
 
 
 def fit_facts(content: Content) -> RenderableType:

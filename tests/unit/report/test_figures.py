@@ -60,10 +60,12 @@ def folder_with(tmp_path, *names, edit=lambda content: None):
 
 
 def test_every_kind_is_there_as_png_and_svg_and_nothing_else(drawn):
-    files, _, _ = drawn
+    files, before, after = drawn
     assert {file.name for file in files} == {f"{name}.{kind}" for name in EACH_KIND for kind in ("png", "svg")}
     assert set(files[0].parent.iterdir()) == set(files)  # no temporary file is left
     require_whole(files)
+    assert before == after, "matplotlib is as it was"
+    assert plt.get_fignums() == []
 
 
 def test_the_dear_ones_are_whole_too(source, tmp_path):
@@ -137,12 +139,6 @@ def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name, tmp_path
     left = np.asarray(ax.lines[0].get_ydata(), float)
     assert left.size > 20
     assert 1e-4 < np.max(np.abs(left)) < 3e-3
-
-
-def test_drawing_leaves_matplotlib_as_it_was(drawn):
-    _, before, after = drawn
-    assert before == after
-    assert plt.get_fignums() == []
 
 
 def test_what_cannot_be_drawn_is_listed(tmp_path):
