@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from string import Template
 
@@ -18,6 +17,7 @@ from profilefit.report.page import sections
 from profilefit.report.page.markup import element, markup, section
 from profilefit.report.records import Source
 from profilefit.report.tables.record_tables import summary
+from profilefit.shader.emit import text_beside
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
@@ -125,12 +125,8 @@ def document(title: str, lead: str, summary: str, parts: Mapping[str, tuple[str,
         title=escape(title),
         lead=escape(lead),
         summary=escape(summary),
-        style=_asset("page.css") + rules,
-        script=_asset("page.js"),
+        style=text_beside(__name__, "page.css") + rules,
+        script=text_beside(__name__, "page.js"),
         links=links,
         sections=body,
     )
-
-
-def _asset(name: str) -> str:
-    return files("profilefit.report.page").joinpath(name).read_text(encoding="utf-8")

@@ -65,20 +65,17 @@ def _hazard(contents: Mapping[str, Content]) -> str:
     forms: dict[tuple[str, ...], dict[str, Content]] = {}
     for name, content in sorted(fitted.items(), key=lambda item: bool(item[1].get("indices"))):
         forms.setdefault(tuple(content["constants"]), {})[name] = content
-    return "\n\n".join(map(_hazard_constants, forms.values()))
-
-
-def _hazard_constants(fitted: Mapping[str, Content]) -> str:
-    """Return records of the same constants, a column each."""
-    names = next(iter(fitted.values()))["constants"]
-    rows = [("n", *map(records.index_words, fitted.values()))]
-    for name in names:
-        of = [content["constants"][name] for content in fitted.values()]
-        rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
-    for measure in ("rel", "ks"):
-        worst_of = (records.regenerated_worst(c, measure) for c in fitted.values())
-        rows.append((f"{measure}, worst", *map(significant, worst_of)))
-    return markdown_table(("constant", *fitted), rows)
+    tables = []
+    for names, alike in forms.items():  # a column for each record of the same constants
+        rows = [("n", *map(records.index_words, alike.values()))]
+        for name in names:
+            of = [content["constants"][name] for content in alike.values()]
+            rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
+        for measure in ("rel", "ks"):
+            worst_of = (records.regenerated_worst(content, measure) for content in alike.values())
+            rows.append((f"{measure}, worst", *map(significant, worst_of)))
+        tables.append(markdown_table(("constant", *alike), rows))
+    return "\n\n".join(tables)
 
 
 def _readings(contents: Mapping[str, Content]) -> str:
@@ -106,10 +103,8 @@ def sections(contents: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
     paper = {name: c for name, c in contents.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
     of_maps = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
-    maps = [
-        (owner, which, *(albedo_number(name, values[name]) for name in OF_MAP))
-        for owner, which, values in _measured(contents, "delta_A")
-    ]
+    sets = _measured(contents, "delta_A")
+    maps = [(owner, which, *(albedo_number(name, values[name]) for name in OF_MAP)) for owner, which, values in sets]
     tables = {
         "short": _short(contents),
         "quality": _quality(_measured(paper, "rel"), PROFILE_MEASURES),
