@@ -12,7 +12,7 @@ from rich.text import Text
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.convert import ENGINES, LENGTHS, QUANTITIES, Engine, Optical
-from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, row_table, significant
 
 DIGITS, COLOUR_PLACES = 5, 4
 NONE = "none"
@@ -107,32 +107,29 @@ def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
 
 
 def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
-    rows = [_typed(engine, medium, unit, n) for engine in ENGINES]
-    in_unit = []
+    rows = []
     for engine in ENGINES:
+        typed = _typed(engine, medium, unit, n)
         field = engine.unit or (f"{unit} scene" if unit else "scene unit")
         scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
-        in_unit.append(f"{'1/' if engine.power < 0 else ''}{field}{scale}")
-    columns = {
-        "": [engine.title for engine in ENGINES],
-        "colour": [_colours(row["colour"]) for row in rows],
-        "length": [" ".join(_cell(value, DIGITS - 1) for value in row["length"]) for row in rows],
-        "in": in_unit,
-        "renders A": [_colours(row["renders"], COLOUR_PLACES - 1, "") for row in rows],
-    }
+        in_unit = f"{'1/' if engine.power < 0 else ''}{field}{scale}"
+        length = " ".join(_cell(value, DIGITS - 1) for value in typed["length"])
+        renders = _colours(typed["renders"], COLOUR_PLACES - 1, "")
+        rows.append((engine.title, _colours(typed["colour"]), length, in_unit, renders))
     caption = [
         "Colours are linear. A row holds for its version only; --sources names fields, formulas, sources and checks.",
         "at: the world scale of the renderer's settings. scene: it is modelled in this unit.",
         "renders A: what Blender shows of this medium, seen from the normal. Light enters refracted, which the map of "
         "its colour to an albedo leaves out.",
     ]
-    if ABSENT in columns["colour"]:
+    if any(colour == ABSENT for _, colour, *_ in rows):
         caption += [f"{ABSENT}: no source says."]
-    if any(NONE in cell for cell in columns["length"]):
+    if any(NONE in length for _, _, length, *_ in rows):
         caption += [f"{NONE}: the renderer has no such g, or its row was not checked with g."]
     if not unit:
         caption += ["No unit was given: convert lengths from yours to the one of the row."]
-    return column_table("What to type", columns, "\n".join(caption), ("", "in"))
+    header = ("", "colour", "length", "in", "renders A")
+    return row_table("What to type", header, rows, "\n".join(caption), ("", "in"))
 
 
 def _colours(values: Floats | None, places: int = COLOUR_PLACES, absent: str = ABSENT) -> str:

@@ -13,7 +13,6 @@ from rich.text import Text
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import DETECTED
-from profilefit.measured.fitting import MediumFit
 from profilefit.measured.identifiability import LOOSE, REFERENCE_ERROR, REPEATS, Candidate, relative_errors
 from profilefit.measured.model import NEAR, QUANTITIES, correlation, unit_of
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
@@ -113,15 +112,12 @@ def _advice_table(result: MediumPosterior) -> RenderableType:
     if advice is None:
         return Text("")
     unit = result.fit.data.unit or "units of r"
-    columns = {
-        "additional measurement": ["none", *(described(one, unit) for one in advice.candidates)],
-        "least certain quantity": [advice.name, *(one.worst[0] for one in advice.candidates)],
-        "± statistical, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
-    }
+    header = ("additional measurement", "least certain quantity", "± statistical, relative")
+    rows = [("none", advice.name, significant(advice.now))]
+    rows += [(described(one, unit), one.worst[0], significant(one.worst[1])) for one in advice.candidates]
     place = "at the far end of the interval of alpha" if result.fit.at_edge else "at the fitted values"
     caption = f"predicted {place}, best first; a value is given the median relative error of the data"
-    left = "additional measurement", "least certain quantity"
-    return column_table("Most informative additional measurement", columns, caption, left)
+    return row_table("Most informative additional measurement", header, rows, caption, header[:2])
 
 
 def described(candidate: Candidate, unit: str) -> str:
@@ -274,23 +270,19 @@ def _beam(result: MediumPosterior) -> Iterator[str]:
         )
 
 
-def _narrowed(fit: MediumFit) -> str:
-    """Return what the data say of ranges."""
-    if fit.range_marginal is None:
-        return "no value of theirs gives a fit with errors, so the middle is fitted"
-    units = {"beam": f" {fit.data.unit or 'units of r'}"}
-    told = ", ".join(
-        f"{name} {value:.3g} ± {fit.range_marginal.error[name]:.2g}{units.get(name, '')}"
-        for name, value in fit.range_marginal.mean.items()
-    )
-    return f"the data and the ranges together say {told}, and what this leaves open is in the intervals"
-
-
 def _medium(result: MediumPosterior) -> Iterator[str]:
     spec, there, unit = result.fit.spec, result.tissue, result.fit.data.unit
     if spec.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
-        yield f"known as ranges: {known}; {_narrowed(result.fit)}"
+        narrowed = "no value of theirs gives a fit with errors, so the middle is fitted"
+        if (marginal := result.fit.range_marginal) is not None:
+            each = []
+            for name, value in marginal.mean.items():
+                in_unit = f" {unit or 'units of r'}" if name == "beam" else ""
+                each.append(f"{name} {value:.3g} ± {marginal.error[name]:.2g}{in_unit}")
+            narrowed = f"the data and the ranges together say {', '.join(each)}"
+            narrowed += ", and what this leaves open is in the intervals"
+        yield f"known as ranges: {known}; {narrowed}"
     if there is not None:
         names, settings = spec.assumed, (spec.law.setting, there.setting)
         here, other = (" and ".join(f"{name} = {getattr(one, name):g}" for name in names) for one in settings)
