@@ -28,6 +28,7 @@ ELEMENTS = ("svg", "defs", "style", "g", "path", "image", "use", "text", "tspan"
 ATTRIBUTES = (
     "height", "viewBox", "width", "version", "type", "id", "clip-path", "transform", "d", "style", "x", "y", HREF
 )  # fmt: skip
+INSIDE = ("#", "data:image/png;base64,")  # begin a link that stays in the drawing
 RULE = "*{stroke-linejoin: round; stroke-linecap: butt}"
 REACHING = re.compile(r"url\s*\(|[\\@<>&]|expression|script", re.IGNORECASE)
 POINTED_AT = re.compile(r"#([^)]+)")
@@ -37,20 +38,12 @@ MARKER = 1000  # letters of a path that is a marker, drawn often and so with one
 QUALITY = 80  # of a photograph as WebP
 UNTURNED = re.compile(r"rotate\(-?0(?: [^)]*)?\)")
 # Neighbours that are one element: letters of a formula, each at its place, and lines of one style; definitions of none.
-TOGETHER = tuple(
-    (re.compile(pattern), whole)
-    for pattern, whole in (
-        (
-            r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">',
-            r'<tspan x="\1 \5" y="\2" style="\3">\4',
-        ),
-        (
-            r'<path d="([^"]*)" ((?:clip-path="[^"]*" )?style="fill:none;(?![^"]*opacity)[^"]*")/>'
-            r'<path d="([^"]*)" \2/>',
-            r'<path d="\1\3" \2/>',
-        ),
-        (r"<defs>(?:<path (?![^>]* id=)[^>]*/>)*</defs>|<defs/>", ""),
-    )
+TSPANS = r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">'
+PATHS = r'<path d="([^"]*)" ((?:clip-path="[^"]*" )?style="fill:none;(?![^"]*opacity)[^"]*")/><path d="([^"]*)" \2/>'
+TOGETHER = (
+    (re.compile(TSPANS), r'<tspan x="\1 \5" y="\2" style="\3">\4'),
+    (re.compile(PATHS), r'<path d="\1\3" \2/>'),
+    (re.compile(r"<defs>(?:<path (?![^>]* id=)[^>]*/>)*</defs>|<defs/>"), ""),
 )
 TICK = re.compile(r"M \S+ \S+\s+L \S+ \S+\s*")
 DRAWING, STYLE = re.compile(r"<svg .*?</svg>", re.DOTALL), re.compile(r' style="([^"]*)"')
@@ -70,18 +63,14 @@ def checked(svg: str) -> str:
         root.remove(part)
     for part in root.iter():
         tag = str(part.tag).removeprefix(SVG)
-        strange = [key for key, value in part.attrib.items() if key not in ATTRIBUTES or not _is_inside(key, value)]
+        strange: list[str] = []
+        for key, value in part.attrib.items():  # may point nowhere but into the drawing
+            inside = value.startswith(INSIDE) if key == HREF else not REACHING.search(value.replace("url(#", ""))
+            strange += [] if key in ATTRIBUTES and inside else [key]
         if tag not in ELEMENTS or strange or (tag == "style" and part.text != RULE):
             what = f"<{tag}>" + (f" with {strange[0]}" if strange else "")
             raise ValueError(f"a drawing with what matplotlib does not write: {what}")
     return tostring(root, encoding="unicode")
-
-
-def _is_inside(key: str, value: str) -> bool:
-    """Return whether a value points nowhere but into the drawing."""
-    if key == HREF:
-        return value.startswith(("#", "data:image/png;base64,"))
-    return not REACHING.search(value.replace("url(#", ""))
 
 
 def inline(svg: str, prefix: str, title: str, variables: Mapping[str, str] = VARIABLES) -> str:

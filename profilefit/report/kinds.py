@@ -175,9 +175,8 @@ def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
     light, unit = sums.content["setting"]["illumination"], sums.content["unit"]
     of = {name: sums.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
     known = known_errors(of.values(), numbered=True)
-    constants = [
-        (name if "." in name else f"{name} [{unit}^2]", *_value_and_errors(one, known)) for name, one in of.items()
-    ]
+    titled = {name if "." in name else f"{name} [{unit}^2]": one for name, one in of.items()}
+    constants = [(title, *_value_and_errors(one, known)) for title, one in titled.items()]
     names = ("constant", "regenerated", *(f"± {word}" for word in known.values()))
     note = f"{_meaning(known, OF_SUM)}. --json has those of every number, in both lights. {sums.content['note']}"
     return [
@@ -206,10 +205,8 @@ def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
     if sums.path.stem != "skin" or sums.stack.unit != "mm":
         return {}
     variances, weights = np.array(D_EON.variances), np.transpose(D_EON.weights)
-    return {
-        light: [quality(one, variances, own) for one, own in zip(sums.lights(light), weights, strict=True)]
-        for light in ILLUMINATIONS
-    }
+    of = {light: zip(sums.lights(light), weights, strict=True) for light in ILLUMINATIONS}
+    return {light: [quality(one, variances, own) for one, own in pairs] for light, pairs in of.items()}
 
 
 # Phase functions fitted to a table: the error of each form, and the constants with their errors.
@@ -332,11 +329,6 @@ def _law_sections(paths: Paths, folder: Path) -> Sections:
     return {**{name: partial(str, text) for name, text in filled.items()}, **markdown_sections(folder)}
 
 
-def _phase_parts(content: Content, path: Path) -> Parts:
-    tables = [part for table in phase_tables(content) for part in (table, Text())]
-    return [*tables, *map(Text, premise_lines(content))]
-
-
 TABLES: Mapping[str, KindTables] = {
     "law": KindTables(
         "records",
@@ -354,7 +346,13 @@ TABLES: Mapping[str, KindTables] = {
         "gaussians", lambda _, path: sum_tables(gaussians.load(path)), sections=lambda paths, _: sum_sections(paths)
     ),
     "phase": KindTables(
-        "phases", _phase_parts, lambda _, folder: phase_table(folder), lambda _, folder: phase_sections(folder)
+        "phases",
+        lambda content, _: [
+            *(part for table in phase_tables(content) for part in (table, Text())),
+            *map(Text, premise_lines(content)),
+        ],
+        lambda _, folder: phase_table(folder),
+        lambda _, folder: phase_sections(folder),
     ),
 }
 

@@ -56,12 +56,8 @@ def z_score(constant: Content) -> float | None:
 
 def known_errors(constants: Iterable[Content], numbered: bool = False) -> dict[str, str]:
     """Return those of `ERRORS` that any constant has, or `numbered`, has a number for: exact light has no photons."""
-    every = list(constants)
-    return {
-        key: word
-        for key, word in ERRORS.items()
-        if any(one.get(key) is not None if numbered else key in one for one in every)
-    }
+    known = {key for one in constants for key in one if not numbered or one[key] is not None}
+    return {key: word for key, word in ERRORS.items() if key in known}
 
 
 def measured_sets(content: Content) -> list[str]:

@@ -7,7 +7,7 @@ import runpy
 import shutil
 import subprocess
 import sys
-from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from profilefit.recipes.folder import STACKS
 from profilefit.recipes.kinds import stack
 from profilefit.shader.law_file import export
 from profilefit.shader.stack_text import export_stack
+from tests.site.test_wheel import run
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, FITS = ROOT / "docs", ROOT / "fits"
@@ -42,36 +43,21 @@ def test_every_public_name_has_its_place():
 
 def test_docstrings_become_lists_formulas_and_prose(monkeypatch):
     monkeypatch.syspath_prepend(DOCS / "ext")
-    restructured = importlib.import_module("docstrings").restructured
-    lines = [
-        "A law of |x| and `y*`.",
-        "",
-        "alpha  albedo [-], in",
-        "       [0, 1]",
-        "r, s   radii",
-        "",
-        "Args:",
-        "    n: index [-],",
-        "        > 0",
-        "    g: mean cosine",
-        "",
-        "Returns:",
-        "    A, in",
-        "    [0, 1]",
-        "",
-        "V(z) = z - z^2 ln(1 + 1/z)",
+    parts = [
+        (["A law of |x| and `y*`."], [r"A law of \|x\| and `y*`."]),
+        (
+            ["alpha  albedo [-], in", "       [0, 1]", "r, s   radii"],
+            ["**alpha**", "    albedo [-], in", "    [0, 1]", "**r, s**", "    radii"],
+        ),
+        (
+            ["Args:", "    n: index [-],", "        > 0", "    g: mean cosine"],
+            ["**n**", "    index [-],", "    > 0", "**g**", "    mean cosine"],
+        ),
+        (["Returns:", "    A, in", "    [0, 1]"], ["**Returns**", "    A, in", "    [0, 1]"]),
+        (["V(z) = z - z^2 ln(1 + 1/z)"], ["::", "", "    V(z) = z - z^2 ln(1 + 1/z)", ""]),
     ]
-    assert restructured(lines) == [
-        r"A law of \|x\| and `y*`.",
-        "",
-        *("**alpha**", "    albedo [-], in", "    [0, 1]", "**r, s**", "    radii"),
-        "",
-        *("**n**", "    index [-],", "    > 0", "**g**", "    mean cosine"),
-        "",
-        *("**Returns**", "    A, in", "    [0, 1]"),
-        "",
-        *("::", "", "    V(z) = z - z^2 ln(1 + 1/z)", ""),
-    ]
+    before, after = ([line for part in parts for line in ("", *part[which])][1:] for which in (0, 1))
+    assert importlib.import_module("docstrings").restructured(before) == after
 
 
 # What is to be typed
@@ -161,13 +147,18 @@ def test_the_shader_that_is_printed_compiles(tmp_path, printed, call):
     main = f"in vec2 uv;\nout vec4 colours;\nvoid main() {{ colours = vec4({call}); }}\n"
     path = tmp_path / "scatter.frag"
     path.write_text(f"#version 330\n{law}{(EXAMPLES / f'{printed}.glsl').read_text()}{main}", encoding="utf-8")
-    told = subprocess.run(["glslangValidator", path], capture_output=True, text=True, check=False)
-    assert told.returncode == 0, told.stdout
+    run("glslangValidator", path)
 
 
 def test_the_recipe_that_is_printed_is_one():
     skin = recipe.read(EXAMPLES / "gaussians-skin.toml")
     assert (skin.law, skin.truth, skin.setting.n) == ("gaussians:4", "exact", 1.4)
+
+
+def beside_python(*folders, **names):
+    """The environment with this Python, and what lies in the folders, found first."""
+    path = os.pathsep.join(map(str, (*folders, Path(sys.executable).parent, os.environ["PATH"])))
+    return {**os.environ, "PATH": path, **names}
 
 
 SRUN = """#!/bin/sh
@@ -180,14 +171,9 @@ SRUN = """#!/bin/sh
 def test_the_slurm_script_runs_its_command_on_its_workers(tmp_path):
     (tmp_path / "srun").write_text(SRUN)
     (tmp_path / "srun").chmod(0o755)
-    path = f"{tmp_path}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     command = ["bash", EXAMPLES / "slurm.sh", sys.executable, EXAMPLES / "on_a_cluster.py", "@", "2e6"]
-    environment = {**os.environ, "PATH": path, "SLURM_JOB_ID": "7"}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert re.match(r"A 0\.\d{6} ± 0\.000\d{3} from 2000000 photons", done.stdout)
+    printed = run(*command, cwd=tmp_path, env=beside_python(tmp_path, SLURM_JOB_ID="7"), timeout=240)
+    assert re.match(r"A 0\.\d{6} ± 0\.000\d{3} from 2000000 photons", printed)
     assert len(list((tmp_path / "skin.photons").glob("batch-*.npz"))) == 2
 
 
@@ -198,25 +184,23 @@ def test_the_array_of_shares_is_the_run(tmp_path):
     (tmp_path / "share.py").write_text(text, encoding="utf-8")
 
     def told(task=None):
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        names = {"PATH": path, "SLURM_ARRAY_TASK_ID": str(task), "SLURM_ARRAY_TASK_COUNT": "3"}
+        environment = beside_python(SLURM_ARRAY_TASK_ID=str(task), SLURM_ARRAY_TASK_COUNT="3")
         command = [sys.executable, "share.py"] if task is None else ["bash", EXAMPLES / "array.sh"]
-        run = partial(subprocess.run, command, cwd=tmp_path, env={**os.environ, **names}, timeout=240)
-        return run(capture_output=True, text=True, check=True).stdout
+        return run(*command, cwd=tmp_path, env=environment, timeout=240)
+
+    def times():
+        return {path: path.stat().st_mtime_ns for path in tmp_path.glob("shares.photons/batch-*")}
 
     assert [told(task) for task in (0, 1, 1, 2)] == [f"{n} batches traced\n" for n in (2, 1, 0, 1)]
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("shares.photons/batch-*")}
+    before = times()
     assert "Estimate(value=" in told()
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("shares.photons/batch-*")} == before
+    assert times() == before
     assert len(before) == 4
 
 
 @pytest.mark.slow
 def test_the_cluster_of_two_processes_traces():
-    command = [sys.executable, EXAMPLES / "local_cluster.py"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "Estimate(value=" in done.stdout
+    assert "Estimate(value=" in run(sys.executable, EXAMPLES / "local_cluster.py", timeout=240)
 
 
 @pytest.mark.slow
@@ -227,14 +211,35 @@ def test_the_python_that_is_printed_runs(page):
     exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
 
 
+# The numbered scripts of `examples/`: short, and they run as they stand
+
+SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
+SMOKE = "02_shader_source.py"
+LONGEST = 25  # lines
+
+
+def test_each_is_one_idea():
+    assert len(SCRIPTS) == 5
+    assert {path.name for path in SCRIPTS if len(path.read_text().splitlines()) > LONGEST} == set()
+
+
+@pytest.mark.parametrize(
+    "name", [path.name if path.name == SMOKE else pytest.param(path.name, marks=pytest.mark.slow) for path in SCRIPTS]
+)
+def test_scripts_run_and_say_nothing_but_the_answer(name, tmp_path):
+    line = [sys.executable, ROOT / "examples" / name]
+    done = subprocess.run(line, capture_output=True, text=True, cwd=tmp_path, timeout=250)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("\n") >= 1
+    assert list(tmp_path.iterdir()) == []
+
+
 # The commands
 
 
 def test_make_ends_when_a_worker_dies(tmp_path):
     """As the Makefile runs the tests: the run fails at once and names the test, where it waited for ever."""
-    words = re.search(
-        r"^PYTEST := \$\(PY\) (-m pytest .*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    words = re.search(r"^PYTEST := \$\(PY\) (-m pytest .*)$", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
     (tmp_path / "test_dead.py").write_text("import os\ndef test_lives(): pass\ndef test_dies(): os._exit(9)\n")
     for name in "abc":
         (tmp_path / f"test_{name}.py").write_text("def test_one(): pass\ndef test_two(): pass\n")
@@ -250,19 +255,16 @@ def test_make_ends_when_a_worker_dies(tmp_path):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", DOCS, out]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    run(sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", DOCS, out)
     return out
 
 
 @pytest.mark.slow
 def test_the_site_needs_no_network(site):
     """No script, style, font or picture from elsewhere; links for readers are no part of a page."""
-    for page in site.rglob("*.html"):
-        text = page.read_text(encoding="utf-8")
-        assert not re.search(r"""<(?:script|img|iframe)[^>]+src=["'](?:https?:)?//""", text), page
-        assert not re.search(r"""<link[^>]+rel=["']stylesheet["'][^>]+href=["'](?:https?:)?//""", text), page
+    loads = ("<(?:script|img|iframe)[^>]+src=", """<link[^>]+rel=["']stylesheet["'][^>]+href=""")
+    for page, tag in product(site.rglob("*.html"), loads):
+        assert not re.search(rf"""{tag}["'](?:https?:)?//""", page.read_text(encoding="utf-8")), page
     assert "<math" in (site / "theory/exact.html").read_text(encoding="utf-8")
 
 

@@ -43,21 +43,15 @@ def rows_of(name: str) -> list[list[str]]:
     return [[c.strip() for c in line.strip("|").split("|")] for line in inside.splitlines() if line.startswith("|")]
 
 
-def test_every_table_is_the_records_own():
+def test_every_table_is_the_records_own_and_stands_in_one_place_and_no_other():
     tables = sections(shipped())
     assert set(tables) == set(PLACES) - set(MEASURED)
     for name, table in tables.items():
         assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in text_of(PLACES[name]), f"{name}: run make records"
-
-
-def test_every_table_stands_in_one_place_and_no_other():
-    known = {*sections(shipped()), *markdown_sections(ROOT / "fits")}
+    known = {*tables, *markdown_sections(ROOT / "fits")}
     found = {(name, path) for path in WRITTEN for name in known if f"<!-- {name} -->" in text_of(path)}
     assert found == set(PLACES.items())
-
-
-def test_filling_again_changes_nothing_and_a_stale_table_is_replaced():
-    tables = sections(shipped())
+    # Filling again changes nothing, and a stale table is replaced.
     for path in set(PLACES.values()):
         assert fill(text_of(path), tables) == text_of(path)
     assert fill("<!-- maps -->\nold\n<!-- /maps -->\n", {"maps": "new"}) == "<!-- maps -->\nnew\n<!-- /maps -->\n"

@@ -319,9 +319,8 @@ def test_the_code_has_the_page_s_transform(light, n):
     found = exact.solve(half_space(0.8, n=n), light)
     for k in (0.05, 0.5, 3.0):
         assert found.transform(k) == pytest.approx(transform_of_formula(0.8, k, n, light, 400), rel=2e-8)
-    assert exact.reflectance(0.8, Setting(light, n)) == pytest.approx(
-        transform_of_formula(0.8, 1e-4, n, light, 400), rel=1e-7
-    )
+    whole = transform_of_formula(0.8, 1e-4, n, light, 400)
+    assert exact.reflectance(0.8, Setting(light, n)) == pytest.approx(whole, rel=1e-7)
 
 
 @pytest.mark.slow

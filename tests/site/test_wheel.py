@@ -7,6 +7,7 @@ import sys
 import venv
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,9 +17,9 @@ ROOT = Path(__file__).resolve().parents[2]
 in_an_environment_of_its_own = pytest.mark.timeout(900)
 
 
-def run(*command: str | Path, cwd: Path) -> str:
+def run(*command: str | Path, **options: Any) -> str:
     """The standard output of a command; where it fails, the test fails and shows all it printed."""
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **options)
     assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
@@ -31,19 +32,9 @@ def wheel(tmp_path_factory) -> Path:
     return built
 
 
-@pytest.fixture(scope="module")
-def scripts(wheel, tmp_path_factory) -> Path:
-    """The folder of programs of a new environment with the wheel and its dependencies."""
-    home = tmp_path_factory.mktemp("environment")
-    venv.create(home, with_pip=True)
-    folder = home / ("Scripts" if os.name == "nt" else "bin")
-    pip = (folder / "python", "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check")
-    run(*pip, "install", wheel, cwd=home)
-    return folder
-
-
 @pytest.mark.slow
-def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
+def test_wheel_holds_the_packages_every_recipe_and_record_and_every_text_that_the_packages_read(wheel):
+    """Shaders, pages, scenes: whatever lies beside the modules."""
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name.split("/")[0] for name in names} == {"mcml_sim", "profilefit", "profilefit-0.1.0.dist-info"}
 
@@ -51,6 +42,11 @@ def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
     assert any(name.endswith(".json") for name in fits)
     assert {f"profilefit/fits/{name}" for name in fits} <= names
     assert {f"profilefit/examples/{path.name}" for path in (ROOT / "examples").iterdir()} <= names
+
+    found = [path for package in ("mcml_sim", "profilefit") for path in (ROOT / package).rglob("*.*")]
+    texts = {path.relative_to(ROOT).as_posix() for path in found if path.suffix != ".pyc" and path.is_file()}
+    assert {Path(name).suffix for name in texts} >= {".glsl", ".frag", ".css", ".js", ".html", ".json"}
+    assert texts <= names
 
 
 @pytest.mark.slow
@@ -72,18 +68,10 @@ def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
 
 @pytest.mark.slow
 @in_an_environment_of_its_own
-def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
+def test_installed_law_evaluates_away_from_the_checkout(wheel, tmp_path):
+    """In a new environment with the wheel and its dependencies."""
+    venv.create(tmp_path / "environment", with_pip=True)
+    python = tmp_path / "environment" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    run(python, "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check", "install", wheel, cwd=tmp_path)
     code = "import profilefit; law = profilefit.load('liang'); print(law.profile(0.5, 0.9))"
-    value = float(run(scripts / "python", "-I", "-c", code, cwd=tmp_path))
-    assert math.isfinite(value)
-    assert value > 0
-
-
-@pytest.mark.slow
-def test_wheel_holds_every_text_that_the_packages_read(wheel):
-    """Shaders, pages, scenes: whatever lies beside the modules."""
-    names = set(zipfile.ZipFile(wheel).namelist())
-    found = [path for package in ("mcml_sim", "profilefit") for path in (ROOT / package).rglob("*.*")]
-    texts = {path.relative_to(ROOT).as_posix() for path in found if path.suffix != ".pyc" and path.is_file()}
-    assert {Path(name).suffix for name in texts} >= {".glsl", ".frag", ".css", ".js", ".html", ".json"}
-    assert texts <= names
+    assert 0 < float(run(python, "-I", "-c", code, cwd=tmp_path)) < math.inf

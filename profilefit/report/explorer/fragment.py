@@ -18,8 +18,7 @@ import base64
 import io
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache
-from importlib.resources import files
+from functools import lru_cache, partial
 from string import Template
 
 import numpy as np
@@ -38,7 +37,9 @@ from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, 
 from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
+from profilefit.shader.emit import text_beside
 
+_asset = partial(text_beside, __name__)
 # In this order: each file uses only what comes before it, but for what runs later.
 SCRIPTS = ("exact", "laws", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")
 LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the ends of its slider
@@ -106,10 +107,6 @@ def _data(folder: Folder) -> str:
         "shaders": shaders | {name: sphere + shaders[name] for name in ("ball", "show")},  # behind a law's text
     }
     return json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-
-
-def _asset(name: str) -> str:
-    return files("profilefit.report.explorer").joinpath(name).read_text(encoding="utf-8")
 
 
 LIGHTS = ("searchlight", "diffuse")

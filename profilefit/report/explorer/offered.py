@@ -51,9 +51,13 @@ def offered(folder: Folder) -> list[Offered]:
     records, laws = Records.of(folder), []
     for named in sorted(profile_laws(records), key=lambda one: RANK.get(one.name.partition(":")[0], len(RANK))):
         if named.law.entry.has_text:
+            label = title = named.law.entry.title
+            if not named.records:
+                label += f", {named.constants}" if named.constants else ""
+            elif named.records[0].replace("-diffuse", "") != title:
+                label += f": {named.records[0]}"
             text, refracting = export(named, records, "glsl-es", PREFIX), _refracting(named, records)
-            label, light = _label(named), named.setting.illumination
-            laws.append(Offered(address(named), named.name, light, label, text, refracting))
+            laws.append(Offered(address(named), named.name, named.setting.illumination, label, text, refracting))
     return laws
 
 
@@ -79,10 +83,3 @@ def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
     pieces = [re.split(WORDS, text) for text in texts]
     places = [at for at, words in enumerate(zip(*pieces, strict=True)) if len(set(words)) > 1]
     return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])
-
-
-def _label(named: LoadedLaw) -> str:
-    title = named.law.entry.title
-    if not named.records:
-        return f"{title}, {named.constants}" if named.constants else title
-    return title if named.records[0].replace("-diffuse", "") == title else f"{title}: {named.records[0]}"

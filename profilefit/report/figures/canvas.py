@@ -124,14 +124,11 @@ def plain_log(axis: Axis) -> None:
 
 def albedo_axis(ax: Axes) -> None:
     """Stretch x evenly in sqrt(1 - alpha), alpha [-] from 0 to 1: the end near 1 is where laws differ."""
-
-    def forward(alpha: Any) -> Any:
-        return 1.0 - np.sqrt(np.clip(1.0 - np.asarray(alpha), 0.0, None))
-
-    def inverse(x: Any) -> Any:
-        return 1.0 - np.clip(1.0 - np.asarray(x), 0.0, None) ** 2
-
-    ax.set_xscale("function", functions=(forward, inverse))
+    forward_and_back = (
+        lambda alpha: 1.0 - np.sqrt(np.clip(1.0 - np.asarray(alpha), 0.0, None)),
+        lambda x: 1.0 - np.clip(1.0 - np.asarray(x), 0.0, None) ** 2,
+    )
+    ax.set_xscale("function", functions=forward_and_back)
     ax.set_xlim(0.0, 1.0)
     ax.set_xticks([0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.99, 1], ["0", ".2", ".4", ".6", ".8", ".9", ".95", ".99", "1"])
     ax.set_xlabel("single-scattering albedo α [-], even in √(1 − α)")

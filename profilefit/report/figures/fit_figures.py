@@ -12,19 +12,8 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from profilefit.measured.model import unit_of
 from profilefit.measured.photo.workflow import Photo
 from profilefit.measured.result import MediumPosterior
-from profilefit.report.figures.canvas import (
-    BLACK,
-    BLUE,
-    DATA,
-    GREEN,
-    GREY,
-    VERMILION,
-    WHOLE,
-    canvas,
-    legend_below,
-    save,
-    styled,
-)
+from profilefit.report.figures import canvas as pen
+from profilefit.report.figures.canvas import canvas, legend_below, save, styled
 from profilefit.report.figures.record_figures import corner_grid, mark
 
 BINS = 24
@@ -45,22 +34,22 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
     line = np.geomspace(r[0] / ENDS, r[-1] * ENDS, CURVE)
     inner, outer = (line * 0.999, line * 1.001) if data.rings else (line, line)
     light = fit.problem.model.linearised(fit.point, inner, outer)[0][:-1]
-    top.plot(line, light, label="fitted law", **WHOLE)
+    top.plot(line, light, label="fitted law", **pen.WHOLE)
     seen = data.value > 0
     top.errorbar(
         r[seen], data.value[seen], yerr=fit.sigma[seen], xerr=half[seen] if data.rings else None,
-        label="data, one standard error" + (", width of the annulus" if data.rings else ""), **DATA,
+        label="data, one standard error" + (", width of the annulus" if data.rings else ""), **pen.DATA,
     )  # fmt: skip
     top.set(xscale="log", yscale="log", ylabel=f"reflected light per area [1/{unit}²]")
     residual = (data.value - fit.light) / fit.sigma
-    below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
-    below.axhspan(-1, 1, color=GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
-    below.axhline(0.0, color=BLUE, linewidth=1.0)
-    below.plot(r, residual, color=BLACK, marker="o", markersize=3.0, linewidth=0.6)
+    below.axhspan(-2, 2, color=pen.GREY, alpha=0.12, linewidth=0)
+    below.axhspan(-1, 1, color=pen.GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
+    below.axhline(0.0, color=pen.BLUE, linewidth=1.0)
+    below.plot(r, residual, color=pen.BLACK, marker="o", markersize=3.0, linewidth=0.6)
     if fit.rel is not None and result.identifiability is not None:
         band = fit.law_size / fit.sigma
-        below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="model error")
-        below.plot(r, -band, color=VERMILION, linestyle="--", linewidth=0.9)
+        below.plot(r, band, color=pen.VERMILION, linestyle="--", linewidth=0.9, label="model error")
+        below.plot(r, -band, color=pen.VERMILION, linestyle="--", linewidth=0.9)
     span = max(3.0, 1.15 * float(np.max(np.abs(residual))))
     below.set(xlabel=f"r [{unit}]", ylabel="(data − law) / σ [-]", ylim=(-span, span))
     legend_below(figure, [top, below])
@@ -95,7 +84,7 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
                 ax.set_xticklabels([])
     for at, one in enumerate(names):
         if (best := result.value(one)) is not None:
-            mark(grid, at, best, color=BLACK)
+            mark(grid, at, best, color=pen.BLACK)
         unit = unit_of(one, result.fit.data.unit)
         label = f"{SYMBOLS.get(one, one)} [{unit or '-'}]"
         grid[size - 1, at].set_xlabel(label)
@@ -108,7 +97,7 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
     return save(figure, out, name)
 
 
-COLOURS = {"red": VERMILION, "green": GREEN, "blue": BLUE, "grey": GREY}
+COLOURS = {"red": pen.VERMILION, "green": pen.GREEN, "blue": pen.BLUE, "grey": pen.GREY}
 SPOT, RINGS = "photo-spot", "photo-rings"  # their files
 DECADES = 5  # of light that a picture shows
 SHOWN = 800  # pixels of a picture's longer side
@@ -127,7 +116,7 @@ def spot_figure(photo: Photo, out: Path, name: str = SPOT) -> list[Path]:
     most = float(np.nanmax(light))
     shown = np.log10(np.clip(np.where(np.isfinite(light), light, np.nan) / most, 10.0**-DECADES, 1.0))
     columns, rows = photo.shot.sides
-    shades = matplotlib.colormaps["magma"].with_extremes(bad=VERMILION)
+    shades = matplotlib.colormaps["magma"].with_extremes(bad=pen.VERMILION)
     image = axes.imshow(shown, cmap=shades, extent=(0, columns, rows, 0), vmin=-DECADES, vmax=0.0)
     pixel = photo.plate.pixel(centre)
     for edge in photo.fits[colour].shot.medium.outer[::EVERY]:
@@ -149,14 +138,13 @@ def rings_figure(photo: Photo, out: Path, name: str = RINGS) -> list[Path]:
         light, rows = (one[0][: rings.value.size] for one in (fit.shot.rows(fit.x), fit.shot.residuals(fit.x)))
         error = np.sqrt(np.diag(rings.covariance))
         seen = rings.value > 0
-        top.errorbar(
-            rings.r[seen], rings.value[seen], yerr=error[seen], label=f"{colour}: rings", **{**DATA, "color": shade}
-        )
-        top.plot(rings.r, light, label=f"{colour}: fit", **{**WHOLE, "color": shade})
+        style = {**pen.DATA, "color": shade}
+        top.errorbar(rings.r[seen], rings.value[seen], yerr=error[seen], label=f"{colour}: rings", **style)
+        top.plot(rings.r, light, label=f"{colour}: fit", **{**pen.WHOLE, "color": shade})
         below.plot(rings.r, rows, marker="o", markersize=2.6, linewidth=0.6, color=shade)
     unit = "counts" if photo.shot.seconds is None else "counts a second"
     top.set(xscale="log", yscale="log", ylabel=f"light [{unit}]")
-    below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
+    below.axhspan(-2, 2, color=pen.GREY, alpha=0.12, linewidth=0)
     below.set(xlabel="r [mm]", ylabel="residual, whitened [σ]")
     legend_below(figure, [top, below])
     return save(figure, out, name)

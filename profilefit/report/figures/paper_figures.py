@@ -19,41 +19,10 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.targets import albedo_values
-from profilefit.report.figures.canvas import (
-    AS_PUBLISHED,
-    BLACK,
-    BLUE,
-    CORRECTED,
-    DATA,
-    GREEN,
-    GREY,
-    ORANGE,
-    PUBLISHED,
-    PURPLE,
-    VERMILION,
-    WHOLE,
-    DrawnLaw,
-    albedo_axis,
-    band_under,
-    canvas,
-    draw_curves,
-    legend_below,
-    plain_log,
-    save,
-    styled,
-)
-from profilefit.report.records import (
-    TOTAL,
-    Content,
-    Fitted,
-    Source,
-    coefficients,
-    converged,
-    exact_profile,
-    total_error,
-    unscaled,
-    z_score,
-)
+from profilefit.report import records
+from profilefit.report.figures import canvas as pen
+from profilefit.report.figures.canvas import albedo_axis, canvas, draw_curves, legend_below, plain_log, save, styled
+from profilefit.report.records import TOTAL, Content, Fitted, Source, coefficients, converged, total_error, z_score
 
 Points = tuple[Floats, ...]
 PANELS = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)  # of a record's albedos, in order: more of them near alpha = 1
@@ -62,17 +31,20 @@ NEAREST = 0.01  # [mfp], as in quality.NEAREST
 ENERGY_WITHIN = 0.995  # as in quality.ENERGY_WITHIN: where `rel` stops looking
 PHOTONS = "photons, ± 1 standard error"
 TRUTH_BAND = "95 % of photon noise and model discrepancy together"
-PRINTED_LAWS = {"published": ("(7) as printed", PUBLISHED), "corrected": ("(7) as printed but b0 = 0.0641", CORRECTED)}
+PRINTED_LAWS = {
+    "published": ("(7) as printed", pen.PUBLISHED),
+    "corrected": ("(7) as printed but b0 = 0.0641", pen.CORRECTED),
+}
 RECORDED_LAWS = {
-    "liang-as-published": ("(7) regenerated, the paper's protocol", AS_PUBLISHED),
-    "liang-whole": ("(7) regenerated, whole profile", WHOLE),
+    "liang-as-published": ("(7) regenerated, the paper's protocol", pen.AS_PUBLISHED),
+    "liang-whole": ("(7) regenerated, whole profile", pen.WHOLE),
 }
 
 
-def _recorded(source: Source, looks: dict[str, tuple[str, Any]]) -> dict[str, DrawnLaw]:
+def _recorded(source: Source, looks: dict[str, tuple[str, Any]]) -> dict[str, pen.DrawnLaw]:
     """Return the laws of records that converged, with their labels and looks, by the record's name."""
     usable = {name: source.usable(name) for name in looks}
-    return {name: DrawnLaw(looks[name][0], one.law, looks[name][1], one) for name, one in usable.items() if one}
+    return {name: pen.DrawnLaw(looks[name][0], one.law, looks[name][1], one) for name, one in usable.items() if one}
 
 
 @styled
@@ -94,7 +66,7 @@ def _by_albedo(
     axes = list(figure.subplots(2, 3, sharey=panel is _error_panel).flat)
     setting = data.law.setting
     laws = {
-        which: DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
+        which: pen.DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
         for which, (label, look) in PRINTED_LAWS.items()
     } | _recorded(source, RECORDED_LAWS)
     for ax, share in zip(axes, PANELS, strict=True):
@@ -107,23 +79,23 @@ def _by_albedo(
     return save(figure, out, name)
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
+def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
     radii = {name: radius for name, radius in radii.items() if radius > 0}  # a > 0 has none
     end = 1.25 * max(cut, *radii.values())
-    r_exact, profile = exact_profile(alpha, data.law.setting, NEAREST, end)
+    r_exact, profile = records.exact_profile(alpha, data.law.setting, NEAREST, end)
     source_limit = alpha / (4 * np.pi)
     r = np.linspace(0.0, end, 600)
-    draw_curves(ax, r, laws.values(), lambda law: np.maximum(unscaled(law, r, alpha), 1e-12))
-    ax.plot(r_exact, r_exact * profile, color=BLACK, linewidth=0.9, label="exact", zorder=3)
+    draw_curves(ax, r, laws.values(), lambda law: np.maximum(records.unscaled(law, r, alpha), 1e-12))
+    ax.plot(r_exact, r_exact * profile, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
     _rings(ax, data, row, end)
     at_foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for name, radius in radii.items():
         ax.plot([radius], [0.0], marker="v", color=laws[name].style["color"], linestyle="none", **at_foot)
-    ax.axvline(cut, color=GREY, linestyle=":", linewidth=1.2, label="r'$_{max}$: where (6) trims")
-    ax.plot([], [], marker="v", linestyle="none", color=GREY, label="r$_{max}$ = −b/a: where (7) ends")
+    ax.axvline(cut, color=pen.GREY, linestyle=":", linewidth=1.2, label="r'$_{max}$: where (6) trims")
+    ax.plot([], [], marker="v", linestyle="none", color=pen.GREY, label="r$_{max}$ = −b/a: where (7) ends")
     ax.set(yscale="log", xlim=(0.0, end), ylim=(source_limit * 2e-4, source_limit * 15))
     ax.set_title(f"α = {alpha:.3f}")
 
@@ -136,19 +108,19 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     index = np.unique(np.searchsorted(r, places).clip(max=r.size - 1))
     index = index[energy[row][index] > 0]
     to_profile = 1.0 / (2 * np.pi * np.diff(edges))[index]  # E = 2 pi r R_d dr
-    ax.errorbar(r[index], energy[row][index] * to_profile, error[row][index] * to_profile, label=PHOTONS, **DATA)
+    ax.errorbar(r[index], energy[row][index] * to_profile, error[row][index] * to_profile, label=PHOTONS, **pen.DATA)
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) -> None:
+def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
-    r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
+    r, truth = records.exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
     for one in laws.values():
         if one.fitted is not None:  # and states in which band the exact profile lies, which old records do not
             known = discrepancy.LawWithErrors.of_record(one.law, one.fitted.content, one.fitted.arrays)
             if known.discrepancy is not None:
                 low, high = discrepancy.profile(known, r, alpha).interval()
-                band_under(ax, r, (low / truth - 1.0, high / truth - 1.0), one.style["color"], TRUTH_BAND)
+                pen.band_under(ax, r, (low / truth - 1.0, high / truth - 1.0), one.style["color"], TRUTH_BAND)
         ax.plot(r, one.law.profile(r, alpha) / truth - 1.0, label=one.label, **one.style)
     edges = data.arrays["r_edges"]
     expected = np.diff(exact.cdf(edges, alpha, setting=setting)) * exact.reflectance(alpha, setting=setting)
@@ -156,9 +128,9 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, DrawnLaw]) ->
     middle = np.sqrt(np.maximum(edges[1:], NEAREST / 10) * np.maximum(edges[:-1], NEAREST / 10))
     shown = (energy > 0) & (edges[1:] < r[-1]) & (edges[:-1] > 0)
     ratio = energy / np.maximum(expected, 1e-300)
-    ax.errorbar(middle[shown], ratio[shown] - 1, error[shown] / expected[shown], label=PHOTONS, **DATA)
-    ax.axhline(0.0, color=BLACK, linewidth=0.8)
-    ax.axvspan(float(outer), r[-1], color=GREY, alpha=0.15, linewidth=0, label="the last 0.5 % of the energy")
+    ax.errorbar(middle[shown], ratio[shown] - 1, error[shown] / expected[shown], label=PHOTONS, **pen.DATA)
+    ax.axhline(0.0, color=pen.BLACK, linewidth=0.8)
+    ax.axvspan(float(outer), r[-1], color=pen.GREY, alpha=0.15, linewidth=0, label="the last 0.5 % of the energy")
     ax.set(xscale="log", xlim=(NEAREST, r[-1]), ylim=(-1.05, 1.05), title=f"α = {alpha:.3f}")
 
 
@@ -167,10 +139,11 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     """Draw alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
     data = source.needed("albedo-liang")
     setting = data.law.setting
-    curves = [DrawnLaw("(8) as printed", catalogue.albedo_law("liang", "published", setting, source.folder), PUBLISHED)]
+    printed = catalogue.albedo_law("liang", "published", setting, source.folder)
+    curves = [pen.DrawnLaw("(8) as printed", printed, pen.PUBLISHED)]
     if data.converged:
-        curves.append(DrawnLaw("(8) regenerated", data.law, WHOLE, data))
-    rational = ("rational in √(1 − α)", {"color": GREEN, "linestyle": "-."})
+        curves.append(pen.DrawnLaw("(8) regenerated", data.law, pen.WHOLE, data))
+    rational = ("rational in √(1 − α)", {"color": pen.GREEN, "linestyle": "-."})
     curves += _recorded(source, {"albedo-rational": rational}).values()
     figure = canvas(6.4)
     panels = figure.subplot_mosaic([["map", "error"], ["fold", "ratio"]])
@@ -182,9 +155,9 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     points = fitted, data.arrays["reflectance"], data.arrays["reflectance_error"]
     even = np.linspace(0.0, 1.0, 1001)
     for ax in (panels["map"], panels["fold"]):
-        ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
+        ax.plot(*exact_map, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
         draw_curves(ax, even, curves, lambda law: law.alpha(even))
-        ax.errorbar(points[1], points[0], xerr=points[2], label=PHOTONS, **DATA)
+        ax.errorbar(points[1], points[0], xerr=points[2], label=PHOTONS, **pen.DATA)
         ax.set_ylabel("single-scattering albedo α [-]")
     panels["map"].set(xlim=(0, 1), ylim=(0, 1.02), title="the whole map")
     panels["fold"].set(xlim=(0.7, 1.0), ylim=(0.97, 1.002), title="its end, enlarged")
@@ -196,7 +169,7 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     return save(figure, out, name)
 
 
-def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw], exact_map: Points) -> None:
+def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[pen.DrawnLaw], exact_map: Points) -> None:
     reflectance, alpha = exact_map
     s = np.sqrt(1.0 - alpha)
     draw_curves(error, reflectance, curves, lambda law: law.alpha(reflectance) - alpha)
@@ -206,16 +179,16 @@ def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[DrawnLaw]
         ratio.plot(reflectance[inside], np.sqrt(1.0 - mapped[inside]) / s[inside], label=one.label, **one.style)
     true_alpha, measured, sigma = points
     slope = np.interp(measured, reflectance, np.gradient(alpha, reflectance))
-    error.errorbar(measured, true_alpha - np.interp(measured, reflectance, alpha), sigma * slope, **DATA)
+    error.errorbar(measured, true_alpha - np.interp(measured, reflectance, alpha), sigma * slope, **pen.DATA)
     for ax, level in ((error, 0.0), (ratio, 1.0)):
-        ax.axhline(level, color=BLACK, linewidth=0.8)
+        ax.axhline(level, color=pen.BLACK, linewidth=0.8)
     error.set(xlim=(0, 1), ylabel="α less exact α [-]", title="error in α")
     ratio.set(xlim=(0.5, 1), ylim=(0.4, 100), yscale="log", title="error in √(1 − α), the root of the absorbed share")
     ratio.set_ylabel("√(1 − α) over exact √(1 − α) [-]")
     plain_log(ratio.yaxis)
 
 
-def _folds(panels: dict[str, Axes], curves: list[DrawnLaw]) -> None:
+def _folds(panels: dict[str, Axes], curves: list[pen.DrawnLaw]) -> None:
     """Mark where a map falls again, so that two reflectances share one albedo."""
     for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)
@@ -230,10 +203,10 @@ def _folds(panels: dict[str, Axes], curves: list[DrawnLaw]) -> None:
 
 EQUATION = {"a": "(11)", "b": "(13)", "c": "(15)"}
 UNIT = {"a": "1/mfp", "b": "-", "c": "mfp"}
-STAGED = {"color": PURPLE, "linestyle": (0, (1, 1.2))}
+STAGED = {"color": pen.PURPLE, "linestyle": (0, (1, 1.2))}
 OF_COEFFICIENTS = {
-    "liang-as-published": ("regenerated, the paper's protocol, jointly", AS_PUBLISHED),
-    "liang-whole": ("regenerated, whole profile", WHOLE),
+    "liang-as-published": ("regenerated, the paper's protocol, jointly", pen.AS_PUBLISHED),
+    "liang-whole": ("regenerated, whole profile", pen.WHOLE),
 }
 RATIOS = (0.6, 1.4)  # shown of law over fitted point [-]
 
@@ -254,7 +227,7 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
 
         draw_curves(top, alpha, lines, value)
         points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
-        top.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
+        top.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **pen.DATA)
         _ratios(bottom, column, lines, data)
         for ax in (top, bottom):
             ax.set_xlim(low, high + 0.02 * (high - low))
@@ -275,26 +248,26 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
         plain_log(axes[0, 1].yaxis)
     if letter == "a":
         for ax in axes[0]:
-            ax.axhline(0.0, color=GREY, linestyle=":", label="a = 0: from here on (7) has no r$_{max}$")
+            ax.axhline(0.0, color=pen.GREY, linestyle=":", label="a = 0: from here on (7) has no r$_{max}$")
     legend_below(figure, list(axes.flat))
     return save(figure, out, name or f"liang-{EQUATION[letter][1:-1]}-{letter}")
 
 
-def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[DrawnLaw]:
+def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[pen.DrawnLaw]:
     equation = EQUATION[letter]
     printed, corrected = (source.printed("liang", which, data.law.setting) for which in ("published", "corrected"))
-    lines = [DrawnLaw(f"{equation} as printed", printed, PUBLISHED)]
+    lines = [pen.DrawnLaw(f"{equation} as printed", printed, pen.PUBLISHED)]
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
         label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
-        lines.append(DrawnLaw(label, corrected, CORRECTED))
+        lines.append(pen.DrawnLaw(label, corrected, pen.CORRECTED))
     stage = data.content["stages"]["coefficient_laws"][letter]
     staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
     failed = "" if stage["result"] == "converged" else " (did not converge)"
-    lines.append(DrawnLaw(f"{equation} through the points{failed}", staged, STAGED))
+    lines.append(pen.DrawnLaw(f"{equation} through the points{failed}", staged, STAGED))
     return [*lines, *_recorded(source, OF_COEFFICIENTS).values()]
 
 
-def _ratios(ax: Axes, column: int, lines: list[DrawnLaw], data: Fitted) -> None:
+def _ratios(ax: Axes, column: int, lines: list[pen.DrawnLaw], data: Fitted) -> None:
     alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
     for label, law, style, _ in lines:
         ratio = coefficients(law, alpha)[column] / points
@@ -303,8 +276,8 @@ def _ratios(ax: Axes, column: int, lines: list[DrawnLaw], data: Fitted) -> None:
             note = f"{label}: {ratio.min():.1f} to {ratio.max():.1f} times"
             ax.text(0.5, 0.95, note, color=style["color"], transform=ax.transAxes, ha="center", va="top", fontsize=8)
     sigma = np.abs(data.arrays["coefficient_errors"][:, column] / points)
-    ax.errorbar(alpha, np.ones_like(alpha), sigma, **DATA)
-    ax.axhline(1.0, color=BLACK, linewidth=0.8)
+    ax.errorbar(alpha, np.ones_like(alpha), sigma, **pen.DATA)
+    ax.axhline(1.0, color=pen.BLACK, linewidth=0.8)
     ax.set_ylim(*RATIOS)
 
 
@@ -322,23 +295,24 @@ def constants_figure(source: Source, out: Path, name: str = "constants") -> list
     for place, (_, one) in enumerate(rows):
         scale, z = abs(one["regenerated"]), z_score(one)
         far = z is not None and abs(z) > FAR
-        ax.errorbar(0.0, place, xerr=(total_error(one) or 0.0) / scale, color=GREY, elinewidth=3.5, alpha=0.6)
+        ax.errorbar(0.0, place, xerr=(total_error(one) or 0.0) / scale, color=pen.GREY, elinewidth=3.5, alpha=0.6)
         ax.plot(
             (one["published"] - one["regenerated"]) / scale, place, linestyle="none", markersize=4.5,
-            marker="D" if far else "o", color=VERMILION if far else BLUE,
+            marker="D" if far else "o", color=pen.VERMILION if far else pen.BLUE,
         )  # fmt: skip
         text = "held" if not one.get("free", True) else "–" if z is None else f"{z:+.1f}".replace("-", "−")
         ax.annotate(text, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.0)
-    ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    ax.axvline(0.0, color=pen.BLACK, linewidth=0.8)
     ax.set_xscale("symlog", linthresh=LINEAR)
     ax.set_xticks(TICKS, [f"{tick:+g}".replace("-", "−") if tick else "0" for tick in TICKS])
     ax.set_yticks(range(len(rows)), [label for label, _ in rows], fontsize=7.0)
     ax.set(ylim=(len(rows) - 0.4, -0.6), xlabel="(published − regenerated) / |regenerated| [-], linear within ±0.1")
     ax.annotate("z", (1.01, -0.9), xycoords=("axes fraction", "data"), va="bottom", annotation_clip=False)
+    within = f"published, within {FAR:g} standard errors"
     handles = [
-        Line2D([], [], color=BLUE, marker="o", linestyle="none", label=f"published, within {FAR:g} standard errors"),
-        Line2D([], [], color=VERMILION, marker="D", linestyle="none", label="published, farther"),
-        Line2D([], [], color=GREY, linewidth=3.5, alpha=0.6, label=f"± {TOTAL}"),
+        Line2D([], [], color=pen.BLUE, marker="o", linestyle="none", label=within),
+        Line2D([], [], color=pen.VERMILION, marker="D", linestyle="none", label="published, farther"),
+        Line2D([], [], color=pen.GREY, linewidth=3.5, alpha=0.6, label=f"± {TOTAL}"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return save(figure, out, name)
@@ -364,11 +338,11 @@ def _printed_constants(source: Source) -> list[tuple[str, Content]]:
 
 LAST_SHARE = 0.999  # as pipelines.inversion_error
 OF_INVERSES = {
-    "liang-inverse-as-published": ("(19) by the paper's protocol", AS_PUBLISHED),
-    "liang-inverse-whole": ("(19) regenerated, in shares of energy", WHOLE),
+    "liang-inverse-as-published": ("(19) by the paper's protocol", pen.AS_PUBLISHED),
+    "liang-inverse-whole": ("(19) regenerated, in shares of energy", pen.WHOLE),
 }
 DOUBTED = (0.4, 0.6)  # where the paper's authors find their inverse weakest
-DOUBTED_BAND: Any = {"color": BLACK, "alpha": 0.07, "linewidth": 0, "label": "α that the paper calls worst"}
+DOUBTED_BAND: Any = {"color": pen.BLACK, "alpha": 0.07, "linewidth": 0, "label": "α that the paper calls worst"}
 
 
 @styled
@@ -390,11 +364,10 @@ def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") ->
             continue
         content = source.content(record)
         quality = content["quality"]
-        alpha = quality["alpha"]
-        if record == "liang-inverse-whole":
-            wide.plot(alpha, quality["published"]["inversion_error"], label="(19) as printed", marker=".", **PUBLISHED)
+        if record == "liang-inverse-whole" and (printed := _printed_inversion(source, record)):
+            wide.plot(*printed, label="(19) as printed", marker=".", **pen.PUBLISHED)
         if converged(content):
-            wide.plot(alpha, quality["regenerated"]["inversion_error"], label=label, marker=".", **style)
+            wide.plot(quality["alpha"], quality["regenerated"]["inversion_error"], label=label, marker=".", **style)
         else:
             wide.plot([], [], label=f"{label}: the fit failed", **style)
     wide.axvspan(*DOUBTED, **DOUBTED_BAND)
@@ -410,19 +383,19 @@ def _inverse_panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     xi = np.concatenate([np.geomspace(1e-3, 0.05, 60), np.linspace(0.05, LAST_SHARE, 240)[1:]])
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
-    ax.plot(share, r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = DrawnLaw("(19) as printed", source.printed("liang", "published", setting), PUBLISHED)
+    ax.plot(share, r, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
+    printed = pen.DrawnLaw("(19) as printed", source.printed("liang", "published", setting), pen.PUBLISHED)
     curves = [printed, *_recorded(source, OF_INVERSES).values()]
     # |g(xi)| of (19), before the clip (21) at r_max
     draw_curves(ax, xi, curves, lambda law: np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9))
     if (whole := source.usable("liang-whole")) is not None:
         label = "r$_{max}$ where (21) clips, whole profile"
-        ax.axhline(float(whole.law.largest_radius(alpha)), color=GREY, linestyle=":", linewidth=1.2, label=label)
+        ax.axhline(float(whole.law.largest_radius(alpha)), color=pen.GREY, linestyle=":", linewidth=1.2, label=label)
     # The tallied cdf at some ring edges, with the standard error of its sum.
     energy, error = data.arrays["energy"][row], data.arrays["energy_error"][row]
     total = energy.sum() + data.arrays["beyond"][row]
     tallied, sigma = (np.cumsum(energy) / total)[::6], (np.sqrt(np.cumsum(error**2)) / total)[::6]
-    ax.errorbar(tallied, data.arrays["r_edges"][1::6], xerr=sigma, label=PHOTONS, **DATA)
+    ax.errorbar(tallied, data.arrays["r_edges"][1::6], xerr=sigma, label=PHOTONS, **pen.DATA)
     ax.set(yscale="log", xlim=(0.0, 1.0), title=f"α = {alpha:.3f}")
     ax.set_ylim(0.3 * np.interp(0.02, share, r), 3.0 * np.interp(LAST_SHARE, share, r))
 
@@ -434,9 +407,9 @@ RECORDS = {
 }
 # Of each form: never distinguished by colour alone.
 LOOKS: dict[str, tuple[str, Any]] = {
-    "liang": ("(19)-(21) regenerated", {"color": ORANGE, "marker": "s", "linestyle": "-"}),
-    "quantile": ("rational in −ln(1 − ξ)", {"color": BLUE, "marker": "o", "linestyle": "-"}),
-    "hazard": ("escape hazard, its cdf inverted in one step", {"color": PURPLE, "marker": "^", "linestyle": "-."}),
+    "liang": ("(19)-(21) regenerated", {"color": pen.ORANGE, "marker": "s", "linestyle": "-"}),
+    "quantile": ("rational in −ln(1 − ξ)", {"color": pen.BLUE, "marker": "o", "linestyle": "-"}),
+    "hazard": ("escape hazard, its cdf inverted in one step", {"color": pen.PURPLE, "marker": "^", "linestyle": "-."}),
 }
 REQUIRED = 1e-3
 
@@ -446,10 +419,10 @@ def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -
     """Draw max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
     figure = canvas(4.6)
     axes = list(figure.subplots(1, 2, sharey=True))
-    for ax, (light, records) in zip(axes, RECORDS.items(), strict=True):
-        for record in records:
+    for ax, (light, names) in zip(axes, RECORDS.items(), strict=True):
+        for record in names:
             draw_inversion(ax, source, record)
-        ax.axhline(REQUIRED, color=BLACK, linewidth=0.8, linestyle=":", label="one in a thousand")
+        ax.axhline(REQUIRED, color=pen.BLACK, linewidth=0.8, linestyle=":", label="one in a thousand")
         albedo_axis(ax)
         ax.set(yscale="log", title=light)
         plain_log(ax.yaxis)
@@ -467,7 +440,7 @@ def draw_inversion(ax: Axes, source: Source, record: str) -> None:
     if fitted is None:
         return
     if printed := _printed_inversion(source, record):
-        ax.plot(*printed, label="(19)-(21) as printed", marker="x", markersize=3.5, **PUBLISHED)
+        ax.plot(*printed, label="(19)-(21) as printed", marker="x", markersize=3.5, **pen.PUBLISHED)
     label, look = LOOKS[fitted.content["law"]]
     ax.plot(*inversion_points(fitted), label=label, markersize=3.5, **look)
 
@@ -501,6 +474,5 @@ def inversion_caption(source: Source) -> str:
             worst = np.argmax(np.where(where, error, -np.inf))
             said.append(f"{error[worst]:.2g} at α = {alpha[worst]:.2g}")
     doubted = f"up to {error[inside].max():.2g}" if np.any(inside) else "nothing was measured"
-    return (
-        f"(19)-(21) as printed: {doubted} for α in [{low:g}, {high:g}], which the paper calls worst; {', '.join(said)}"
-    )
+    printed_as = f"(19)-(21) as printed: {doubted} for α in [{low:g}, {high:g}]"
+    return f"{printed_as}, which the paper calls worst; {', '.join(said)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import methodcaller
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -33,32 +34,9 @@ from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.targets import albedo_values
 from profilefit.recipes.workers import Workers
-from profilefit.report.figures.canvas import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    albedo_axis,
-    canvas,
-    legend_below,
-    plain_log,
-    save,
-    styled,
-)
-from profilefit.report.figures.paper_figures import (
-    albedo_figure,
-    coefficient_figure,
-    constants_figure,
-    error_figure,
-    has_printed,
-    inverse_figure,
-    inversion_figure,
-    profile_figure,
-)
+from profilefit.report.figures import canvas as pen
+from profilefit.report.figures import paper_figures as paper
+from profilefit.report.figures.canvas import albedo_axis, canvas, legend_below, plain_log, save, styled
 from profilefit.report.kinds import published
 from profilefit.report.records import SETS, Content, Fitted, Source, converged, measures
 from profilefit.report.tables.cells import significant
@@ -77,23 +55,23 @@ class Plan:
     draw: Callable[..., list[Path]]
     missing: str = ""
 
+    def drawn(self, source: Source, out: Path) -> list[Path]:
+        """Draw the figure into a folder, and return its files."""
+        return self.draw(source, out, name=self.name)
+
 
 Track = Callable[[list[Plan]], Iterable[Plan]]
 
+INVERSE, QUANTILES = ("liang-inverse-whole",), ("quantile", "quantile-diffuse")
 PAPER = (
-    Plan("liang-7-profile", ("liang-as-published",), ("liang-whole",), profile_figure),
-    Plan("liang-7-error", ("liang-whole",), ("liang-as-published",), error_figure),
-    Plan("liang-8-albedo", ("albedo-liang",), ("albedo-rational",), albedo_figure),
-    Plan("liang-11-a", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "a")),
-    Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "b")),
-    Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), partial(coefficient_figure, "c")),
-    Plan("liang-19-inverse", ("liang-inverse-whole",), ("liang-inverse-as-published", "liang-whole"), inverse_figure),
-    Plan(
-        "inversion-error",
-        ("liang-inverse-whole",),
-        ("quantile", "quantile-diffuse", "hazard", "hazard-diffuse"),
-        inversion_figure,
-    ),
+    Plan("liang-7-profile", ("liang-as-published",), ("liang-whole",), paper.profile_figure),
+    Plan("liang-7-error", ("liang-whole",), ("liang-as-published",), paper.error_figure),
+    Plan("liang-8-albedo", ("albedo-liang",), ("albedo-rational",), paper.albedo_figure),
+    Plan("liang-11-a", ("liang-as-published",), ("liang-whole",), partial(paper.coefficient_figure, "a")),
+    Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), partial(paper.coefficient_figure, "b")),
+    Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), partial(paper.coefficient_figure, "c")),
+    Plan("liang-19-inverse", INVERSE, ("liang-inverse-as-published", "liang-whole"), paper.inverse_figure),
+    Plan("inversion-error", INVERSE, (*QUANTILES, "hazard", "hazard-diffuse"), paper.inversion_figure),
 )
 
 
@@ -122,26 +100,22 @@ def draw_all(
             possible.append(plan)
     drawn: dict[int, list[Path]] = {}
     with Workers(min(processes, len(possible))) as workers:
-        task = partial(_drawn, source if processes == 1 else Source(folder), out)  # what is read travels with it
-        figures = workers.each(task, possible)
+        known = source if processes == 1 else Source(folder)  # what is read travels with the task
+        figures = workers.each(methodcaller("drawn", known, out), possible)
         for _ in track(possible):
             number, drawn[number] = next(figures)
     return [path for number in range(len(possible)) for path in drawn[number]], left_out
-
-
-def _drawn(source: Source, out: Path, plan: Plan) -> list[Path]:
-    return plan.draw(source, out, name=plan.name)
 
 
 def plans(source: Source) -> tuple[Plan, ...]:
     """Return the paper's figures, those of all laws and stacks, and of each record."""
     profiles = tuple(name for name in source.paths if measures(source.content(name), "rel"))
     lacking = "" if profiles else f"{source.folder} has no record of a profile law"
-    printed = has_printed(source)
+    printed = paper.has_printed(source)
     unprinted = "" if printed else f"{source.folder} has no record of constants that were printed"
     return (
         *PAPER,
-        Plan("constants", (), printed, constants_figure, unprinted),
+        Plan("constants", (), printed, paper.constants_figure, unprinted),
         Plan("quality", (), profiles, quality_figure, lacking),
         *([Plan(OF_SUMS, (), (), sum_figure)] if record.available(source.folder / SUMS) else []),
         *(plan for name in source.paths for plan in record_plans(source, name)),
@@ -199,7 +173,7 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
         else:
             ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    ax.axhline(0.0, color=pen.BLACK, linewidth=0.8)
     return save(figure, out, name or f"residuals-{record_name}")
 
 
@@ -213,7 +187,7 @@ def _of_map(ax: Axes, fitted: Fitted) -> None:
         what = "α"
     else:
         left, what = np.asarray(law.reflectance(alpha)) - reflectance, "A"
-    ax.errorbar(alpha, left, error, color=BLUE, marker="o", markersize=2.6, linewidth=0.8, elinewidth=0.8)
+    ax.errorbar(alpha, left, error, color=pen.BLUE, marker="o", markersize=2.6, linewidth=0.8, elinewidth=0.8)
     albedo_axis(ax)
     ax.set_ylabel(f"{what} of the map less {what} of the data [-]")
 
@@ -231,17 +205,15 @@ def _of_profile(ax: Axes, fitted: Fitted, alpha: float, colour: Floats, row: int
     ax.errorbar(middle, left, spread, color=colour, linewidth=1.0, elinewidth=0.7, label=f"α = {alpha:.3f}")
 
 
+_energy_within = jax.jit(lambda law, edges, alpha: law.unscaled_energy(edges, alpha))
+
+
 def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
     """Return what the fit compared, within each edge (..., n) [-]."""
     short = -edges.shape[-1] % MOST_RINGS  # so that one compilation serves all albedos
     full = np.pad(edges, [(0, 0)] * (edges.ndim - 1) + [(0, short)], mode="edge")
     with jax.enable_x64(True):
         return np.asarray(_energy_within(law, full, np.float64(alpha)))[..., : edges.shape[-1]]
-
-
-@jax.jit
-def _energy_within(law: ProfileLaw, edges: jax.Array, alpha: jax.Array) -> jax.Array:
-    return law.unscaled_energy(edges, alpha)
 
 
 SHOWN = (MEASURES["rel"], MEASURES["ks"])
@@ -251,7 +223,7 @@ KINDS = {
     "refracting": "refracting surfaces, n = 1.4",
 }
 # Lines of one panel in turn, by colour and marker: never by colour alone. Printed constants are dashed.
-COLOURS, MARKERS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY), "osv^Dx+<"
+COLOURS, MARKERS = (pen.BLUE, pen.VERMILION, pen.GREEN, pen.ORANGE, pen.PURPLE, pen.SKY), "osv^Dx+<"
 ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, of what is above [inch]
 
 
@@ -352,7 +324,7 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     figure = canvas(8.0, layout="none")
     grid = corner_grid(figure, samples, BINS, max_n_ticks=2 if len(names) > LARGE else 4)
     figure.subplots_adjust(left=0.09, right=0.97, bottom=0.09, top=0.965, wspace=0.06, hspace=0.06)
-    looks = {"regenerated": (BLACK, "-"), "published": (VERMILION, "--")}
+    looks = {"regenerated": (pen.BLACK, "-"), "published": (pen.VERMILION, "--")}
     for column, constant in enumerate(constants):
         for which, (color, style) in looks.items():  # where they lie in the panel
             value = constant.get(which)
@@ -367,8 +339,8 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
 def corner_grid(figure: Figure, samples: Floats, bins: int, **more: Any) -> NDArray[Any]:
     """Draw samples (draws, n) in pairs and alone, and return the panels (n, n)."""
     corner.corner(
-        samples, fig=figure, bins=bins, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
-        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
+        samples, fig=figure, bins=bins, color=pen.BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
+        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": pen.BLUE},
         contour_kwargs={"linewidths": 0.6}, **more,
     )  # fmt: skip
     return np.array(figure.axes).reshape(samples.shape[1], -1)
@@ -421,12 +393,12 @@ def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any
         if value is not None and not least <= value <= most
     ]
     handles = [
-        Line2D([], [], color=BLACK, linewidth=0.8, label="regenerated"),
-        Patch(color=BLUE, alpha=0.6, label="39 % and 86 % of the draws: one and two σ"),
+        Line2D([], [], color=pen.BLACK, linewidth=0.8, label="regenerated"),
+        Patch(color=pen.BLUE, alpha=0.6, label="39 % and 86 % of the draws: one and two σ"),
     ]
     if any(value is not None for value in printed):
         label = "as printed" + ("" if not outside else "; outside its panel:\n" + fill(", ".join(outside), 40))
-        handles.append(Line2D([], [], color=VERMILION, linestyle="--", linewidth=0.8, label=label))
+        handles.append(Line2D([], [], color=pen.VERMILION, linestyle="--", linewidth=0.8, label=label))
     wider = [(c.get("jackknife_error") or 0.0) / s for c, s in zip(constants, samples.std(axis=0, ddof=1), strict=True)]
     if max(wider) > 1.0:
         note = f"the jackknife errors are up to {significant(max(wider))} times this wide"
@@ -437,7 +409,7 @@ def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any
 # Error of sums of Gaussians over their number, of every stack that a folder has records of.
 
 OF_SUMS = "gaussians-of-stacks"
-LOOKS = {"red": (VERMILION, "o"), "green": (GREEN, "s"), "blue": (BLUE, "^")}  # never by colour alone
+LOOKS = {"red": (pen.VERMILION, "o"), "green": (pen.GREEN, "s"), "blue": (pen.BLUE, "^")}  # never by colour alone
 LONGEST = 3  # panels of a row
 STACK_ROW, STACK_FEET = 2.5, 0.7  # height of a row, and of what is below [inch]
 STROKES = {"searchlight": (0, (1, 1.5)), "diffuse": "-"}
@@ -510,10 +482,10 @@ def _draw_sums(ax: Axes, sums: gaussians.SumRecord) -> None:
             if others:
                 of_six = others[light][place]["rel"]
                 ax.plot(DEFAULT, of_six, color=color, linestyle="none", marker=marker, markersize=6, fillstyle="none")
-    ax.plot([], [], color=GREY, linestyle=STROKES["diffuse"], label="diffuse light")
-    ax.plot([], [], color=GREY, linestyle=STROKES["searchlight"], label="searchlight")
+    ax.plot([], [], color=pen.GREY, linestyle=STROKES["diffuse"], label="diffuse light")
+    ax.plot([], [], color=pen.GREY, linestyle=STROKES["searchlight"], label="searchlight")
     if others:
-        ax.plot([], [], color=GREY, linestyle="none", marker="o", markersize=6, fillstyle="none", label="published")
+        ax.plot([], [], color=pen.GREY, linestyle="none", marker="o", markersize=6, fillstyle="none", label="published")
     ax.set_yscale("log")
     plain_log(ax.yaxis)
     ax.set_xticks(list(gaussians.COUNTS))

@@ -15,15 +15,7 @@ from scipy import ndimage
 
 from profilefit.report.figures.canvas import BLACK, ORANGE, PURPLE, VERMILION, WIDTH, YELLOW, canvas, save, styled
 from profilefit.report.tables.stability_tables import SIGNS
-from profilefit.studies.stability.cells import (
-    ARITHMETICS,
-    DTYPES,
-    LENGTHS,
-    QUANTITIES,
-    ArgumentAxis,
-    Cells,
-    Verdict,
-)
+from profilefit.studies.stability.cells import ARITHMETICS, DTYPES, LENGTHS, QUANTITIES, ArgumentAxis, Cells, Verdict
 
 # Red classes differ in lightness and carry a sign, as does what is not judged; the others are pale.
 COLOURS = {

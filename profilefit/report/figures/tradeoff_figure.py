@@ -21,21 +21,8 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
-from profilefit.report.figures.canvas import (
-    BLUE,
-    DPI,
-    GREEN,
-    GREY,
-    ORANGE,
-    POINTS,
-    PURPLE,
-    SKY,
-    VERMILION,
-    canvas,
-    plain_log,
-    save,
-    styled,
-)
+from profilefit.report.figures import canvas as pen
+from profilefit.report.figures.canvas import canvas, plain_log, save, styled
 from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Panel, Point, TradeoffPart, front, standings
 
 STEP = 4.5  # from a point to the nearest place of its label [pt]
@@ -78,8 +65,10 @@ def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], 
             bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
             arrowprops={"arrowstyle": "-", "color": "0.6", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 2.0},
         )
-        boxes = [_placed(note, place, renderer) for place in PLACES]
-        costs = [_crowding(box, occupied, inside) for box in boxes]
+        costs = []  # square pixels that a label would share with others, or have outside the axes
+        for box in (_placed(note, place, renderer) for place in PLACES):
+            shared = sum(_area(Bbox.intersection(box, other)) for other in occupied)
+            costs.append(shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside))))
         far = [DISTANCE * (STEP * np.hypot(*place)) ** 2 for place in PLACES]
         best = int(np.argmin(np.add(costs, far)))
         occupied.append(_placed(note, PLACES[best], renderer))
@@ -90,7 +79,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], 
 def box_of(axes: Axes, points: Sequence[tuple[float, float]], around: float = 0.0) -> Bbox:
     """Return the box in pixels of places in data coordinates, `around` points wider on all sides."""
     places, figure = axes.transData.transform(np.asarray(points, float)), axes.figure
-    margin = around * (figure.dpi if isinstance(figure, Figure) else figure.figure.dpi) / POINTS
+    margin = around * (figure.dpi if isinstance(figure, Figure) else figure.figure.dpi) / pen.POINTS
     (x0, y0), (x1, y1) = places.min(axis=0) - margin, places.max(axis=0) + margin
     return Bbox.from_extents(x0, y0, x1, y1)
 
@@ -102,18 +91,11 @@ def renderer_of(axes: Axes) -> RendererBase:
 
 def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase) -> Bbox:
     x, y = place
-    note.set(position=(STEP * x, STEP * y))
-    note.set(
-        ha="left" if x > 0 else "right" if x < 0 else "center", va="bottom" if y > 0 else "top" if y < 0 else "center"
-    )
+    ha = "left" if x > 0 else "right" if x < 0 else "center"
+    va = "bottom" if y > 0 else "top" if y < 0 else "center"
+    note.set(position=(STEP * x, STEP * y), ha=ha, va=va)
     note.update_positions(renderer)
     return Text.get_window_extent(note, renderer).padded(2.0)  # an Annotation's own has its arrow, too
-
-
-def _crowding(box: Bbox, occupied: Sequence[Bbox], inside: Bbox) -> float:
-    """Return square pixels that a label would share with others, or have outside the axes."""
-    shared = sum(_area(Bbox.intersection(box, other)) for other in occupied)
-    return shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside)))
 
 
 def _area(box: Bbox | None) -> float:
@@ -123,7 +105,7 @@ def _area(box: Bbox | None) -> float:
 HEIGHT = 4.3  # of one panel [inch]
 FEET = 0.8  # for legend and caption [inch]
 SMALL, CAPTION_WIDTH = 6.5, 150  # size [pt] and letters of a line
-LINES = (BLUE, GREEN, PURPLE, ORANGE, SKY)  # of methods with more than one effort
+LINES = (pen.BLUE, pen.GREEN, pen.PURPLE, pen.ORANGE, pen.SKY)  # of methods with more than one effort
 LEAST_DECADES = 1.3  # an axis shorter than that has ticks at 1, 2 and 5
 MARKS: dict[str, dict[str, Any]] = {
     FRONT: {"marker": "s", "ms": 6.0, "zorder": 4},
@@ -142,18 +124,25 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     """Draw a part's panels below each other; `caption` says which machine."""
     rows = len(part.panels)
     figure = canvas(HEIGHT * rows + FEET)
-    figure.set_dpi(DPI)  # labels are placed for the pixels that they are saved with
+    figure.set_dpi(pen.DPI)  # labels are placed for the pixels that they are saved with
     all_axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, part.panels, strict=True):
         draw(axes, panel, colours_of(part.points))
     used = {standing for panel in part.panels for standing in standings(panel.points)}
     joined = any(panel.joined for panel in part.panels)
-    handles = [_handle(standing, GREY if joined else _colour(standing)) for standing in MARKS if standing in used]
+    handles = []
+    for standing in (standing for standing in MARKS if standing in used):
+        colour = pen.GREY if joined else _colour(standing)
+        handle = Line2D([], [], color=colour, ls="none", label=MEANINGS[standing])
+        handle.set(**{key: value for key, value in MARKS[standing].items() if key != "zorder"})
+        if standing == FRONT:
+            handle.set(color=pen.VERMILION, ls="-", lw=1.3, mfc=colour, mec=pen.VERMILION, mew=1.3)
+        handles.append(handle)
     spread = "thin: up to the worst; thick: middle 68 % of repeats"
-    handles.append(Line2D([], [], color=GREY, marker="_", lw=0.7, label=spread))
+    handles.append(Line2D([], [], color=pen.GREY, marker="_", lw=0.7, label=spread))
     title = fill(caption, CAPTION_WIDTH)
     legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, title=title, title_fontsize=SMALL)
-    legend.get_title().set_color(GREY)
+    legend.get_title().set_color(pen.GREY)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, panel in zip(all_axes, part.panels, strict=True):
@@ -175,7 +164,7 @@ def draw(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
     for point, standing in zip(panel.points, standings(panel.points), strict=True):
         _mark(axes, point, standing, colours[point.method] if panel.joined else _colour(standing))
     best = [panel.points[i] for i in front(panel.points)]
-    axes.plot(*_xy(best), drawstyle="steps-post", color=VERMILION, lw=1.3, zorder=2)
+    axes.plot(*_xy(best), drawstyle="steps-post", color=pen.VERMILION, lw=1.3, zorder=2)
     axes.margins(x=0.16, y=0.14)
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         if np.log10(high / low) < LEAST_DECADES:
@@ -187,7 +176,7 @@ def _mark(axes: Axes, point: Point, standing: str, colour: str) -> None:
     x, y = point.cost, point.error
     style: dict[str, Any] = {"color": colour, **MARKS[standing]}
     if standing == FRONT:
-        style |= {"mec": VERMILION, "mew": 1.3}
+        style |= {"mec": pen.VERMILION, "mew": 1.3}
     of_x, of_y = ([[one.value - one.low], [one.high - one.value]] for one in (x, y))
     axes.errorbar(x.value, y.value, of_y, of_x, elinewidth=1.6, capsize=2.0, ls="none", **style)
     if point.worst is not None:
@@ -215,21 +204,13 @@ def _occupied(axes: Axes, panel: Panel) -> Iterator[Bbox]:
         yield box_of(axes, [(next_x, y), (next_x, next_y)], 0.7)
 
 
-def _handle(standing: str, colour: str) -> Line2D:
-    handle = Line2D([], [], color=colour, ls="none", label=MEANINGS[standing])
-    handle.set(**{key: value for key, value in MARKS[standing].items() if key != "zorder"})
-    if standing == FRONT:
-        handle.set(color=VERMILION, ls="-", lw=1.3, mfc=colour, mec=VERMILION, mew=1.3)
-    return handle
-
-
 def colours_of(points: Sequence[Point]) -> dict[str, str]:
     """Return a colour by method, the same in all panels of a part."""
     return {method: LINES[i % len(LINES)] for i, method in enumerate(dict.fromkeys(point.method for point in points))}
 
 
 def _colour(standing: str) -> str:
-    return BLUE if standing == BEATEN else VERMILION
+    return pen.BLUE if standing == BEATEN else pen.VERMILION
 
 
 def _xy(points: Sequence[Point]) -> tuple[list[float], list[float]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from string import Template
 
@@ -14,21 +13,11 @@ from mcml_sim.files.whole_file import require_writable, write_whole
 from profilefit.recipes import record
 from profilefit.report.drawing import classed
 from profilefit.report.explorer import explorer_section
+from profilefit.report.page import sections
 from profilefit.report.page.markup import element, markup, section
-from profilefit.report.page.sections import (
-    EvidenceFolder,
-    failures,
-    layers,
-    paper_figures,
-    promises,
-    provenance,
-    record_part,
-    shader,
-    speed,
-    whole_figure,
-)
 from profilefit.report.records import Source
 from profilefit.report.tables.record_tables import summary
+from profilefit.shader.emit import text_beside
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
@@ -57,8 +46,8 @@ PARTS = {
     "claims": "Promised, and measured",
     "provenance": "Where it comes from",
 }
-# Section -> the command that measures it, its parts.
-MEASURED = {"stability": ("stability", failures), "tradeoff": ("tradeoff", speed), "check": ("check", shader)}
+# Section, and the command that measures it -> its parts.
+MEASURED = {"stability": sections.failures, "tradeoff": sections.speed, "check": sections.shader}
 RECORD = "record "  # begins the key of a part that is one record
 PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -104,20 +93,21 @@ def write_page(
     """
     require_writable(path, room=ROOM)
     source = Source(folder, tuple(names) if names else None)
-    measures = EvidenceFolder(evidence, folder)
+    measures = sections.EvidenceFolder(evidence, folder)
     for file in source.paths.values():  # damage is reported now, not after a minute
         record.read(file, whole=True)
-    measured = {key: measures.section(name, parts) for key, (name, parts) in MEASURED.items()}
-    measured["claims"] = "\n".join(promises(measures))
+    measured = {name: measures.section(name, parts) for name, parts in MEASURED.items()}
+    measured["claims"] = "\n".join(sections.promises(measures))
     makers: dict[str, Callable[[], str]] = {
         "fits": lambda: markup(summary({name: source.content(name) for name in source.paths})),
         "explorer": lambda: explorer_section(source.folder),
-        "constants": lambda: whole_figure(source, "constants"),
-        "quality": lambda: whole_figure(source, "quality"),
-        "paper": lambda: paper_figures(source),
-        "stacks": lambda: "\n".join(layers(source, measures)),
-        **{f"{RECORD}{name}": partial(record_part, source, name) for name in source.paths},  # these take longest
-        "provenance": lambda: "\n".join(provenance(source, path.name)),
+        "constants": lambda: sections.whole_figure(source, "constants"),
+        "quality": lambda: sections.whole_figure(source, "quality"),
+        "paper": lambda: sections.paper_figures(source),
+        "stacks": lambda: "\n".join(sections.layers(source, measures)),
+        # These take longest.
+        **{f"{RECORD}{name}": partial(sections.record_part, source, name) for name in source.paths},
+        "provenance": lambda: "\n".join(sections.provenance(source, path.name)),
         **{key: partial(str, text) for key, text in measured.items()},
     }
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
@@ -129,18 +119,14 @@ def write_page(
 
 def document(title: str, lead: str, summary: str, parts: Mapping[str, tuple[str, str]]) -> str:
     """Return a page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
-    rules, sections = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
+    rules, body = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
     links = "".join(element("li", element("a", escape(head), href=f"#{key}")) for key, (head, _) in parts.items())
     return PAGE.substitute(
         title=escape(title),
         lead=escape(lead),
         summary=escape(summary),
-        style=_asset("page.css") + rules,
-        script=_asset("page.js"),
+        style=text_beside(__name__, "page.css") + rules,
+        script=text_beside(__name__, "page.js"),
         links=links,
-        sections=sections,
+        sections=body,
     )
-
-
-def _asset(name: str) -> str:
-    return files("profilefit.report.page").joinpath(name).read_text(encoding="utf-8")

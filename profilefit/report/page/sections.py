@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -18,24 +18,15 @@ from profilefit.recipes.evidence import digest, stale
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons
 from profilefit.report.drawing import address, checked, inline
+from profilefit.report.figures import record_figures as plots
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import (
-    OF_SUMS,
-    PAPER,
-    Plan,
-    plans,
-    record_plans,
-    sum_caption,
-    sum_figure,
-    sums_of,
-)
 from profilefit.report.kinds import stack_table, sum_tables
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Content, Source
-from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.record_tables import photons_text, record_tables
-from profilefit.report.tables.tradeoff_tables import with_spread
+from profilefit.report.tables.tradeoff_tables import point_columns
 from profilefit.studies.stability.cells import Verdict
 
 SHOWN = 12  # letters of a SHA-256
@@ -94,13 +85,13 @@ CAPTIONS = {
 }
 
 
-def _drawn(plan: Plan, source: Source) -> str:
+def _drawn(plan: plots.Plan, source: Source) -> str:
     """Return the figure of a plan as part of a page; where it cannot be drawn, why."""
     reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
     title = CAPTIONS.get(plan.name) or CAPTIONS[plan.name.split("-")[0]]
-    return _drawing(plan.name, lambda out: plan.draw(source, out, name=plan.name), title)
+    return _drawing(plan.name, lambda out: plan.drawn(source, out), title)
 
 
 def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
@@ -112,20 +103,20 @@ def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
 
 def whole_figure(source: Source, name: str) -> str:
     """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
-    (plan,) = (one for one in plans(source) if one.name == name)
+    (plan,) = (one for one in plots.plans(source) if one.name == name)
     return _drawn(plan, source)
 
 
 def paper_figures(source: Source) -> str:
     """Return the figures of the paper again, as far as there are records for them."""
-    return "\n".join(_drawn(plan, source) for plan in PAPER if set(plan.needs) <= set(source.paths))
+    return "\n".join(_drawn(plan, source) for plan in plots.PAPER if set(plan.needs) <= set(source.paths))
 
 
 def record_part(source: Source, name: str, figures: bool = True) -> str:
     """Return everything of one record, folded; without `figures` only what its .json has."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
-    plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
+    plans_of = [plan for plan in plots.record_plans(source, name) if not plan.missing] if figures else []
     corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
     drawings = "\n".join(_drawn(plan, source) for plan in plans_of if plan.name != corner)
     draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
@@ -154,10 +145,8 @@ class EvidenceFolder:
         try:
             return "\n".join(parts(self))
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
-            given = f"{type(error).__name__}: {error}"
-            raise InputError(
-                f"{self.folder / name}.json: expected what `profilefit {name} --out` writes, got {given}"
-            ) from error
+            expected = f"{self.folder / name}.json: expected what `profilefit {name} --out` writes"
+            raise InputError(f"{expected}, got {type(error).__name__}: {error}") from error
 
     def content(self, name: str) -> Content | None:
         """Return the content of `name`.json; None if there is none. InputError on a file of another kind."""
@@ -247,8 +236,8 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
     if table is None:
         return
     yield markup(table)
-    if sums := sums_of(source.folder):
-        yield _drawing(OF_SUMS, lambda out: sum_figure(source, out), sum_caption(sums))
+    if sums := plots.sums_of(source.folder):
+        yield _drawing(plots.OF_SUMS, lambda out: plots.sum_figure(source, out), plots.sum_caption(sums))
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     yield from _pictures(evidence, OF_LAYERS)
@@ -259,9 +248,16 @@ def _check(content: Content) -> Iterator[str]:
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, measures) in GROUPS.items():
-        if content[key]:
-            columns = _columns(content[key], measures)
-            yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
+        errors = (f"{MEASURES[name].symbol}\n{of}" for name in measures for of in ("model", "float32"))
+        header, rows = ("law", "result", "light", "n", *errors, "bad\ninside", "bad\noutside"), []
+        for one in content[key]:
+            setting = (one["setting"]["illumination"], f"{one['setting']['n']:g}")
+            known = (of.get(name) for name in measures for of in (one["model"]["values"], one["rounding"]))
+            bad = (sum(v for v in one[place].values() if isinstance(v, int)) for place in ("inside", "outside"))
+            result = "FAIL" if one["broken"] else "pass"
+            rows.append((_label(one), result, *setting, *map(significant, known), *map(str, bad)))
+        if rows:
+            yield markup(row_table(title, header, rows, MEANING, left=("light", "result"), fold=("law",)))
     if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
     if costs := content["costs"]:
@@ -269,22 +265,6 @@ def _check(content: Content) -> Iterator[str]:
         for work in next(iter(costs.values()))["ns"]:
             columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
         yield markup(column_table(COSTS, columns, left=("source",)))
-
-
-def _columns(group: Sequence[Content], measures: Sequence[str]) -> dict[str, list[str]]:
-    columns = {
-        "law": [_label(one) for one in group],
-        "result": ["FAIL" if one["broken"] else "pass" for one in group],
-        "light": [one["setting"]["illumination"] for one in group],
-        "n": [f"{one['setting']['n']:g}" for one in group],
-    }
-    for name in measures:
-        short = MEASURES[name].symbol
-        columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
-        columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
-    for place in ("inside", "outside"):
-        columns[f"bad\n{place}"] = [str(sum(v for v in one[place].values() if isinstance(v, int))) for one in group]
-    return columns
 
 
 def _label(content: Content) -> str:
@@ -324,13 +304,7 @@ def _numbers(part: Content) -> str:
     tables = []
     for panel in part["panels"].values():
         points = panel["points"]
-        columns = {
-            "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
-            "cost": [with_spread(**one["cost"]) for one in points],
-            "error": [with_spread(**one["error"]) for one in points],
-            "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
-            "stands": [one["standing"] for one in points],
-        }
+        columns = point_columns(points) | {"stands": [one["standing"] for one in points]}
         caption = f"cost: {panel['cost']}; error: {panel['error']}".replace("$", "")
         tables.append(markup(column_table(panel["title"].replace("$", ""), columns, caption, left=("", "stands"))))
     return "\n".join([*tables, *(paragraph(note, "dim") for note in part["notes"])])

@@ -100,11 +100,9 @@ def row_table(
     aligned: Sequence[str] = (),
 ) -> Group:
     """Return rows under their headers, as `column_table` shows columns; those `aligned` stand on the decimal point."""
-    columns: dict[str, list[str]] = {name: [] for name in header}
-    for row in rows:
-        for name, cell in zip(columns, row, strict=True):
-            columns[name].append(cell)
-    shown = {name: on_the_point(cells) if name in aligned else cells for name, cells in columns.items()}
+    columns: list[Sequence[str]] = list(zip(*rows, strict=True)) or [() for _ in header]
+    named = zip(header, columns, strict=True)
+    shown = {name: on_the_point(cells) if name in aligned else cells for name, cells in named}
     return column_table(title, shown, caption, left, fold)
 
 
@@ -117,26 +115,19 @@ def spark(values: Sequence[float | None], ends: tuple[float, float] | None, widt
 
     width  the most characters; of more values the largest of each stretch is shown, since an error may not be averaged
     """
-    if ends is None:
-        return GAP * min(len(values), width or len(values))
     count = min(width or len(values), len(values))
-    places = [round(i * len(values) / max(count, 1)) for i in range(count + 1)]
-    stretches = (filter(_is_shown, values[a:b]) for a, b in pairwise(places))
-    return "".join(_block(max(stretch, default=None), *ends) for stretch in stretches)  # type: ignore[type-var]
+    if ends is None:
+        return GAP * count
+    low, high = ends
+    blocks = ""
+    for first, last in pairwise(round(i * len(values) / max(count, 1)) for i in range(count + 1)):
+        known = [value for value in values[first:last] if value is not None and 0 < value < math.inf]
+        share = math.log(max(known) / low) / math.log(high / low) if known and high > low else 0.0
+        blocks += BLOCKS[round(min(max(share, 0.0), 1.0) * (len(BLOCKS) - 1))] if known else GAP
+    return blocks
 
 
 def span(rows: Iterable[Sequence[float | None]]) -> tuple[float, float] | None:
     """Return the smallest and the largest positive number of all, the one scale of a table's sparks; None of none."""
-    known = [value for row in rows for value in row if value is not None and _is_shown(value)]
+    known = [value for row in rows for value in row if value is not None and 0 < value < math.inf]
     return (min(known), max(known)) if known else None
-
-
-def _block(value: float | None, low: float, high: float) -> str:
-    if value is None:
-        return GAP
-    share = math.log(value / low) / math.log(high / low) if high > low else 0.0
-    return BLOCKS[round(min(max(share, 0.0), 1.0) * (len(BLOCKS) - 1))]
-
-
-def _is_shown(value: float | None) -> bool:
-    return value is not None and math.isfinite(value) and value > 0

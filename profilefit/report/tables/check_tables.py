@@ -11,7 +11,7 @@ from rich.text import Text
 
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import plain
-from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
+from profilefit.report.tables.cells import ABSENT, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.shader.check.chosen import REGENERATED, checked, chosen
 from profilefit.shader.check.dense_grid import ShaderCheck
@@ -53,14 +53,11 @@ def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
     """Return the distribution of each law's errors, and where the largest is; below the GPU's beside the record's."""
     parts: list[RenderableType] = []
     for one in laws:
-        rows = [
-            (name, *map(significant, (spread.half, spread.most, spread.largest)), spread.where)
-            for name, spread in one.spreads.items()
-        ]
-        pairs = [
-            f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})"
-            for name, value in one.measured.items()
-        ]
+        each = one.spreads.items()
+        rows = [(name, *map(significant, (at.half, at.most, at.largest)), at.where) for name, at in each]
+        pairs = []
+        for name, value in one.measured.items():
+            pairs.append(f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})")
         caption = f"GPU against the exact half space: {', '.join(pairs)}" if pairs else ""
         header = ("float32 error", "50 %", "99 %", "largest", "at")
         parts.append(row_table(_called(one), header, rows, caption, left=("float32 error", "at")))
@@ -74,30 +71,27 @@ def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
 
 
 def _cost_rows(costs: Mapping[str, Cost]) -> list[tuple[str, ...]]:
-    return [
-        (name, *(f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for work in WORKS))
-        for name, cost in costs.items()
-    ]
+    works = {name: [(cost.ns[work], cost.ratio[work]) for work in WORKS] for name, cost in costs.items()}
+    return [(name, *(f"{significant(ns)} ({ratio:.2f})" for ns, ratio in each)) for name, each in works.items()]
 
 
 def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
     """Return a line a law, a column for each thing that is stored in float16."""
-    columns = {"law": [_at_index(one.of) for one in checks]}
-    for name in HALVES:
-        if any(name in one.rel for one in checks):
-            columns[name] = [
-                f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT
-                for one in checks
-            ]
-    return column_table("Half precision", columns, HALF_CAPTION, fold=("law",))
+    stored = [name for name in HALVES if any(name in one.rel for one in checks)]
+    rows = []
+    for one in checks:
+        pairs = ((one.rel.get(name), one.ks.get(name)) for name in stored)
+        texts = (ABSENT if rel is None else f"{significant(rel)} / {significant(ks)}" for rel, ks in pairs)
+        rows.append((_at_index(one.of), *texts))
+    return row_table("Half precision", ("law", *stored), rows, HALF_CAPTION, fold=("law",))
 
 
 def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
     """Return the broken bounds, a line each, and the sum of it."""
     lines = [Text(f"{FAIL} {_called(one)}: {bound}") for one in checks for bound in one.broken]
     failed = sum(bool(one.broken) for one in checks)
-    count = f"{len(checks)} law{'s' if len(checks) != 1 else ''} or map{'s' if len(checks) != 1 else ''}"
-    return [*lines, Text(f"{count}: {failed} fail" if failed else f"{count}: all pass", style="bold")]
+    count = "1 law or map" if len(checks) == 1 else f"{len(checks)} laws or maps"
+    return [*lines, Text(f"{count}: {f'{failed} fail' if failed else 'all pass'}", style="bold")]
 
 
 def markdown_check(folder: Path) -> str:

@@ -34,11 +34,8 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
 
     layers  the one layer for a stack: none without one, one of a grey stack, or those of red, green and blue
     """
-    shown = {
-        "best cheaper": choice.cheaper,
-        "chosen" if choice.chosen else "nearest": choice.nearest,
-        "next dearer": choice.dearer,
-    }
+    nearest = "chosen" if choice.chosen else "nearest"
+    shown = {"best cheaper": choice.cheaper, nearest: choice.nearest, "next dearer": choice.dearer}
     rows = {name: one for name, one in shown.items() if one is not None}
     least = min(one.error.total for one in rows.values())
     places = max(1 - math.floor(math.log10(max(100.0 * least, 1e-4))), 0)  # two digits of the least
@@ -74,13 +71,11 @@ def sea_lines(answer: SeaNeed) -> list[str]:
     off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in answer.haze.items())
     folds = "light folds" if answer.focus >= 1.0 else "no light folds"
     ways = {"sunlight": (answer.light_steps, answer.light), "views": (answer.view_steps, answer.view)}
-    steps = ", ".join(
-        f"{name} {number or 'none, Newton alone'} (S {significant(steep)})" for name, (number, steep) in ways.items()
-    )
+    each = (f"{name} {n or 'none, Newton alone'} (S {significant(steep)})" for name, (n, steep) in ways.items())
     return [
         f"terms: {answer.terms}; off the broadened haze at worst: {off} (requested: {_percent(answer.tolerance)} %)",
         f"splat: {answer.splat}; {folds} before the floor (F {significant(answer.focus)})",
-        f"steps to a hit: {steps}",
+        f"steps to a hit: {', '.join(each)}",
     ]
 
 
@@ -251,9 +246,8 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     )
     single = max(one.single for one in layers)
     needs = "needs a pass of its own" if single > choice.scene.tolerance else "needs no pass of its own"
-    text += (
-        f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on average."
-    )
+    text += f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on "
+    text += "average."
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as the file says, and these layers are not."

@@ -12,7 +12,7 @@ from rich.text import Text
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.convert import ENGINES, LENGTHS, QUANTITIES, Engine, Optical
-from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, row_table, significant
 
 DIGITS, COLOUR_PLACES = 5, 4
 NONE = "none"
@@ -33,28 +33,23 @@ class ConventionRow:
 
 def _rows(medium: Optical, n: float) -> list[ConventionRow]:
     """Return all quantities; a table leaves out what says the same twice."""
-    surface, matched = _surface(n, medium.g), _surface(1.0, medium.g)
+    reflectances = []
+    for name, title, index in (("reflectance", "reflectance A", n), ("matched", "  index-matched", 1.0)):
+        surface = "exact, index-matched" if index == 1 else f"exact, n = {index:g}"
+        if medium.g != 0.0:
+            surface += f", g = {medium.g:g}" if index != 1 else ", g = 0 by similarity"
+        for light in ILLUMINATIONS:
+            values = medium.reflectance(light, index)
+            reflectances.append(ConventionRow(f"{name}_{light}", title, light, 0, surface, values))
     return [
         ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
         ConventionRow("alpha_unreduced", "  unreduced", "", 0, "mu_s / (mu_s + mu_a)", medium.alpha_unreduced),
-        *(
-            ConventionRow(f"reflectance_{light}", "reflectance A", light, 0, surface, medium.reflectance(light, n))
-            for light in ILLUMINATIONS
-        ),
-        *(
-            ConventionRow(f"matched_{light}", "  index-matched", light, 0, matched, medium.reflectance(light))
-            for light in ILLUMINATIONS
-        ),
+        *reflectances,
         ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
         ConventionRow("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
         ConventionRow("mu_s_unreduced", "  unreduced mu_s", "", -1, "mu_s' / (1 - g)", medium.mu_s / (1.0 - medium.g)),
         *(ConventionRow(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
     ]
-
-
-def _surface(n: float, g: float) -> str:
-    known = "exact, index-matched" if n == 1 else f"exact, n = {n:g}"
-    return known if g == 0.0 else f"{known}, g = {g:g}" if n != 1 else f"{known}, g = 0 by similarity"
 
 
 def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, Any]:
@@ -85,7 +80,12 @@ def convert_table(medium: Optical, unit: str, n: float = 1.0, sources: bool = Fa
 
     unit  that of length, or ""; n the index that A is of
     """
-    described = (Text(), Text("\n".join(map(_described, ENGINES)))) if sources else ()
+    lines = []
+    for engine in ENGINES if sources else ():
+        fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
+        lines += [engine.title, f"  fields: {'; '.join(fields)}", f"  typed: {engine.formula}"]
+        lines += [f"  source: {engine.source}", f"  checked: {engine.checked}"]
+    described = (Text(), Text("\n".join(lines))) if sources else ()
     return Group(_quantities(medium, unit, n), Text(), _engines(medium, unit, n), *described)
 
 
@@ -107,40 +107,29 @@ def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
 
 
 def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
-    rows = [_typed(engine, medium, unit, n) for engine in ENGINES]
-    in_unit = []
+    rows = []
     for engine in ENGINES:
+        typed = _typed(engine, medium, unit, n)
         field = engine.unit or (f"{unit} scene" if unit else "scene unit")
         scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
-        in_unit.append(f"{'1/' if engine.power < 0 else ''}{field}{scale}")
-    columns = {
-        "": [engine.title for engine in ENGINES],
-        "colour": [_colours(row["colour"]) for row in rows],
-        "length": [" ".join(_cell(value, DIGITS - 1) for value in row["length"]) for row in rows],
-        "in": in_unit,
-        "renders A": [_colours(row["renders"], COLOUR_PLACES - 1, "") for row in rows],
-    }
+        in_unit = f"{'1/' if engine.power < 0 else ''}{field}{scale}"
+        length = " ".join(_cell(value, DIGITS - 1) for value in typed["length"])
+        renders = _colours(typed["renders"], COLOUR_PLACES - 1, "")
+        rows.append((engine.title, _colours(typed["colour"]), length, in_unit, renders))
     caption = [
         "Colours are linear. A row holds for its version only; --sources names fields, formulas, sources and checks.",
         "at: the world scale of the renderer's settings. scene: it is modelled in this unit.",
         "renders A: what Blender shows of this medium, seen from the normal. Light enters refracted, which the map of "
         "its colour to an albedo leaves out.",
     ]
-    if ABSENT in columns["colour"]:
+    if any(colour == ABSENT for _, colour, *_ in rows):
         caption += [f"{ABSENT}: no source says."]
-    if any(NONE in cell for cell in columns["length"]):
+    if any(NONE in length for _, _, length, *_ in rows):
         caption += [f"{NONE}: the renderer has no such g, or its row was not checked with g."]
     if not unit:
         caption += ["No unit was given: convert lengths from yours to the one of the row."]
-    return column_table("What to type", columns, "\n".join(caption), ("", "in"))
-
-
-def _described(engine: Engine) -> str:
-    fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
-    return (
-        f"{engine.title}\n  fields: {'; '.join(fields)}\n  typed: {engine.formula}\n"
-        f"  source: {engine.source}\n  checked: {engine.checked}"
-    )
+    header = ("", "colour", "length", "in", "renders A")
+    return row_table("What to type", header, rows, "\n".join(caption), ("", "in"))
 
 
 def _colours(values: Floats | None, places: int = COLOUR_PLACES, absent: str = ABSENT) -> str:

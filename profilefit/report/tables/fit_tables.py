@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.misfit import DETECTED
-from profilefit.measured.fitting import MediumFit
 from profilefit.measured.identifiability import LOOSE, REFERENCE_ERROR, REPEATS, Candidate, relative_errors
 from profilefit.measured.model import NEAR, QUANTITIES, correlation, unit_of
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
 from profilefit.recipes import record
-from profilefit.report.tables.cells import (
-    ABSENT,
-    SEARCHLIGHT,
-    column_table,
-    interval,
-    on_the_point,
-    row_table,
-    significant,
-    to_error,
-)
+from profilefit.report.tables import cells
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, row_table, significant, to_error
 
 if TYPE_CHECKING:  # which a fit of one medium does not load
     from profilefit.measured.layers import LayersFit
@@ -52,8 +44,9 @@ def fit_tables(result: MediumPosterior, title: str) -> list[RenderableType]:
     """Return estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
-        if len(result.identified) > 1:
-            parts.append(_correlation_table(result))
+        if len(names := result.identified) > 1:
+            joint = correlation(result.fit.gradients, result.fit.statistical, names)
+            parts.append(column_table("Correlations", {"": names, **_below_diagonal(names, joint, 3)}))
         parts.append(_advice_table(result))
     return parts
 
@@ -72,7 +65,9 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     marks = {name: (EDGE if ends[name] else ABSENT) if name in ends else HELD for name in names}
     columns = {
         "": list(names),
-        "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
+        "value": cells.on_the_point(
+            [to_error(result.value(name), data[name] if name in moving else None) for name in names]
+        ),
         "± statistical": [significant(data[name]) if name in moving else marks[name] for name in names],
     }
     caption = CAPTION
@@ -89,10 +84,9 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
         within = result.whole_interval(name) if whole else result.interval(name)
         low, high = within or (None, None)
         is_wide = low is not None and high is not None and 0 < WIDE * low < high
-        columns["95 %"].append(ANYTHING if is_wide else interval(within, 1.0 if name in SHARES else None))
-    caption += "; 95 %: interval by " + (
-        "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
-    )
+        columns["95 %"].append(ANYTHING if is_wide else cells.interval(within, 1.0 if name in SHARES else None))
+    errors = "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
+    caption += f"; 95 %: interval by {errors}"
     if any(ends.values()):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
     if fit.spec.law.setting.illumination == Setting().illumination:
@@ -106,13 +100,11 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
     return column_table(title, columns, caption, left=("", "unit"))
 
 
-def _correlation_table(result: MediumPosterior) -> RenderableType:
-    names = result.identified
-    joint = correlation(result.fit.gradients, result.fit.statistical, names)
-    columns = {"": list(names)}
-    for at, name in enumerate(names[:-1]):
-        columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
-    return column_table("Correlations", columns)
+def _below_diagonal(names: Sequence[str], joint: Floats, places: int) -> dict[str, list[str]]:
+    """Return the columns of a symmetric matrix by name, each pair of names once."""
+    rows = range(len(names))
+    columns = ([f"{joint[row, at]:.{places}f}" if row > at else "" for row in rows] for at in rows[:-1])
+    return dict(zip(names, columns, strict=False))
 
 
 def _advice_table(result: MediumPosterior) -> RenderableType:
@@ -120,15 +112,12 @@ def _advice_table(result: MediumPosterior) -> RenderableType:
     if advice is None:
         return Text("")
     unit = result.fit.data.unit or "units of r"
-    columns = {
-        "additional measurement": ["none", *(described(one, unit) for one in advice.candidates)],
-        "least certain quantity": [advice.name, *(one.worst[0] for one in advice.candidates)],
-        "± statistical, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
-    }
+    header = ("additional measurement", "least certain quantity", "± statistical, relative")
+    rows = [("none", advice.name, significant(advice.now))]
+    rows += [(described(one, unit), one.worst[0], significant(one.worst[1])) for one in advice.candidates]
     place = "at the far end of the interval of alpha" if result.fit.at_edge else "at the fitted values"
     caption = f"predicted {place}, best first; a value is given the median relative error of the data"
-    left = "additional measurement", "least certain quantity"
-    return column_table("Most informative additional measurement", columns, caption, left)
+    return row_table("Most informative additional measurement", header, rows, caption, header[:2])
 
 
 def described(candidate: Candidate, unit: str) -> str:
@@ -281,29 +270,22 @@ def _beam(result: MediumPosterior) -> Iterator[str]:
         )
 
 
-def _narrowed(fit: MediumFit) -> str:
-    """Return what the data say of ranges."""
-    if fit.range_marginal is None:
-        return "no value of theirs gives a fit with errors, so the middle is fitted"
-    units = {"beam": f" {fit.data.unit or 'units of r'}"}
-    told = ", ".join(
-        f"{name} {value:.3g} ± {fit.range_marginal.error[name]:.2g}{units.get(name, '')}"
-        for name, value in fit.range_marginal.mean.items()
-    )
-    return f"the data and the ranges together say {told}, and what this leaves open is in the intervals"
-
-
 def _medium(result: MediumPosterior) -> Iterator[str]:
     spec, there, unit = result.fit.spec, result.tissue, result.fit.data.unit
     if spec.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
-        yield f"known as ranges: {known}; {_narrowed(result.fit)}"
+        narrowed = "no value of theirs gives a fit with errors, so the middle is fitted"
+        if (marginal := result.fit.range_marginal) is not None:
+            each = []
+            for name, value in marginal.mean.items():
+                in_unit = f" {unit or 'units of r'}" if name == "beam" else ""
+                each.append(f"{name} {value:.3g} ± {marginal.error[name]:.2g}{in_unit}")
+            narrowed = f"the data and the ranges together say {', '.join(each)}"
+            narrowed += ", and what this leaves open is in the intervals"
+        yield f"known as ranges: {known}; {narrowed}"
     if there is not None:
-        names = spec.assumed
-        here, other = (
-            " and ".join(f"{name} = {getattr(one, name):g}" for name in names)
-            for one in (spec.law.setting, there.setting)
-        )
+        names, settings = spec.assumed, (spec.law.setting, there.setting)
+        here, other = (" and ".join(f"{name} = {getattr(one, name):g}" for name in names) for one in settings)
         told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
         yield (
             f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
@@ -359,13 +341,12 @@ def layers_tables(fit: LayersFit, title: str) -> list[RenderableType]:
         "value": [to_error(value, value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
         "±": [significant(value * error) for value, error in zip(fit.values, fit.errors, strict=True)],
         "95 %": [
-            UNKNOWN if name in fit.loose else interval(ends)
+            UNKNOWN if name in fit.loose else cells.interval(ends)
             for name, ends in zip(fit.names, fit.intervals.tolist(), strict=True)
         ],
         "unit": ["" if name == "scale" else unit if name[0] == "d" else f"1/{unit}" for name in fit.names],
+        **_below_diagonal(fit.names, fit.correlation, 2),
     }
-    for at, name in enumerate(fit.names[:-1]):
-        free[name] = [f"{fit.correlation[row, at]:.2f}" if row > at else "" for row in range(len(fit.names))]
     caption = "±: from the errors of the data, wider where they do not explain the residuals; right: correlations"
     products = {
         "product": [fit.product(at) for at in range(len(fit.products))],
@@ -437,7 +418,7 @@ def photo_tables(photo: Photo) -> list[RenderableType]:
             best = photo.bounds[colour].get(name)
             rows.append((
                 colour if name == MEDIUM[0] else "", name, to_error(value, error), significant(error),
-                interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+                cells.interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
             ))  # fmt: skip
     title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
     caption = (

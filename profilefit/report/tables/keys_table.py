@@ -65,10 +65,8 @@ def page() -> str:
     parts = [HEAD]
     for kind, each in models().items():
         for name, model in zip(SCENES if kind == "scene" else ("",), each, strict=True):
-            rows = [
-                f"| {code(table)} | {code(key)} | {accepted} | {code(default)} |"
-                for table, key, accepted, default in keys(model)
-            ]
+            row = "| {} | {} | {} | {} |".format
+            rows = [row(code(table), code(key), words, code(default)) for table, key, words, default in keys(model)]
             title = f"## {kind.capitalize()}{f': {name}' * bool(name)}"
             parts.append("\n".join([title, "", "| table | key | accepted | default |", "|---|---|---|---|", *rows, ""]))
     return "\n".join(parts)

@@ -135,6 +135,7 @@ SCALES: Mapping[str, tuple[float, str]] = {
     "r2": (1.0, ""),
 }
 MAP_HEADERS = ("map", "light", "n", "δA", "δα", "√(1-α)", "rises", "α(1)", "fold", "α(0)")
+MAP_CAPTION = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
 NOTHING = "None of these records holds a law that can be measured against the exact half space."
 
 
@@ -179,10 +180,21 @@ def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[Rendera
         for measure in SCALES:
             yield _profile_table(measure, setting, by_label)
     if qualities.maps:
-        yield _map_table(qualities.maps)
+        rows = []
+        for law, quality in qualities.maps:
+            home = (law.label, law.setting.illumination, f"{law.setting.n:g}")
+            numbers = (albedo_number(measure, getattr(quality, measure)) for measure in OF_MAP)
+            rows.append((*home, *numbers, albedo_number("at_one", law.law.alpha(0.0))))
+        yield row_table("Maps between A and α", MAP_HEADERS, rows, MAP_CAPTION, left=("light",), fold=("map",))
     for setting, of_setting in groupby(qualities.samplers, key=lambda one: one.of.setting):
         samplers = list(of_setting)
-        yield _sampler_table(setting, samplers)
+        shown = []
+        for one in samplers:
+            errors = (one.exact_error, *(getattr(one.quality, name) for name in COLUMNS.values()))
+            shown.append((_sampler_label(one), *map(_worst, errors)))
+        header = ("law: sampler", "exact", *COLUMNS)
+        caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
+        yield row_table(f"Samplers, {setting}", header, shown, caption, fold=header[:1])
         if in_detail:
             yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
     if not (qualities.profiles or qualities.maps or qualities.samplers):
@@ -222,14 +234,8 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
     """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    header = (
-        "law",
-        "constants",
-        "light",
-        "n",
-        "number",
-        *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")),
-    )
+    of_measures = (f"{measure} {which}" for measure in ("rel", "ks") for which in ("mean", "worst"))
+    header = ("law", "constants", "light", "n", "number", *of_measures)
     rows = [
         (
             *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
@@ -257,28 +263,6 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     if setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
-
-
-def _map_table(measured: Sequence[tuple[LoadedLaw, AlbedoQuality]]) -> RenderableType:
-    rows = [
-        (
-            *(one.label, one.setting.illumination, f"{one.setting.n:g}"),
-            *(albedo_number(measure, getattr(quality, measure)) for measure in OF_MAP),
-            albedo_number("at_one", one.law.alpha(0.0)),
-        )
-        for one, quality in measured
-    ]
-    caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
-    return row_table("Maps between A and α", MAP_HEADERS, rows, caption, left=("light",), fold=("map",))
-
-
-def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
-    rows = [
-        (_sampler_label(s), *map(_worst, (s.exact_error, *(getattr(s.quality, name) for name in COLUMNS.values()))))
-        for s in samplers
-    ]
-    caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
-    return row_table(f"Samplers, {setting}", ("law: sampler", "exact", *COLUMNS), rows, caption, fold=("law: sampler",))
 
 
 def _sampler_label(sampler: MeasuredSampler) -> str:

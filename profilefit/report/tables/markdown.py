@@ -5,23 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.recipes.reproduction import LENGTH, PUBLISHED
-from profilefit.report.records import (
-    Content,
-    at_index,
-    converged,
-    index_words,
-    known_errors,
-    largest_error,
-    measured_sets,
-    measures,
-    regenerated_worst,
-)
+from profilefit.report import records
+from profilefit.report.records import Content, converged, largest_error
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.quality_tables import albedo_number
 
@@ -41,13 +31,13 @@ SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regen
 SHORT |= {("hazard-refracting", "regenerated")}
 
 
-def markdown_constants(records: Mapping[str, Content]) -> str:
+def markdown_constants(contents: Mapping[str, Content]) -> str:
     """Return every constant of every record: printed, regenerated, and its errors; a failed fit has no row."""
-    known = known_errors(one for content in _fits(records).values() for one in content["constants"].values())
+    known = records.known_errors(one for content in _fits(contents).values() for one in content["constants"].values())
     header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
     rows: list[Sequence[str]] = []
     failures = []
-    for name, content in _fits(records).items():
+    for name, content in _fits(contents).items():
         if not converged(content):
             failures.append(f"{_text(name)} has no constants to show: {_text(content['fit']['result'])}.")
             continue
@@ -65,36 +55,33 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
     return "\n\n".join([markdown_table(header, rows), *failures, note])
 
 
-def _hazard(records: Mapping[str, Content]) -> str:
+def _hazard(contents: Mapping[str, Content]) -> str:
     """Return the constants of the hazard law in every setting, a record a column, and its worst errors there.
 
     Records of n = 1 come first, then those that span the indices of a surface that refracts.
     """
-    of_hazard = {name: c for name, c in _fits(records).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
+    of_hazard = {name: c for name, c in _fits(contents).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
     fitted = {name: c for name, c in of_hazard.items() if converged(c)}
     forms: dict[tuple[str, ...], dict[str, Content]] = {}
     for name, content in sorted(fitted.items(), key=lambda item: bool(item[1].get("indices"))):
         forms.setdefault(tuple(content["constants"]), {})[name] = content
-    return "\n\n".join(map(_hazard_constants, forms.values()))
+    tables = []
+    for names, alike in forms.items():  # a column for each record of the same constants
+        rows = [("n", *map(records.index_words, alike.values()))]
+        for name in names:
+            of = [content["constants"][name] for content in alike.values()]
+            rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
+        for measure in ("rel", "ks"):
+            worst_of = (records.regenerated_worst(content, measure) for content in alike.values())
+            rows.append((f"{measure}, worst", *map(significant, worst_of)))
+        tables.append(markdown_table(("constant", *alike), rows))
+    return "\n\n".join(tables)
 
 
-def _hazard_constants(fitted: Mapping[str, Content]) -> str:
-    """Return records of the same constants, a column each."""
-    names = next(iter(fitted.values()))["constants"]
-    rows = [("n", *map(index_words, fitted.values()))]
-    for name in names:
-        of = [content["constants"][name] for content in fitted.values()]
-        rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
-    for measure in ("rel", "ks"):
-        worst_of = (regenerated_worst(c, measure) for c in fitted.values())
-        rows.append((f"{measure}, worst", *map(significant, worst_of)))
-    return markdown_table(("constant", *fitted), rows)
-
-
-def _readings(records: Mapping[str, Content]) -> str:
+def _readings(contents: Mapping[str, Content]) -> str:
     """Return the reading nearest to print of each equation: its choices, its result, and the verdict."""
     header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
-    readings = [r for content in records.values() for r in content.get("readings") or ()]
+    readings = [r for content in contents.values() for r in content.get("readings") or ()]
     best: dict[str, Content] = {}
     for reading in sorted(readings, key=lambda r: inf if r["curve_distance"] is None else r["curve_distance"]):
         best.setdefault(reading["equation"], reading)
@@ -112,17 +99,20 @@ def _readings(records: Mapping[str, Content]) -> str:
     return markdown_table(header, rows) if rows else ""
 
 
-def sections(records: Mapping[str, Content]) -> dict[str, str]:
+def sections(contents: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
-    paper = {name: c for name, c in records.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
+    paper = {name: c for name, c in contents.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
+    of_maps = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
+    sets = _measured(contents, "delta_A")
+    maps = [(owner, which, *(albedo_number(name, values[name]) for name in OF_MAP)) for owner, which, values in sets]
     tables = {
-        "short": _short(records),
+        "short": _short(contents),
         "quality": _quality(_measured(paper, "rel"), PROFILE_MEASURES),
         "constants": markdown_constants(paper),
-        "hazard": _hazard(records),
-        "readings": _readings(records),
-        "inversion": _quality(_measured(records, "inversion_error"), ("inversion_error",)),
-        "maps": _maps(records),
+        "hazard": _hazard(contents),
+        "readings": _readings(contents),
+        "inversion": _quality(_measured(contents, "inversion_error"), ("inversion_error",)),
+        "maps": markdown_table(of_maps, maps) if maps else "",
     }
     return {name: text for name, text in tables.items() if text}
 
@@ -140,48 +130,37 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
 def _quality(sets: Sequence[tuple[str, str, Content]], measures: Sequence[str], of: str = "record") -> str:
     """Return a row for each set of constants: mean and worst over alpha of these measures; nothing without a set."""
     header = (of, "constants", *(f"{key.replace('_', ' ')} {end}" for key in measures for end in ("mean", "worst")))
-    rows = [
-        (owner, which, *(text for key in measures for text in _mean_and_worst(key, values.get(key))))
-        for owner, which, values in sets
-    ]
+    rows = []
+    for owner, which, values in sets:
+        row = [owner, which]
+        for key in measures:
+            ends: tuple[float | None, float | None] = (None, None)  # photons do not say all
+            if (known := values.get(key)) is not None:
+                ends = float(np.mean(known)), MEASURES[key].worst(known)
+            row += [f"{end:.4f}" if key == "r2" and end is not None else significant(end) for end in ends]
+        rows.append(row)
     return markdown_table(header, rows) if rows else ""
 
 
-def _short(records: Mapping[str, Content]) -> str:
+def _short(contents: Mapping[str, Content]) -> str:
     """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
-    searchlight = {name: c for name, c in records.items() if _is_searchlight(c, spanning=True)}
+    searchlight = {name: c for name, c in contents.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    named = [(owner + at_index(records.get(owner, {})), which, values) for owner, which, values in chosen]
+    named = [(owner + records.at_index(contents.get(owner, {})), which, values) for owner, which, values in chosen]
     return _quality(named, ("rel", "ks"), "law")
 
 
-def _maps(records: Mapping[str, Content]) -> str:
-    header = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
-    rows = [
-        (owner, which, *(albedo_number(name, values[name]) for name in OF_MAP))
-        for owner, which, values in _measured(records, "delta_A")
-    ]
-    return markdown_table(header, rows) if rows else ""
-
-
-def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
+def _measured(contents: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
     """Return (record or law, set, measures) of each set once, printed constants of a law only once."""
     sets: dict[tuple[str, str], Content] = {}
-    for name, content in _fits(records).items():
-        for which in measured_sets(content):
+    for name, content in _fits(contents).items():
+        for which in records.measured_sets(content):
             regenerated = which == "regenerated"
-            owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
+            owner = name if regenerated else f"{content['law']}{' map' if records.measures(content, 'delta_A') else ''}"
             if measure in content["quality"][which] and (converged(content) or not regenerated):
                 sets.setdefault((owner, which), content["quality"][which])
     return [(*place, values) for place, values in sets.items()]
-
-
-def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
-    if values is None:  # photons do not say it
-        return ABSENT, ABSENT
-    mean, worst = float(np.mean(values)), MEASURES[measure].worst(values)
-    return (f"{mean:.4f}", f"{worst:.4f}") if measure == "r2" else (significant(mean), significant(worst))
 
 
 def _is_searchlight(content: Content, spanning: bool = False) -> bool:
@@ -191,8 +170,8 @@ def _is_searchlight(content: Content, spanning: bool = False) -> bool:
     return matched and setting.get("illumination") == "searchlight"
 
 
-def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
-    return {name: content for name, content in records.items() if "constants" in content}
+def _fits(contents: Mapping[str, Content]) -> dict[str, Content]:
+    return {name: content for name, content in contents.items() if "constants" in content}
 
 
 def _text(cell: str) -> str:

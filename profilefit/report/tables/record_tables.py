@@ -21,29 +21,10 @@ from profilefit.recipes.checks import SAME_COST
 from profilefit.recipes.record import SPANS
 from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
 from profilefit.recipes.schema import ERRORS
-from profilefit.report.records import (
-    SETS,
-    TOTAL,
-    Content,
-    at_index,
-    converged,
-    index_words,
-    known_errors,
-    largest_error,
-    measures,
-    z_score,
-)
-from profilefit.report.tables.cells import (
-    ABSENT,
-    column_table,
-    interval,
-    on_the_point,
-    row_table,
-    significant,
-    span,
-    spark,
-    to_error,
-)
+from profilefit.report import records
+from profilefit.report.records import SETS, Content, at_index, converged, largest_error
+from profilefit.report.tables import cells
+from profilefit.report.tables.cells import ABSENT, column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.quality_tables import quality_tables, spark_table, values_of, worst_measures
 
 if TYPE_CHECKING:
@@ -93,17 +74,17 @@ def constants_table(content: Content) -> RenderableType:
     if any(v is not None for v in published):
         columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in published])
     columns["\nregenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
-    known = known_errors(constants.values())
+    known = records.known_errors(constants.values())
     for place, (key, word) in enumerate(known.items()):
         texts = on_the_point([significant(row.get(key)) for row in rows])
         if place == 0:
             texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
         columns[f"±\n{word}"] = texts
-    scores = [z_score(row) for row in rows]
+    scores = [records.z_score(row) for row in rows]
     meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
         columns["\nz"] = [ABSENT if z is None else f"{z:+.0f}" if abs(z) >= TENFOLD else f"{z:+.1f}" for z in scores]
-        meanings.append(f"z: published less regenerated, over the errors of {TOTAL}, combined")
+        meanings.append(f"z: published less regenerated, over the errors of {records.TOTAL}, combined")
     title = "Constants, lengths in units of the transport mean free path"
     caption = "; ".join(meanings)
     if not converged(content):
@@ -120,24 +101,21 @@ def _intervals_table(content: Content) -> RenderableType:
     for name, constant in content["constants"].items():
         for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
             levels = (constant["intervals"][kind].get(level) for level in ("68%", "95%"))
-            rows.append(("" if place else name, KINDS[kind], *map(interval, levels)))
+            rows.append(("" if place else name, KINDS[kind], *map(cells.interval, levels)))
     return row_table("Credible intervals (emcee)", ("", "from", "68 %", "95 %"), rows, left=("", "from"))
 
 
 def _derived_table(derived: Content, surface: str = "") -> RenderableType:
     """Return A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
-    errors = derived["statistical"], derived["model"]
-    both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
-    header, title = DERIVED[derived["quantity"]]
-    columns = {
-        "α": [f"{alpha:g}" for alpha in derived["alpha"]],
-        header: on_the_point([to_error(v, e) for v, e in zip(derived["value"], both, strict=True)]),
-        "± photons": on_the_point([significant(error) for error in errors[0]]),
-        "± model": on_the_point([significant(error) for error in errors[1]]),
-    }
-    return column_table(
-        title + surface, columns, "model: how far the law is from the truth; one standard error each", ("α",)
-    )
+    columns = (derived[key] for key in ("alpha", "value", "statistical", "model"))
+    rows = []
+    for alpha, value, *errors in zip(*columns, strict=True):
+        largest = max((error for error in errors if error is not None), default=None)
+        rows.append((f"{alpha:g}", to_error(value, largest), *map(significant, errors)))
+    quantity, title = DERIVED[derived["quantity"]]
+    header = ("α", quantity, "± photons", "± model")
+    caption = "model: how far the law is from the truth; one standard error each"
+    return row_table(title + surface, header, rows, caption, ("α",), aligned=header[1:])
 
 
 def fit_facts(content: Content) -> RenderableType:
@@ -165,10 +143,8 @@ def fit_facts(content: Content) -> RenderableType:
         size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
         lines += [("discrepancy", size), ("", f"{reach}; {off['result']}")]
     if left := content.get("left_out"):
-        facts = (
-            f"{left['rings']} radial bins and {left['albedos']} albedos left out: too few photons for a standard error"
-        )
-        lines.append(("data", facts))
+        what = f"{left['rings']} radial bins and {left['albedos']} albedos"
+        lines.append(("data", f"{what} left out: too few photons for a standard error"))
     return _facts("Fit", lines + _second_opinions(content))
 
 
@@ -184,11 +160,9 @@ def _second_opinions(content: Content) -> list[Line]:
                 cost = "" if ratio is None else f"misfit {significant(ratio)} times the best: "
                 lines.append(("", f"{other['count']}: {cost}{other['result'].split(':')[0]}"))
     if check := content.get("crosscheck"):
-        lines.append(("photons", check["result"]))
-        facts = (
-            f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions, p-value {significant(check['chance'])}"
-        )
-        lines.append(("", f"{facts}, {check['photons']:.2g} photons"))
+        facts = f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions"
+        chance = f"p-value {significant(check['chance'])}, {check['photons']:.2g} photons"
+        lines += [("photons", check["result"]), ("", f"{facts}, {chance}")]
     return lines
 
 
@@ -219,7 +193,7 @@ def title_of(content: Content) -> RenderableType:
     light = f"{setting['illumination']}{beam}"
     for name, ranges in SPANS.items():
         is_in = f"every {name} in" if content.get(ranges) else f"{name} ="
-        light += f", {is_in} {index_words(content, name)}"
+        light += f", {is_in} {records.index_words(content, name)}"
     if content.get("indices"):
         light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
     lines: list[Line] = [
@@ -286,31 +260,29 @@ def evidence_tables(content: Content) -> list[RenderableType]:
 
 
 def _readings_of(equation: str, readings: list[Content]) -> RenderableType:
-    best = sorted(readings, key=lambda one: inf if one["curve_distance"] is None else one["curve_distance"])[:BEST]
-    columns = {
-        "verdict": [one["verdict"] for one in best],
-        "curve": [_share(one["curve_distance"]) for one in best],
-        "constants": [_share(one["constant_distance"]) for one in best],
-        "reading, its constants, its evidence": [_reading(one) for one in best],
-    }
-    more = len(readings) - len(best)
+    rows = []
+    for one in sorted(readings, key=lambda one: inf if one["curve_distance"] is None else one["curve_distance"])[:BEST]:
+        pairs = []
+        for name, value in one["constants"].items():
+            printed = f" (printed {one['published'][name]:g})" if name in one["published"] else ""
+            pairs.append(f"{name} {value:.4g}{printed}")
+        text = "\n".join(part for part in (one["choices"], ", ".join(pairs), one.get("evidence")) if part)
+        rows.append((one["verdict"], _share(one["curve_distance"]), _share(one["constant_distance"]), text))
+    more = len(readings) - len(rows)
     caption = f"and {more} more in the record, further from print" if more else ""
     title = f"{equation}: rms distance of the curve and largest distance of a constant from print"
-    return column_table(title, columns, caption, left=("verdict",), fold=("reading, its constants, its evidence",))
-
-
-def _reading(reading: Content) -> str:
-    printed = reading["published"]
-    pairs = ", ".join(
-        f"{name} {value:.4g}" + (f" (printed {printed[name]:g})" if name in printed else "")
-        for name, value in reading["constants"].items()
-    )
-    return "\n".join(part for part in (reading["choices"], pairs, reading.get("evidence")) if part)
+    header = ("verdict", "curve", "constants", "reading, its constants, its evidence")
+    return row_table(title, header, rows, caption, left=("verdict",), fold=header[-1:])
 
 
 def _table1(rows: list[Content]) -> RenderableType:
     """Return every model of each material, at the channel and range that the other law's printed error points to."""
-    shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
+    shown: list[Content] = []
+    for group in _by(rows, "material").values():
+        known = (row for row in group if row.get("model") == NORMALIZED_DIFFUSION)
+        best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf, default=None)
+        of_best = ("channel", "range_choice", "range_mm")
+        shown += [row for row in group if best is None or all(row.get(key) == best.get(key) for key in of_best)]
     ranges = [f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT for row in shown]
     columns = {
         "material": [
@@ -326,16 +298,6 @@ def _table1(rows: list[Content]) -> RenderableType:
         "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
     )
     return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model",))
-
-
-def _at_its_range(rows: list[Content]) -> list[Content]:
-    known = [row for row in rows if row.get("model") == NORMALIZED_DIFFUSION]
-    if not known:
-        return rows
-    best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf)
-    return [
-        row for row in rows if all(row.get(key) == best.get(key) for key in ("channel", "range_choice", "range_mm"))
-    ]
 
 
 def _ratio(row: Content) -> list[float]:
@@ -380,13 +342,13 @@ SUMMARIES = {
 }
 
 
-def summary(records: Records) -> RenderableType:
+def summary(contents: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
-    readings = {name: content for name, content in records.items() if content["pipeline"] == "evidence"}
-    for name, content in records.items():
+    readings = {name: content for name, content in contents.items() if content["pipeline"] == "evidence"}
+    for name, content in contents.items():
         if name not in readings:
-            is_of = (measure for measure in ("delta_A", "rel") if measures(content, measure))
+            is_of = (measure for measure in ("delta_A", "rel") if records.measures(content, measure))
             groups[next(is_of, "inversion_error")][name] = content
     shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
     if readings:
@@ -399,29 +361,29 @@ def summary(records: Records) -> RenderableType:
         shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
-        for name, content in records.items()
+        for name, content in contents.items()
         if "fit" in content and not converged(content)
     ]
     parts = [part for table in shown for part in (table, Text())]
     return Group(*parts, *failures, Text(CAPTION, style="dim"))
 
 
-def _summary_table(measure: str, records: Records) -> RenderableType:
+def _summary_table(measure: str, contents: Records) -> RenderableType:
     """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
     title, headers = SUMMARIES[measure]
-    spans = [content.get("indices") for content in records.values()]
-    numbers = [f"{content['setting']['n']:g}" for content in records.values()]
+    spans = [content.get("indices") for content in contents.values()]
+    numbers = [f"{content['setting']['n']:g}" for content in contents.values()]
     columns = {
-        "record": list(records),
+        "record": list(contents),
         "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
-        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
-        **{header: [_course(content, key) for content in records.values()] for header, key in headers.items()},
+        "photons": [truth(content).removesuffix(" photons") for content in contents.values()],
+        **{header: [_course(content, key) for content in contents.values()] for header, key in headers.items()},
     }
     if measure == "rel":
-        columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in records.values()]
+        columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in contents.values()]
     if measure != "delta_A":
-        rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in records.values()]
-        columns["over α"] = [spark(row, span(rows), SPARK) for row in rows]
+        rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in contents.values()]
+        columns["over α"] = [cells.spark(row, cells.span(rows), SPARK) for row in rows]
     return column_table(title, columns, left=("record", "over α"))
 
 
@@ -445,8 +407,8 @@ def reproduced(
         one, content = reproductions.get(name), record.read(paths[name]) if name in paths else {"fit": {"result": ""}}
         result = content["fit"]["result"] if "fit" in content else f"{len(content.get('readings', []))} readings"
         numbers = (one.moved, one.relative, one.intervals) if one else ()
-        cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
-        rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
+        shown = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
+        rows.append([name, f"{spent:.1f}", *shown[:4], (one.problem if one else "") or result])
     headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
     return row_table(REPRODUCED, headers, rows, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -14,7 +14,7 @@ from rich.text import Text
 
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.studies.stability.atlas import Findings
-from profilefit.studies.stability.cells import Cells, Region, Verdict
+from profilefit.studies.stability.cells import Region, Verdict
 from profilefit.studies.stability.fit_cases import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
 
 # Columns of the CSV, and what of a region they hold.
@@ -54,8 +54,12 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
     for region in (region for part in parts for region in part.regions):
         groups.setdefault((not region.verdict.is_red, region.advice), []).append(region)
     rows = sorted(groups.items(), key=lambda item: (item[0][0], -len({one.subject for one in item[1]})))
+    names = []
+    for subjects in ({one.subject for one in group} for _, group in rows):
+        name = next(iter(subjects)) if len(subjects) == 1 else f"{len(subjects)} of them"
+        names.append(name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…")
     columns = {
-        "of": [_among({one.subject for one in group}) for _, group in rows],
+        "of": names,
         "cells": [str(sum(one.count for one in group)) for _, group in rows],
         "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
         "what helps": [advice or BARE for (_, advice), _ in rows],
@@ -63,11 +67,6 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
     total = sum(one.codes.size for part in parts for one in part.cells)
     caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
     return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
-
-
-def _among(subjects: set[str]) -> str:
-    name = next(iter(subjects)) if len(subjects) == 1 else f"{len(subjects)} of them"
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def region_table(part: Findings, most: int = 20) -> RenderableType:
@@ -138,10 +137,8 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
         lines += [f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}" for one in part.fits if one.is_failure]
     ours = [part for part in parts if part.fits or any(one.own for one in part.cells)]
     broken = sum(part.failures > 0 for part in ours)
-    summary = (
-        f"{broken} of them with red cells inside their range" if broken else "none has a red cell inside its range"
-    )
-    lines.append(f"ours: {len(ours)} laws, maps and functions, {summary}")
+    red = f"{broken} of them with red cells inside their range" if broken else "none has a red cell inside its range"
+    lines.append(f"ours: {len(ours)} laws, maps and functions, {red}")
     own = [one for part in parts for one in part.cells if one.own]
     inside = sum(int(np.sum(one.inside)) for one in own)
     if aside := sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own):
@@ -164,17 +161,16 @@ def fits_csv(fits: Sequence[FitCase]) -> str:
 
 def content(parts: Sequence[Findings]) -> dict[str, Any]:
     """Return all of it for JSON."""
+    subjects = {}
+    for part in (part for part in parts if part.cells):
+        total = np.sum([np.bincount(one.codes.ravel(), minlength=len(Verdict)) for one in part.cells], axis=0)
+        subjects[part.name] = {one.words: int(total[one]) for one in Verdict}
     return {
         "passed": not any(part.failures for part in parts),
-        "subjects": {part.name: _counts(part.cells) for part in parts if part.cells},
+        "subjects": subjects,
         "regions": list(csv.DictReader(io.StringIO(regions_csv(parts)))),
         "fits": [vars(one) for part in parts for one in part.fits],
     }
-
-
-def _counts(cells: Sequence[Cells]) -> Mapping[str, int]:
-    total = np.sum([np.bincount(one.codes.ravel(), minlength=len(Verdict)) for one in cells], axis=0)
-    return {one.words: int(total[one]) for one in Verdict}
 
 
 def _csv(header: Iterable[str], rows: Iterable[Sequence[Any]]) -> str:

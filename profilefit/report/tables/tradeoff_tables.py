@@ -51,12 +51,7 @@ def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
 
 def _table(part: TradeoffPart, panel: Panel, notes: Sequence[str]) -> RenderableType:
     points = panel.points
-    columns = {
-        "": [f"{p.method}, {p.label}" if p.label else p.method for p in points],
-        panel.cost.split("[")[1].rstrip("]"): [with_spread(**vars(p.cost)) for p in points],
-        "error": [with_spread(**vars(p.error)) for p in points],
-        "worst": [ABSENT if p.worst is None else significant(p.worst.value) for p in points],
-    }
+    columns = point_columns(list(map(asdict, points)), panel.cost.split("[")[1].rstrip("]"))
     if any("standardised" in p.facts for p in points):
         columns["distance"] = [significant(float(p.facts["standardised"])) for p in points]
     columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
@@ -67,7 +62,17 @@ def _table(part: TradeoffPart, panel: Panel, notes: Sequence[str]) -> Renderable
     return column_table(title, columns, "\n".join((caption, *notes)), left=("", "stands"))
 
 
-def with_spread(value: float, low: float, high: float) -> str:
+def point_columns(points: Sequence[Mapping[str, Any]], cost: str = "cost") -> dict[str, list[str]]:
+    """Return names, costs, errors and worst errors of points as `as_numbers` has them, under their headers."""
+    return {
+        "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
+        cost: [_with_spread(**one["cost"]) for one in points],
+        "error": [_with_spread(**one["error"]) for one in points],
+        "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
+    }
+
+
+def _with_spread(value: float, low: float, high: float) -> str:
     """Return text such as 1.23 (1.20 … 1.31), or the number alone where it has no spread."""
     shown = significant(value, 3)
     return shown if low == high else f"{shown} ({significant(low)} … {significant(high)})"
@@ -78,7 +83,13 @@ def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
     comments = [f"{part.name}: {part.title}", *(f"{name}: {value}" for name, value in machine.items())]
     comments += [f"panel {p.name}: {p.title}; cost: {p.cost}; error, worst: {p.error}" for p in part.panels]
     comments += part.notes
-    rows = [_row(*one) for panel in part.panels for one in _standing(panel)]
+    rows = []
+    for point, standing in (one for panel in part.panels for one in _standing(panel)):
+        row = {"panel": point.panel, "method": point.method, "label": point.label}
+        for name in MEASURES:
+            one: WithSpread | None = getattr(point, name)
+            row |= {f"{name}{end}": "" if one is None else _text(getattr(one, at)) for end, at in ENDS.items()}
+        rows.append(row | {"standing": standing} | {name: _text(value) for name, value in point.facts.items()})
     columns = list(dict.fromkeys(column for row in rows for column in row))
     text = io.StringIO()
     text.writelines(f"# {line.replace('$', '')}\n" for line in comments)
@@ -105,14 +116,6 @@ def as_numbers(part: TradeoffPart) -> dict[str, Any]:
 
 def _standing(panel: Panel) -> list[tuple[Point, str]]:
     return list(zip(panel.points, standings(panel.points), strict=True))
-
-
-def _row(point: Point, standing: str) -> dict[str, str]:
-    row = {"panel": point.panel, "method": point.method, "label": point.label}
-    for name in MEASURES:
-        measured: WithSpread | None = getattr(point, name)
-        row |= {f"{name}{end}": "" if measured is None else _text(getattr(measured, at)) for end, at in ENDS.items()}
-    return row | {"standing": standing} | {name: _text(value) for name, value in point.facts.items()}
 
 
 def _text(value: float | int | str) -> str:

@@ -27,13 +27,14 @@ def test_three_scenes_are_predicted(context):
 def test_measured_error_is_known_where_nothing_is_blurred(context):
     """Lambert's error does not depend on the screen, and rises with the mean free path in pixels."""
     case = Case((0.6, 0.4, 0.2), (1.0, 0.7, 0.5), 0.5)
-    found = []
-    for size in ((64, 64), (96, 80)):
+
+    def error(case, size):
         with Measured(context, case, choose.SETTING, Within(), size) as view:
-            found.append(view.error(NOTHING))
-    assert found[0] == pytest.approx(found[1], rel=0.01)
-    with Measured(context, replace(case, pixel=4.0), choose.SETTING, Within(), (32, 64)) as view:
-        assert view.error(NOTHING) < 0.9 * found[0]
+            return view.error(NOTHING)
+
+    found = error(case, (64, 64))
+    assert found == pytest.approx(error(case, (96, 80)), rel=0.01)
+    assert error(replace(case, pixel=4.0), (32, 64)) < 0.9 * found
 
 
 @pytest.mark.slow

@@ -37,23 +37,18 @@ def test_furs_are_within_their_ends_and_the_same_again():
 
 
 def test_the_sum_leaves_out_what_no_way_serves():
-    one = Fur(0.1, 20.0, 45.0, 0.05)
-    found = [
-        *(Judged(one, "swept", 12, error, least) for error, least in ((0.049, 10), (0.051, 13), (0.05, 12))),
-        Judged(one, None, None, None, None),
-    ]
-    told = summary(found)
+    ways = [("swept", 12, error, least) for error, least in ((0.049, 10), (0.051, 13), (0.05, 12))]
+    told = summary([Judged(Fur(0.1, 20.0, 45.0, 0.05), *way) for way in (*ways, (None,) * 4)])
     assert (told["furs"], told["with a way"]) == (4, 3)
     assert told["within"] == pytest.approx(2 / 3)
     assert (told["median ratio"], told["mean ratio"]) == pytest.approx((1.0, (1.2 + 12 / 13 + 1.0) / 3))
 
 
 def test_it_prints_and_writes(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(fur_choose, "RAYS", 100)
-    monkeypatch.setattr(fur_choose, "PATCHES", 4)
-    monkeypatch.setattr(study, "RAYS", 50)
-    monkeypatch.setattr(study, "MOST", 16)
-    monkeypatch.setattr(fur_choose, "DEGREES", (0.0, 20.0))
+    few = {"RAYS": 100, "PATCHES": 4, "DEGREES": (0.0, 20.0)}
+    for module, sizes in ((fur_choose, few), (study, {"RAYS": 50, "MOST": 16})):
+        for name, size in sizes.items():
+            monkeypatch.setattr(module, name, size)
     path = tmp_path / "numbers.json"
     fur_choose.main(["--furs", "2", "--json", str(path)])
     told = json.loads(path.read_text(encoding="utf-8"))

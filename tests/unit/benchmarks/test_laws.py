@@ -1,4 +1,4 @@
-"""The tables of costs and errors, and the command that prints them."""
+"""The tables of laws' costs and errors, and of the step edge, small, and the commands that print them."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import profilefit
-from benchmarks import laws
+from benchmarks import laws, step_edge
 from profilefit.studies.tradeoff import laws as study
 from profilefit.studies.tradeoff.laws import PARTS, ContenderResult, LawSizes, counts
 from profilefit.studies.tradeoff.stopwatch import Ratio
@@ -43,3 +43,19 @@ def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     assert hazard["setup_nanoseconds"] > 0
     assert hazard["rel"]["worst"] < 0.01 < 0.05 < content["Liang, corrected"]["rel"]["worst"]
     assert "profile" not in content["hazard, two steps"]["time_ratio"]
+
+
+@pytest.mark.slow
+def test_the_step_edge_prints_and_writes(monkeypatch, tmp_path, capsys):
+    absent = ("absent", "gaussians", "no-such-set")
+    wanted = {"searchlight": (("hazard", "hazard", "regenerated"), ("Liang, printed", "liang", "published"), absent)}
+    monkeypatch.setattr(step_edge, "WANTED", wanted)
+    monkeypatch.setattr(step_edge, "ALPHAS", (0.8,))
+    numbers = tmp_path / "numbers.json"
+    step_edge.main(["--samples", "16", "--trials", "100", "--json", str(numbers)])
+    printed = capsys.readouterr().out
+    assert "left out: absent: constants must be" in printed
+    assert "16 lattice samples under searchlight light" in printed
+    found = json.loads(numbers.read_text())["laws"]["searchlight"]
+    assert found["hazard"]["bias"][0] < 0.003 < 0.1 < found["Liang, printed"]["bias"][0]
+    assert abs(found["hazard"]["random"][0] - 1.0) < 0.05 < found["exact, uniform radii"]["random"][0] - 1.0

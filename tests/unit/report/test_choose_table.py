@@ -2,19 +2,12 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
 from mcml_sim import Setting
-from profilefit.report.tables.choose_table import (
-    choose_table,
-    content,
-    fur_content,
-    fur_lines,
-    headline,
-    sea_content,
-    sea_lines,
-)
+from profilefit.report.tables import choose_table as tables
 from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
@@ -31,6 +24,16 @@ SAMPLED = Option("sampled", 64, name="hazard-diffuse")
 LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6, 0.003)
 
 
+def words(choice, *layers):
+    """The table, its lines joined."""
+    return " ".join(rendered([tables.choose_table(choice, shipped(), layers)], 100).split())
+
+
+def data(choice, *layers):
+    """The content as a reader of the JSON has it."""
+    return json.loads(json.dumps(tables.content(choice, shipped(), layers)))
+
+
 @pytest.fixture(scope="module")
 def choice():
     errors = [(0.1, 0.1, 0.0, 0.001, 0.0, 0), (0.012, 0.01, 0.006, 0.001, 0.0, 1), (0.008, 0.0, 0.0, 0.001, 0.008, 2)]
@@ -41,68 +44,65 @@ def choice():
 
 
 def test_says_it_in_one_line_and_why(choice):
-    text = rendered([choose_table(choice, shipped(), (LAYER,))], 100)
+    text = rendered([tables.choose_table(choice, shipped(), (LAYER,))], 100)
     chosen = "The cheapest option within tolerance and budget: separable, 17 taps (requested: 2.0 % within 4 ms)"
     assert text.splitlines()[0] == chosen
-    rows = {line[:12]: line for line in text.splitlines()}
-    assert "nothing (Lambert)" in rows["best cheaper"]
-    assert "no: error" in rows["best cheaper"]
-    assert "1.2" in rows["chosen      "]
-    assert "yes" in rows["chosen      "]
-    assert "no: ms" in rows["next dearer "]
-    assert "4.0 to 8.0" in rows["next dearer "]
-    assert "worst: green, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
-    assert "the best cheaper: red, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
-    assert "one layer is enough" in text
-    assert "n = 1.4." in text
-    assert "an estimate of a frame on a gtx-1050" in text
+    rows = {line[:12].strip(): line for line in text.splitlines()}
+    cells = {
+        "best cheaper": ("nothing (Lambert)", "no: error"),
+        "chosen": ("1.2", "yes"),
+        "next dearer": ("no: ms", "4.0 to 8.0"),
+    }
+    assert [cell for name, some in cells.items() for cell in some if cell not in rows[name]] == []
+    told = [
+        *("worst: green, pixel 0.10 mm, radius 5.0 mm; mostly its shape.", "one layer is enough", "n = 1.4."),
+        "the best cheaper: red, pixel 0.10 mm, radius 5.0 mm; mostly its shape.",
+        "an estimate of a frame on a gtx-1050",
+    ]
+    assert [one for one in told if one not in text] == []
 
 
-def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
+@pytest.mark.parametrize(("error", "verdict"), [(0.014, "enough"), (0.017, "enough alone"), (0.03, "not enough")])
+def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice, error, verdict):
     """0.012 of 0.02 leaves 0.016, in squares."""
-    verdicts = {}
-    for error in (0.014, 0.017, 0.03):
-        layer = OneLayer(**{**vars(LAYER), "error": error, "standard_error": 0.0005})
-        verdicts[error] = content(choice, shipped(), (layer,))["one_layer"]["verdict"]
-    assert verdicts == {0.014: "enough", 0.017: "enough alone", 0.03: "not enough"}
+    layer = replace(LAYER, error=error, standard_error=0.0005)
+    assert data(choice, layer)["one_layer"]["verdict"] == verdict
 
 
 def test_the_worst_of_three_colours_is_told(choice):
     """Its verdict counts first, then its error; all three as data."""
     errors = {"red": (0.014, 0.0005), "green": (0.021, 0.0001), "blue": (0.022, 0.002)}
-    layers = [OneLayer(0.4, 0.9, 1.2, 1.4, error, spread, 10**6, 0.003) for error, spread in errors.values()]
-    text = " ".join(rendered([choose_table(choice, shipped(), layers)], 100).split())
+    layers = [replace(LAYER, error=error, standard_error=spread) for error, spread in errors.values()]
+    text = words(choice, *layers)
     assert "Layers, of three colours, green the worst: one layer is not enough: " in text
     assert "is off by 2.1 ± 0.010 %" in text
-    made = json.loads(json.dumps(content(choice, shipped(), layers)))["one_layer"]
-    assert [(one["channel"], one["error"], one["verdict"]) for one in made] == [
-        ("red", 0.014, "enough"),
-        ("green", 0.021, "not enough"),
-        ("blue", 0.022, "undecided"),
-    ]
-    alike = rendered([choose_table(choice, shipped(), layers[:1] * 3)], 100)
-    assert "Layers, of three colours, red the worst: one layer is enough." in " ".join(alike.split())
+    made = [(one["channel"], one["error"], one["verdict"]) for one in data(choice, *layers)["one_layer"]]
+    assert made == [("red", 0.014, "enough"), ("green", 0.021, "not enough"), ("blue", 0.022, "undecided")]
+    assert "Layers, of three colours, red the worst: one layer is enough." in words(choice, *layers[:1] * 3)
 
 
-def test_says_when_nothing_serves(choice):
-    scarce = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=1.0)}), choice.predicted)
-    assert headline(scarce).startswith(
-        "No option meets 2.0 % within 1 ms: the cheapest within the tolerance is separable"
-    )
-    strict = chosen(Requirements(**{**vars(SCENE), "tolerance": 0.001, "budget": Budget()}), choice.predicted)
-    assert headline(strict) == "No option meets 0.10 %: the most accurate is hazard-diffuse, 64 samples"
+@pytest.mark.parametrize(
+    ("changed", "answer"),
+    [
+        ({"budget": Budget(ms=1.0)}, "2.0 % within 1 ms: the cheapest within the tolerance is separable, 17 taps"),
+        ({"tolerance": 0.001, "budget": Budget()}, "0.10 %: the most accurate is hazard-diffuse, 64 samples"),
+    ],
+    ids=["scarce", "strict"],
+)
+def test_says_when_nothing_serves(choice, changed, answer):
+    assert tables.headline(chosen(replace(SCENE, **changed), choice.predicted)) == f"No option meets {answer}"
 
 
 def test_a_budget_within_the_range_is_likely_kept(choice):
     """3.0 ms, but 3.5 at worst."""
-    tight = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=3.2)}), choice.predicted)
-    text = rendered([choose_table(tight, shipped())], 100)
+    tight = chosen(replace(SCENE, budget=Budget(ms=3.2)), choice.predicted)
+    text = rendered([tables.choose_table(tight, shipped())], 100)
     assert "likely" in next(line for line in text.splitlines() if line.startswith("chosen"))
-    assert "likely: the estimate is within the budget" in " ".join(text.split())
+    assert "likely: the estimate is within the budget" in words(tight)
 
 
 def test_as_data(choice):
-    made = json.loads(json.dumps(content(choice, shipped(), (LAYER,))))
+    made = data(choice, LAYER)
     assert made["chosen"] == "separable, 17 taps"
     assert [one["ms"] for one in made["options"]] == [2.0, 3.0, 5.0]
     assert made["options"][2]["ms_range"] == [4.0, 8.0]
@@ -113,12 +113,12 @@ def test_as_data(choice):
 
 def test_what_a_sea_needs_and_why():
     need = SeaNeed({"single": 0.34, "scaled": 0.056}, focus=0.8, light=1.2, view=0.25)
-    assert sea_lines(need) == [
+    assert tables.sea_lines(need) == [
         "terms: scaled; off the broadened haze at worst: single 34 %, scaled 5.6 % (requested: 10 %)",
         "splat: faces; no light folds before the floor (F 0.80)",
         "steps to a hit: sunlight 8 (S 1.2), views none, Newton alone (S 0.25)",
     ]
-    assert sea_content(need) == {
+    assert tables.sea_content(need) == {
         "terms": "scaled",
         "haze": {"single": 0.34, "scaled": 0.056},
         "tolerance": 0.1,
@@ -136,17 +136,16 @@ def test_what_fur_needs_and_which_way():
         75: dict(zip(names, (None, None, None, 34, 20), strict=True)),
     }
     need = FurNeed(layers, 0.05)
-    assert fur_lines(need) == [
+    assert tables.fur_lines(need) == [
         "45 degrees: linear 168, quadratic none, fitted none, swept 11, swept two strands 9; cheapest: swept",
         "75 degrees: linear none, quadratic none, fitted none, swept 34, swept two strands 20; "
         "cheapest: swept two strands",
         "swept two strands, 20 layers: the cheapest to 75 degrees (requested: 5.0 % of the length)",
     ]
-    told = fur_content(need)
+    told = tables.fur_content(need)
     assert (told["way"], told["layers"], told["angle"], told["most"]) == ("swept, two strands", 20, 75, 256)
     assert told["by_angle"][0] == {"angle": 45, "layers": layers[45], "cheapest": "swept"}
     none = FurNeed({75: dict.fromkeys(names)}, 0.05)
-    assert fur_lines(none)[-1] == (
-        "no way is within the tolerance at 75 degrees, by 256 layers (requested: 5.0 % of the length)"
-    )
-    assert fur_content(none)["way"] is None
+    answer = "no way is within the tolerance at 75 degrees, by 256 layers (requested: 5.0 % of the length)"
+    assert tables.fur_lines(none)[-1] == answer
+    assert tables.fur_content(none)["way"] is None

@@ -1,4 +1,4 @@
-"""Figures inside a page: every text as it was, colours by name, ids apart, places to a tenth of a point."""
+"""Figures and tables inside a page: every text and cell as it was, what is special escaped, colours by name."""
 
 import base64
 import io
@@ -8,13 +8,20 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from PIL import Image
+from rich.console import Group
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
 
 from profilefit.report.drawing import VARIABLES, address, checked, classed, inline
 from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
+from profilefit.report.page.markup import command, details, markup, section
+from profilefit.report.tables.cells import column_table
 
 
+@pytest.fixture(scope="module")
 @styled
-def drawn() -> str:
+def original():
     figure = canvas(2.0, 3.0)
     ax = figure.subplots()
     ax.plot([0.0123, 1.9876], [0.05, 0.95], color=BLUE, marker="o", label="R$_d$ of 0.0544")
@@ -28,47 +35,37 @@ def drawn() -> str:
 
 
 @pytest.fixture(scope="module")
-def original():
-    return drawn()
-
-
-@pytest.fixture(scope="module")
 def page(original):
     return inline(original, "first", "A <title>")
 
 
-def texts(svg: str) -> str:
-    found = ET.fromstring(svg[svg.index("<svg") : svg.rindex("</svg>") + 6])
-    return "|".join("".join("".join(one.itertext()).split()) for one in found.iter() if one.tag.endswith("text"))
+def elements(svg: str, *tags: str) -> list[ET.Element]:
+    """The elements of a drawing whose tags end so."""
+    root = ET.fromstring(svg[svg.index("<svg") : svg.rindex("</svg>") + 6])
+    return [one for one in root.iter() if one.tag.endswith(tags)]
 
 
-def test_every_text_stays_as_it_was(original, page):
-    assert texts(page) == texts(original)
-    assert "α=0.0591<1" in texts(page)
-    assert "0.0544" in texts(page)
+def test_every_text_stays_as_it_was_letters_of_a_formula_with_a_place_each(original, page):
+    before, after = ("|".join("".join("".join(one.itertext()).split()) for one in elements(svg, "text"))
+                     for svg in (original, page))  # fmt: skip
+    assert before == after
+    assert "α=0.0591<1" in after
+    assert "0.0544" in after
+    spans = re.findall(r'<tspan [^>]*?x="([^"]*)"[^>]*>([^<]*)</tspan>', page)
+    assert len(spans) == len(re.findall(r"<tspan [^>]*>[^<]*</tspan>", page))
+    assert any(" " in places for places, _ in spans)
+    assert [len(places.split()) for places, _ in spans] == [len(letters) for _, letters in spans]
 
 
-def test_letters_of_a_formula_are_one_text_with_a_place_each(page):
-    together = [places for places in re.findall(r'<tspan x="([^"]*)"', page) if " " in places]
-    assert together
-    for tspan in re.findall(r"<tspan [^>]*>[^<]*</tspan>", page):
-        places, letters = re.search(r'x="([^"]*)"', tspan)[1].split(), re.search(r">([^<]*)<", tspan)[1]
-        assert len(places) == len(letters)
-
-
-def test_colours_are_the_pages_own(page):
-    assert "var(--blue)" in page
-    assert "var(--muted)" in page
-    assert not [colour for colour in VARIABLES if colour.lower() in page.lower()]
+def test_colours_and_title_are_the_pages_own_and_what_nobody_sees_is_left_out(page):
+    assert [one for one in ("var(--blue)", "var(--muted)", 'aria-label="A &lt;title&gt;"') if one not in page] == []
+    assert [one for one in ("<metadata>", "<style", *VARIABLES) if one.lower() in page.lower()] == []
 
 
 def test_ids_have_the_figures_prefix_and_are_all_there(original, page):
     used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', page))
-    assert used
-    assert all(one.startswith("first-") for one in used)
-    assert used == set(re.findall(r' id="([^"]*)"', page))
-    other = inline(original, "second", "B")
-    assert not used & set(re.findall(r' id="([^"]*)"', other))
+    assert used == set(re.findall(r' id="(first-[^"]*)"', page)) == set(re.findall(r' id="([^"]*)"', page)) > set()
+    assert not used & set(re.findall(r' id="([^"]*)"', inline(original, "second", "B")))
 
 
 def corners(d: str) -> list[np.ndarray]:
@@ -86,10 +83,8 @@ def corners(d: str) -> list[np.ndarray]:
 
 def lines(svg: str) -> list[np.ndarray]:
     """The points (n, 2) of every line and curve, wherever it is drawn."""
-    root = ET.fromstring(svg[svg.index("<svg") : svg.rindex("</svg>") + 6])
-    paths = [one for one in root.iter() if one.tag.endswith("path")]
+    paths, uses = elements(svg, "path"), elements(svg, "use")
     shapes = {f"#{one.get('id')}": one.get("d") for one in paths}
-    uses = [one for one in root.iter() if one.tag.endswith("use")]
     links = [one.get("href") or one.get("{http://www.w3.org/1999/xlink}href") for one in uses]
     drawn = [(one.get("d"), 0.0, 0.0) for one in paths if one.get("style", "") and "id" not in one.attrib]
     drawn += [(shapes[link], *(one.get(key, "0") for key in "xy")) for link, one in zip(links, uses, strict=True)]
@@ -103,12 +98,6 @@ def test_every_line_is_where_it_was(original, page):
     for line in before:
         assert min(np.max(np.abs(line - one)) for one in after if one.shape == line.shape) < 0.101
     assert len(page) < 0.6 * len(original)
-
-
-def test_what_nobody_sees_is_left_out_and_a_screen_reader_hears_the_title(page):
-    assert "<metadata>" not in page
-    assert "<style" not in page
-    assert 'aria-label="A &lt;title&gt;"' in page
 
 
 def test_a_figure_without_a_frame_is_refused():
@@ -184,3 +173,50 @@ def test_a_photograph_may_lose_what_nobody_sees():
     assert len(small) < 0.5 * len(exactly)
     shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(small.split(",")[1])))).astype(float)
     assert np.sqrt(np.mean((shown - pixels) ** 2)) < 5
+
+
+# Tables
+
+
+def cells(html: str, tag: str) -> list[str]:
+    return ["".join(one.itertext()) for one in ET.fromstring(f"<x>{html.replace('<br>', ' ')}</x>").iter(tag)]
+
+
+def test_a_table_has_its_title_headers_cells_and_caption_in_order():
+    """Numbers stand to the right, and long texts may wrap."""
+    columns = {"": ["a<b", "c"], "x [mm]": ["1", "2"], "long": ["many words", "more"]}
+    html = markup(column_table("Title", columns, "told & done", fold=("long",)))
+    assert cells(html, "th") == list(columns)
+    assert cells(html, "td") == ["a<b", "1", "many words", "c", "2", "more"]
+    assert cells(html, "p") == ["Title", "told & done"]
+    assert html.index("Title") < html.index("<table>") < html.index("told &amp; done")
+    found = ET.fromstring(f"<x>{html}</x>")
+    assert [one.get("class") for one in found.iter("td")] == [None, "number", "text"] * 2
+
+
+def test_styles_become_classes_and_lines_breaks():
+    html = markup(Text.assemble(("name", "bold"), "\n", ("FAILED", "bold red"), " <why>"))
+    assert html == '<p><span class="bold">name</span><br><span class="bold red">FAILED</span> &lt;why&gt;</p>'
+
+
+def test_a_table_of_facts_has_no_head_and_groups_are_taken_apart():
+    table = Table(show_header=False, title="Fit")
+    table.add_column()
+    table.add_row(Text("converged", style="green"))
+    html = markup(Group(Padding(table, 1), "and a line"))
+    assert "<thead>" not in html
+    assert cells(html, "td") == ["converged"]
+    assert cells(html, "p") == ["Fit", "and a line"]
+    assert '<span class="green">converged</span>' in html
+
+
+def test_what_is_no_table_is_refused():
+    with pytest.raises(TypeError, match="texts, tables and groups, got int"):
+        markup(3)  # type: ignore[arg-type]
+
+
+def test_commands_titles_and_ids_are_escaped():
+    assert "a &amp;&amp; b" in command("a && b")
+    assert section("here", "A < B", ["x"]).startswith('<section id="here"><h2>A &lt; B</h2>')
+    assert '<details id="it"><summary>more</summary>' in details("more", "x", "it")
+    assert '<details open=""><summary>more</summary>' in details("more", "x", is_open=True)

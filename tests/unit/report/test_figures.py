@@ -23,15 +23,11 @@ pytestmark = pytest.mark.slow
 SHIPPED = catalogue.fits_folder()
 SMALL_CORNER = "corner-albedo-liang"
 # Every kind of figure once: corner plots differ in nothing but their record, nor does (15) from (11) but in its letter.
-OF_RECORDS = (
-    SMALL_CORNER,
-    "residuals-albedo-liang",
-    "residuals-burley-whole",
-    "residuals-quantile",
-    "quality-liang-whole",
+EACH_KIND = (
+    *("liang-7-profile", "liang-11-a", "liang-13-b", "constants", "quality", "quality-liang-whole", SMALL_CORNER),
+    *("residuals-albedo-liang", "residuals-burley-whole", "residuals-quantile"),
 )
 DEAR = ("liang-7-error", "liang-8-albedo", "liang-19-inverse", "inversion-error")
-EACH_KIND = ("liang-7-profile", "liang-11-a", "liang-13-b", "constants", "quality", *OF_RECORDS)
 # Cheap ones of each layout, drawn again.
 AGAIN = ("liang-11-a", "quality", SMALL_CORNER)
 
@@ -51,30 +47,25 @@ def drawn(source, tmp_path_factory):
     return files, before, dict(matplotlib.rcParams)
 
 
-def folder_with(tmp_path, *names):
+def folder_with(tmp_path, *names, edit=lambda content: None):
+    """A folder of these records, the content of each changed by `edit`."""
     folder = tmp_path / "records"
     folder.mkdir()
     for name in names:
-        for suffix in (".json", ".npz"):
-            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
+        content = json.loads((SHIPPED / f"{name}.json").read_text())
+        edit(content)
+        (folder / f"{name}.json").write_text(json.dumps(content))
+        shutil.copy(SHIPPED / f"{name}.npz", folder)
     return folder
 
 
-def change(folder, name, edit):
-    path = folder / f"{name}.json"
-    content = json.loads(path.read_text())
-    edit(content)
-    path.write_text(json.dumps(content))
-
-
 def test_every_kind_is_there_as_png_and_svg_and_nothing_else(drawn):
-    files, _, _ = drawn
+    files, before, after = drawn
     assert {file.name for file in files} == {f"{name}.{kind}" for name in EACH_KIND for kind in ("png", "svg")}
     assert set(files[0].parent.iterdir()) == set(files)  # no temporary file is left
-
-
-def test_png_is_1200_pixels_wide_with_ink_that_nowhere_touches_its_edge(drawn):
-    require_whole(drawn[0])
+    require_whole(files)
+    assert before == after, "matplotlib is as it was"
+    assert plt.get_fignums() == []
 
 
 def test_the_dear_ones_are_whole_too(source, tmp_path):
@@ -85,7 +76,7 @@ def test_the_dear_ones_are_whole_too(source, tmp_path):
 
 
 def require_whole(files):
-    """Text that did not fit would be cut at the edge, and leave ink there."""
+    """A PNG is 1200 pixels wide; text that did not fit would be cut at the edge, and leave ink there."""
     for file in (file for file in files if file.suffix == ".png"):
         pixels = matplotlib.image.imread(file)[..., :3]
         assert pixels.shape[1] == 1200, file.name
@@ -95,27 +86,22 @@ def require_whole(files):
         assert np.all(edges > 0.99), file.name
 
 
-def test_svg_carries_no_date_and_is_the_same_twice(drawn, source, tmp_path):
-    first = {file.name: file.read_bytes() for file in drawn[0] if file.suffix == ".svg"}
+def test_svg_carries_text_and_no_date_and_is_the_same_twice_and_one_format_may_be_enough(drawn, source, tmp_path):
+    first = {file.stem: file.read_bytes() for file in drawn[0] if file.suffix == ".svg"}
     assert not any(b"<dc:date>" in text for text in first.values())
-    for plan in plans(source):
-        if plan.name in AGAIN:
-            plan.draw(source, tmp_path, name=plan.name)
-            assert (tmp_path / f"{plan.name}.svg").read_bytes() == first[f"{plan.name}.svg"]
-
-
-def test_text_in_an_svg_is_text_and_one_format_may_be_enough(drawn, source, tmp_path):
-    (svg,) = (file for file in drawn[0] if file.name == "quality.svg")
-    assert ">gaussians-4</text>" in svg.read_text(encoding="utf-8")
-    (plan,) = (plan for plan in plans(source) if plan.name == SMALL_CORNER)
+    assert b">gaussians-4</text>" in first["quality"]
+    again = {plan.name: plan for plan in plans(source) if plan.name in AGAIN}
+    for name, plan in again.items():
+        plan.draw(source, tmp_path, name=name)
+        assert (tmp_path / f"{name}.svg").read_bytes() == first[name]
     with only("svg"):
-        assert plan.draw(source, tmp_path, name="one") == [tmp_path / "one.svg"]
-    assert [file.name for file in tmp_path.iterdir()] == ["one.svg"]
+        assert again[SMALL_CORNER].draw(source, tmp_path / "one", name="one") == [tmp_path / "one" / "one.svg"]
+    assert [file.name for file in (tmp_path / "one").iterdir()] == ["one.svg"]
 
 
 def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
-    folder = folder_with(tmp_path, "albedo-liang")
-    change(folder, "albedo-liang", lambda c: [one.update(jackknife_error=None) for one in c["constants"].values()])
+    none = {"jackknife_error": None}
+    folder = folder_with(tmp_path, "albedo-liang", edit=lambda c: [one.update(none) for one in c["constants"].values()])
     with only("svg"):
         files, _ = draw_all(folder, tmp_path / "out", ["albedo-liang"])
     assert tmp_path / "out" / f"{SMALL_CORNER}.svg" in files
@@ -125,10 +111,10 @@ def test_a_corner_of_many_constants_shows_the_most_correlated(source, tmp_path):
     with only("svg"):
         (file,) = corner_figure("hazard-refracting", source, tmp_path)
     svg, samples = file.read_text(encoding="utf-8"), source.needed("hazard-refracting").arrays["samples_misfit"]
-    shown = [name for name in source.content("hazard-refracting")["covariance"]["names"] if f">{name}</text>" in svg]
+    names = source.content("hazard-refracting")["covariance"]["names"]
+    shown = [name for name in names if f">{name}</text>" in svg]
     assert len(shown) == 12
     assert "the 12 of 32 constants" in svg
-    names = source.content("hazard-refracting")["covariance"]["names"]
     joint = np.abs(np.corrcoef(samples.astype(float), rowvar=False)) - np.eye(len(names))
     first, second = np.unravel_index(joint.argmax(), joint.shape)
     assert {names[first], names[second]} <= set(shown)
@@ -155,16 +141,9 @@ def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name, tmp_path
     assert 1e-4 < np.max(np.abs(left)) < 3e-3
 
 
-def test_drawing_leaves_matplotlib_as_it_was(drawn):
-    _, before, after = drawn
-    assert before == after
-    assert plt.get_fignums() == []
-
-
 def test_what_cannot_be_drawn_is_listed(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
     fit = {"result": "no fit", "steps": 9, "condition_number": 1.0, "residuals": {}}
-    change(folder, "burley-whole", lambda content: content.update(posterior={}, fit=fit))
+    folder = folder_with(tmp_path, "burley-whole", edit=lambda content: content.update(posterior={}, fit=fit))
     files, left_out = draw_all(folder, tmp_path / "out")
     assert [file.name for file in files] == ["quality.png", "quality.svg"]
     assert len(left_out) == len(PAPER) + 4
@@ -182,8 +161,11 @@ def test_names_choose_the_figures_that_show_them(tmp_path):
 
 
 def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
-    change(folder, "burley-whole", lambda content: [c.pop("regenerated") for c in content["constants"].values()])
+    def edit(content):
+        for one in content["constants"].values():
+            one.pop("regenerated")
+
+    folder = folder_with(tmp_path, "burley-whole", edit=edit)
     with pytest.raises(RecordError, match=r"is damaged: constants\.s0\.regenerated must be a number, got nothing"):
         draw_all(folder, tmp_path / "out")
     shutil.copy(SHIPPED / "burley-whole.json", folder)
@@ -193,30 +175,31 @@ def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
     (tmp_path / "out").write_text("a file")
     with pytest.raises(OutputError, match=r"cannot write into .*out: "):
-        draw_all(folder, tmp_path / "out")
+        draw_all(folder_with(tmp_path, "burley-whole"), tmp_path / "out")
 
 
 def test_band_is_the_quantiles_of_laws_evaluated_one_by_one(source):
     """The slow twin: a law for each draw."""
     fitted = next(f for f in map(source.usable, ("liang-whole", "liang-as-published")) if f is not None)
-    alpha = np.array([0.2, 0.9, 0.995])
-    band = fitted.band(lambda law: coefficients(law, alpha)[2])
+
+    def c_of(law):
+        return coefficients(law, np.array([0.2, 0.9, 0.995]))[2]
+
+    low, high = fitted.band(c_of)
     samples = fitted.arrays["samples_misfit"].astype(float)
     names = tuple(fitted.content["covariance"]["names"])
     some = samples[np.linspace(0, len(samples) - 1, DRAWS).astype(int)]
-    one_by_one = [coefficients(fitted.law.with_vector(names, list(map(float, draw))), alpha)[2] for draw in some]
-    np.testing.assert_allclose(band, np.quantile(one_by_one, [0.025, 0.975], axis=0), rtol=1e-12)
+    one_by_one = [c_of(fitted.law.with_vector(names, list(map(float, draw)))) for draw in some]
+    np.testing.assert_allclose((low, high), np.quantile(one_by_one, [0.025, 0.975], axis=0), rtol=1e-12)
     # Negative control: the fit itself lies inside, and the band has a width.
-    assert np.all((band[0] < coefficients(fitted.law, alpha)[2]) & (coefficients(fitted.law, alpha)[2] < band[1]))
+    assert np.all((low < c_of(fitted.law)) & (c_of(fitted.law) < high))
 
 
 def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
-    change(folder, "burley-whole", lambda content: content["fit"].update(result="no convergence"))
-    here = Source(folder)
+    failed = {"result": "no convergence"}
+    here = Source(folder_with(tmp_path, "burley-whole", edit=lambda content: content["fit"].update(failed)))
     assert here.usable("burley-whole") is None
     assert here.fitted("burley-whole").band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
     assert here.fitted("liang-whole") is None
@@ -225,9 +208,7 @@ def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
 
 
 def test_a_record_without_covariance_is_drawn_without_what_rests_on_it(tmp_path):
-    folder = folder_with(tmp_path, "burley-whole")
-    change(folder, "burley-whole", lambda content: content.pop("covariance"))
-    source = Source(folder)
+    source = Source(folder_with(tmp_path, "burley-whole", edit=lambda content: content.pop("covariance")))
     fitted = source.needed("burley-whole")
     assert fitted.band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
     assert LawWithErrors.of_record(fitted.law, fitted.content, fitted.arrays).discrepancy is None

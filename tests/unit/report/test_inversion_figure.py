@@ -2,18 +2,14 @@
 
 import json
 import shutil
+from itertools import product
 
 import numpy as np
 import pytest
 
 from profilefit.recipes import catalogue
+from profilefit.report.figures import paper_figures as figures
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.paper_figures import (
-    draw_inversion,
-    inversion_caption,
-    inversion_figure,
-    inversion_points,
-)
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
@@ -23,10 +19,8 @@ SHIPPED = catalogue.fits_folder()
 def folder(tmp_path_factory):
     """The paper's inverse and one other, the printed one with errors that a reader can check."""
     folder = tmp_path_factory.mktemp("records")
-    for path in (
-        SHIPPED / f"{name}{kind}" for name in ("liang-inverse-whole", "quantile") for kind in (".json", ".npz")
-    ):
-        shutil.copy(path, folder)
+    for name, kind in product(("liang-inverse-whole", "quantile"), ("json", "npz")):
+        shutil.copy(SHIPPED / f"{name}.{kind}", folder)
     content = json.loads((folder / "liang-inverse-whole.json").read_text())
     content["quality"]["alpha"] = [0.1, 0.3, 0.5, 0.8, 0.9]
     for which in ("published", "regenerated"):
@@ -35,25 +29,22 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_caption_says_where_the_printed_inverse_is_worst(folder):
-    caption = inversion_caption(Source(folder))
+def test_caption_says_where_the_printed_inverse_is_worst_and_lines_are_the_records_own_numbers(folder):
+    source = Source(folder)
+    caption = figures.inversion_caption(source)
     assert "up to 0.07 for α in [0.4, 0.6]" in caption
     assert caption.endswith("0.04 at α = 0.1, 0.083 at α = 0.9")
-
-
-def test_lines_are_the_records_own_numbers(folder):
-    source = Source(folder)
     ax = canvas(2.0).subplots()
     for name in ("liang-inverse-whole", "quantile", "hazard-diffuse"):
-        draw_inversion(ax, source, name)
+        figures.draw_inversion(ax, source, name)
     labels = [line.get_label() for line in ax.get_lines()]
     assert labels == ["(19)-(21) as printed", "(19)-(21) regenerated", "rational in −ln(1 − ξ)"]
     np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), [0.04, 0.02, 0.07, 0.05, 0.083])
-    alpha, error = inversion_points(source.fitted("quantile"))
+    alpha, error = figures.inversion_points(source.fitted("quantile"))
     np.testing.assert_array_equal(ax.get_lines()[2].get_xydata(), np.column_stack([alpha, error]))
     assert np.all(error <= 1e-3)
 
 
 def test_it_is_drawn_without_the_records_that_it_only_uses(folder, tmp_path):
-    files = inversion_figure(Source(folder), tmp_path)
+    files = figures.inversion_figure(Source(folder), tmp_path)
     assert {file.name for file in files} == {"inversion-error.png", "inversion-error.svg"}

@@ -1,8 +1,9 @@
-"""The tables say what the records say, to the digits that the errors leave, on any screen."""
+"""Tables, on any screen and in Markdown, say what the records say, to the digits that the errors leave."""
 
 import copy
 import io
 import math
+import re
 from collections import Counter
 
 import numpy as np
@@ -12,10 +13,12 @@ from rich.console import Console
 from profilefit.recipes import catalogue, record
 from profilefit.report.records import converged, known_errors, largest_error, z_score
 from profilefit.report.tables import cells, quality_tables, record_tables
+from profilefit.report.tables.markdown import markdown_constants, sections
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
 FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
 REASON = "no convergence in 2000 steps: constants trade against each other"
+GAPS = (None, math.nan, math.inf, 0.0, -1.0)  # no positive numbers
 
 
 def rendered(parts, width: int) -> str:
@@ -25,33 +28,35 @@ def rendered(parts, width: int) -> str:
     return console.file.getvalue()
 
 
-def failed(content: dict) -> dict:
-    """The same record, had its fit failed."""
-    other = copy.deepcopy(content)
-    other["fit"]["result"] = REASON
-    other["posterior"] = {}
-    for constant in other["constants"].values():
-        constant.pop("intervals", None)
-    return other
+def words(part, width: int = 100) -> str:
+    """What stands there, its lines joined."""
+    return " ".join(rendered([part], width).split())
+
+
+def narrow(parts, width: int) -> str:
+    """The text, of which no word is cut, abbreviated or broken inside a number: lines only end elsewhere."""
+    text = rendered(parts, width)
+    assert max(map(len, text.splitlines())) <= width
+    assert Counter(text.split()) == Counter(rendered(parts, 400).split())
+    return text
+
+
+def rounding(constant: dict) -> float:
+    """Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200."""
+    return max(0.05 * (largest_error(constant) or 0.0), 0.005 * abs(constant["regenerated"]))
 
 
 @pytest.mark.parametrize("width", [100, 80])
 @pytest.mark.parametrize("name", RECORDS)
 def test_a_narrow_screen_loses_and_breaks_nothing(name, width):
-    """Lines may end elsewhere, but between the same words: none is cut, abbreviated or broken inside a number."""
-    parts = record_tables.record_tables(RECORDS[name])
-    narrow = rendered(parts, width)
-    assert max(map(len, narrow.splitlines())) <= width
-    assert Counter(narrow.split()) == Counter(rendered(parts, 400).split())
+    narrow(record_tables.record_tables(RECORDS[name]), width)
 
 
 @pytest.mark.parametrize("width", [100, 80])
 def test_the_summary_fits_and_names_every_record(width):
-    text = rendered([record_tables.summary(RECORDS)], width)
-    assert max(map(len, text.splitlines())) <= width
+    text = narrow([record_tables.summary(RECORDS)], width)
+    assert [name for name in RECORDS if name not in text] == []
     assert "…" not in text
-    assert all(name in text for name in RECORDS)
-    assert Counter(text.split()) == Counter(rendered([record_tables.summary(RECORDS)], 400).split())
 
 
 @pytest.mark.parametrize("name", FITS)
@@ -68,9 +73,7 @@ def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
         published, regenerated, z = shown.pop("published", "–"), shown.pop("regenerated"), shown.pop("z", "–")
         score = z_score(values)
         assert z == "–" if score is None else float(z) == pytest.approx(score, rel=0.05, abs=0.05)
-        value, error = values["regenerated"], largest_error(values)
-        # Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200.
-        assert abs(float(regenerated) - value) <= max(0.05 * (error or 0.0), 0.005 * abs(value))
+        assert abs(float(regenerated) - values["regenerated"]) <= rounding(values)
         assert published == "–" if values["published"] is None else float(published) == values["published"]
         if not values["free"]:
             assert list(shown.values()) == ["held", *["–"] * (len(known) - 1)]
@@ -94,14 +97,16 @@ def test_quality_shows_the_mean_and_the_worst_of_every_set(name):
 
 def test_a_failed_fit_says_why_wherever_it_is_shown():
     name, content = next(item for item in FITS.items() if "rel" in item[1]["quality"]["regenerated"])
-    broken = failed(content)
-    detail = rendered(record_tables.record_tables(broken), 100)
-    assert detail.count("FAILED") == 1 + sum("FAILED" in line for line in _stages(content))
-    assert REASON in " ".join(detail.split())
-    assert "No credible intervals" in detail
-    assert "no law" in " ".join(detail.split())
-    assert REASON in " ".join(rendered([record_tables.summary({name: broken})], 200).split())
-    assert "→ FAILED" in rendered([record_tables.summary({name: broken})], 200)
+    broken = copy.deepcopy(content)
+    broken["fit"]["result"], broken["posterior"] = REASON, {}
+    for constant in broken["constants"].values():
+        constant.pop("intervals", None)
+    detail = " ".join(rendered(record_tables.record_tables(broken), 100).split())
+    stages = record_tables.stage_tables(content["stages"]) if "stages" in content else []
+    assert detail.count("FAILED") == 1 + rendered(stages, 100).count("FAILED")
+    assert [one for one in (REASON, "No credible intervals", "no law") if one not in detail] == []
+    shown = words(record_tables.summary({name: broken}), 200)
+    assert [one for one in (REASON, "→ FAILED") if one not in shown] == []
     assert "FAILED" not in rendered([record_tables.constants_table(content)], 100)
 
 
@@ -109,9 +114,8 @@ def test_z_is_the_distance_in_the_errors_that_add():
     """The printed b0 is 70 standard errors from the one that was fitted; without a printed value there is no z."""
     lines = rendered([record_tables.constants_table(FITS["liang-whole"])], 80).splitlines()
     b0 = FITS["liang-whole"]["constants"]["b0"]
-    apart = (b0["published"] - b0["regenerated"]) / math.hypot(
-        b0["statistical_error"], b0["discretisation_error"], b0["model_error"]
-    )
+    errors = (b0[f"{of}_error"] for of in ("statistical", "discretisation", "model"))
+    apart = (b0["published"] - b0["regenerated"]) / math.hypot(*errors)
     assert next(line.split()[-1] for line in lines if line.startswith("b0 ")) == f"{apart:+.0f}"
     assert "z: published less regenerated" in " ".join(" ".join(lines).split())
     assert "z" not in rendered([record_tables.constants_table(FITS["hazard"])], 80).splitlines()[2].split()
@@ -139,10 +143,6 @@ def test_a_record_shows_its_errors_over_alpha():
     assert quality_tables.spark_table(FITS["albedo-rational"]) == []
 
 
-def _stages(content):
-    return rendered(record_tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
-
-
 def test_three_errors_are_reported_separately_and_old_records_have_none_of_it():
     content = copy.deepcopy(FITS["hazard"])
     content.pop("discrepancy", None)
@@ -154,7 +154,7 @@ def test_three_errors_are_reported_separately_and_old_records_have_none_of_it():
     assert line.split()[2:5] == ["0.0011", "0.0022", "0.033"]
     process = {"amplitude": 0.0123, "amplitude_error": 0.0011, "length_r": 2.0, "length_s": 0.5, "rms": 0.009}
     told = {**content, "discrepancy": {**process, "gain": None, "result": "found"}}
-    text = " ".join(rendered([record_tables.fit_facts(told)], 100).split())
+    text = words(record_tables.fit_facts(told))
     assert "discrepancy amplitude 0.0123 ± 0.0011; residuals 0.0090 rms" in text
     assert "correlation length 0.50 in √(1 − α), 2.0 in ln r; found" in text
     for constant in content["constants"].values():
@@ -164,34 +164,26 @@ def test_three_errors_are_reported_separately_and_old_records_have_none_of_it():
     assert "amplitude" not in old
 
 
-def test_a_chain_that_is_too_short_says_so():
+def test_a_chain_that_is_too_short_says_so_and_brackets_of_units_are_no_markup():
     content = copy.deepcopy(next(content for content in FITS.values() if converged(content)))
     kind = next(iter(content["posterior"]))
     content["posterior"][kind]["result"] = "chain of 1000 steps is under 50 autocorrelation times (90)"
     assert "FAILED: chain of 1000 steps is under 50" in rendered([record_tables.fit_facts(content)], 100)
-
-
-def test_brackets_of_units_are_no_markup():
-    content = copy.deepcopy(next(iter(FITS.values())))
     content["title"] = content["note"] = "lengths in [mfp], [bold]not bold[/bold]"
-    text = rendered(record_tables.record_tables(content), 200)
-    assert text.count("[bold]not bold[/bold]") == 2
+    assert rendered(record_tables.record_tables(content), 200).count("[bold]not bold[/bold]") == 2
 
 
 def test_readings_are_shown_best_first():
     far = {"equation": "(8)", "choices": "far", "constants": {}, "published": {}, "verdict": "no"}
     far |= {"curve_distance": 0.5, "constant_distance": None}
     near = {**far, "choices": "near", "constants": {"p": 5.63}, "published": {"p": 5.67}, "curve_distance": 0.004}
-    rows = [
-        {"material": "apple", "channel": "red", "model": "normalized diffusion", "mse_over_printed": [1.0, 0.9, 1.02]},
-        {"material": "apple", "channel": "red", "model": "paper", "mse_over_printed": [0.7]},
-        {"material": "apple", "channel": "blue", "model": "normalized diffusion", "mse_over_printed": [9.0]},
-    ]
+    models = (("red", "normalized diffusion", [1.0, 0.9, 1.02]), ("red", "paper", [0.7]))
+    models += (("blue", "normalized diffusion", [9.0]),)
+    names = ("channel", "model", "mse_over_printed")
+    rows = [{"material": "apple", **dict(zip(names, one, strict=True))} for one in models]
     text = rendered(record_tables.evidence_tables({"readings": [far, near], "table1": rows}), 100)
     assert text.index("near") < text.index("far")
-    assert "p 5.63 (printed 5.67)" in text
-    assert "0.4 %" in text
-    assert "0.700" in text
+    assert [one for one in ("p 5.63 (printed 5.67)", "0.4 %", "0.700") if one not in text] == []
     # The channel is chosen by the other law's error, never by this one's.
     assert "blue" not in text
     assert "no readings" in rendered(record_tables.evidence_tables({"readings": [], "table1": []}), 100)
@@ -216,22 +208,19 @@ def test_digits_end_with_those_of_the_error(value, error, text):
     assert cells.to_error(value, error) == text
 
 
-def test_decimal_points_stand_in_one_column():
+def test_decimal_points_stand_in_one_column_and_an_interval_has_two_digits_of_its_half_width():
+    assert cells.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
+    assert cells.interval(None) == "–"
     padded = cells.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
     from_right = {len(text) - (text.index(".") if "." in text else len(text.rstrip())) for text in padded}
     assert from_right == {len(".2e-05")}
     assert [text.strip() for text in padded] == ["-0.0064", "14.0", "30", "1.2e-05", "–"]
 
 
-def test_an_interval_has_two_digits_of_its_half_width():
-    assert cells.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
-    assert cells.interval(None) == "–"
-
-
 def test_second_opinions_are_told():
     """How many random starts reach the best optimum, and whether photons agree with the exact profile."""
     content = RECORDS["hazard"]
-    text = " ".join(rendered([record_tables.fit_facts(content)], 100).split())
+    text = words(record_tables.fit_facts(content))
     tried, check = content["starts"], content["crosscheck"]
     best = round(tried["share_best"] * tried["count"])
     assert f"{best} of {tried['count']} reach the best optimum" in text
@@ -264,10 +253,27 @@ def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
     assert worst == max(*found[keys[0]], *np.atleast_1d(content["quality"]["regenerated"][keys[0]]))
 
 
-def test_powers_of_ten_are_even_steps():
-    values = [10.0**power for power in range(8)]
-    assert cells.spark(values, cells.span([values])) == cells.BLOCKS
-    assert cells.spark(values[::-1], cells.span([values])) == cells.BLOCKS[::-1]
+LOW, HIGH, POWERS = cells.BLOCKS[0], cells.BLOCKS[-1], [10.0**power for power in range(8)]
+SPARKS = {
+    "powers of ten are even steps": (POWERS, POWERS, cells.BLOCKS),
+    "and back": (POWERS[::-1], POWERS, cells.BLOCKS[::-1]),
+    "beyond the ends it stays at them": ([1e-9, 9.0], [1e-4, 1.0], LOW + HIGH),
+    "of many values the largest of each stretch is shown": (
+        [1.0] * 13 + [1e7] + [1.0] * 10,
+        POWERS,
+        LOW * 6 + HIGH + LOW * 5,
+    ),
+    "few are a block each": ([1.0] * 5, POWERS, LOW * 5),
+    "equal numbers have no scale": ([2.0, 2.0], [2.0, 2.0], LOW * 2),
+    "none": ([], [], ""),
+    **{f"{nothing} is a gap": ([1.0, nothing, 10.0], [1.0, 10.0], f"{LOW} {HIGH}") for nothing in GAPS},
+    **{f"{nothing} has no scale": ([nothing] * 2, [nothing] * 2, "  ") for nothing in GAPS},
+}
+
+
+@pytest.mark.parametrize(("values", "scale", "blocks"), SPARKS.values(), ids=SPARKS)
+def test_blocks_show_numbers_on_a_logarithmic_scale(values, scale, blocks):
+    assert cells.spark(values, cells.span([scale]), 12) == blocks
 
 
 def test_one_scale_for_several_rows():
@@ -275,23 +281,81 @@ def test_one_scale_for_several_rows():
     ends = cells.span([good, bad])
     assert ends == (1e-4, 1.0)
     assert max(cells.spark(good, ends)) < min(cells.spark(bad, ends))
-    assert cells.spark([1e-9, 9.0], ends) == cells.BLOCKS[0] + cells.BLOCKS[-1], "beyond the ends it stays at them"
 
 
-def test_of_many_values_the_largest_of_each_stretch_is_shown():
-    values = [1.0] * 24
-    values[13] = 1e7
-    shown = cells.spark(values, cells.span([values]), 12)
-    assert shown == cells.BLOCKS[0] * 6 + cells.BLOCKS[-1] + cells.BLOCKS[0] * 5
-    assert len(cells.spark(values[:5], cells.span([values]), 12)) == 5
+# Markdown
 
 
-@pytest.mark.parametrize("nothing", [None, math.nan, math.inf, 0.0, -1.0])
-def test_what_is_no_positive_number_is_a_gap(nothing):
-    assert cells.spark([1.0, nothing, 10.0], (1.0, 10.0)) == cells.BLOCKS[0] + " " + cells.BLOCKS[-1]
-    assert cells.spark([nothing, nothing], cells.span([[nothing, nothing]])) == "  "
+def parsed(text: str) -> list[list[dict[str, str]]]:
+    """Every table of a markdown text, each row by its headers."""
+    found = []
+    for block in text.split("\n\n"):
+        lines = [line for line in block.splitlines() if line.startswith("|")]
+        if len(lines) < 3:
+            continue
+        rows = [[cell.strip() for cell in line.replace(r"\|", "¦").strip("|").split("|")] for line in lines]
+        assert len({len(line) for line in lines}) == 1, "columns are aligned in the source"
+        assert all(set(cell) <= set(":-") for cell in rows[1])
+        found.append([dict(zip(rows[0], row, strict=True)) for row in rows[2:]])
+    return found
 
 
-def test_equal_numbers_have_no_scale():
-    assert cells.spark([2.0, 2.0], cells.span([[2.0, 2.0]])) == cells.BLOCKS[0] * 2
-    assert cells.spark([], None) == ""
+def quality_rows(records) -> list[dict[str, str]]:
+    found = sections(records)
+    return [row for name in ("quality", "inversion", "maps") for row in parsed(found[name])[0]]
+
+
+def test_constants_read_back_those_of_the_paper_s_laws_with_their_equation():
+    [rows] = parsed(markdown_constants(RECORDS))
+    by_key = {(row["record"], row["constant"]): row for row in rows}
+    expected = {(name, c) for name, content in FITS.items() if converged(content) for c in content["constants"]}
+    assert set(by_key) == expected
+    assert len(rows) == len(expected)
+    for (name, constant), row in by_key.items():
+        values = FITS[name]["constants"][constant]
+        assert abs(float(row["regenerated"]) - values["regenerated"]) <= rounding(values)
+        if values["published"] is not None:
+            assert float(row["published"]) == values["published"]
+        if values["free"] and values.get("jackknife_error") is not None:
+            assert float(row["± jackknife"]) == pytest.approx(values["jackknife_error"], rel=0.05)
+    equations = {row["constant"]: row["equation"] for row in rows if FITS[row["record"]]["law"] == "liang"}
+    assert equations.items() >= {"p": "(8)", "a1": "(11)", "b0": "(13)", "c3": "(15)", "h1": "(20)"}.items()
+    assert all(row["equation"] == "–" for row in rows if FITS[row["record"]]["law"] != "liang")
+
+
+def test_a_failed_fit_has_a_reason_and_no_constants():
+    name, content = next((name, content) for name, content in FITS.items() if converged(content))
+    records = {**RECORDS, name: content | {"fit": content["fit"] | {"result": "no convergence in 9 steps"}}}
+    text = markdown_constants(records)
+    assert f"{name} has no constants to show: no convergence in 9 steps" in text
+    assert name not in {row["record"] for table in parsed(text) for row in table}
+    assert name not in {row["record"] for row in quality_rows(records)}
+
+
+def test_quality_reads_back_with_printed_sets_once():
+    rows = quality_rows(RECORDS)
+    of_profiles = [(row["record"], row["constants"]) for row in rows if "rel mean" in row]
+    assert len(set(of_profiles)) == len(of_profiles) > 0
+    for row in rows:
+        if row["constants"] != "regenerated":
+            continue
+        quality = FITS[row["record"]]["quality"]["regenerated"]
+        if "rel mean" in row:
+            assert "–" not in row.values()
+            for key in ("rel", "ks", "l1", "mse"):
+                assert float(row[f"{key} mean"]) == pytest.approx(np.mean(quality[key]), rel=0.05)
+                assert float(row[f"{key} worst"]) == pytest.approx(np.max(quality[key]), rel=0.05)
+            assert float(row["r2 worst"]) == pytest.approx(np.min(quality["r2"]), abs=5e-5)
+        elif "max error of A" in row:
+            assert float(row["max error of A"]) == pytest.approx(quality["delta_A"], rel=0.05)
+            assert row["rises all the way"] == ("yes" if quality["monotone"] else "no")
+        else:
+            assert float(row["inversion error worst"]) == pytest.approx(np.max(quality["inversion_error"]), rel=0.05)
+
+
+def test_the_short_table_and_the_hazard_s_constants_say_which_index():
+    found = sections(RECORDS)
+    assert "| hazard-refracting, n = 1.4 |" in found["short"]
+    indices = ("1", "(1.3, 1.5]", "(1, 1.6]")  # of one, of g, too, of every n
+    for index, table in zip(map(re.escape, indices), found["hazard"].split("\n\n"), strict=True):
+        assert re.search(rf"^\| n +\| {index} +\| {index} +\|$", table, re.MULTILINE)

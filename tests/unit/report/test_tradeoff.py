@@ -27,10 +27,13 @@ PART = TradeoffPart("demo", "Demo", (Panel("p", "R$_d$ of p", "time [s]", "error
 
 @pytest.mark.slow
 def test_labels_keep_off_each_other_and_inside():
-    chart = canvas(4.0)
-    axes = chart.subplots()
+    """Negative control: where there is no room, overlaps are counted and not denied."""
+    chart, crowded = canvas(4.0), canvas(1.2, width=1.6)
+    axes, small = chart.subplots(), crowded.subplots()
     axes.set(xscale="log", yscale="log", xlim=(0.5, 2.0), ylim=(0.01, 1.0))
-    chart.draw_without_rendering()
+    small.set(xlim=(0.0, 2.0), ylim=(0.0, 1.0))
+    for one in (chart, crowded):
+        one.draw_without_rendering()
     chart.set_layout_engine("none")
     labels = [Label(f"law number {i}", 1.0 + 0.01 * i, 0.1) for i in range(6)]
     bar = box_of(axes, [(1.0, 0.1), (1.0, 0.5)], 2.0)
@@ -39,30 +42,16 @@ def test_labels_keep_off_each_other_and_inside():
     boxes = [matplotlib.text.Text.get_window_extent(text, renderer_of(axes)) for text in axes.texts]
     for i, box in enumerate(boxes):
         assert inside.x0 <= box.x0 < box.x1 <= inside.x1
-        assert not box.overlaps(bar)
-        assert not any(box.overlaps(other) for other in boxes[:i])
-
-
-@pytest.mark.slow
-def test_crowded_labels_say_so():
-    """Negative control: where there is no room, overlaps are counted and not denied."""
-    chart = canvas(1.2, width=1.6)
-    axes = chart.subplots()
-    axes.set(xlim=(0.0, 2.0), ylim=(0.0, 1.0))
-    chart.draw_without_rendering()
-    assert max(place_labels(axes, [Label("a long name of a law", 1.0, 0.5)] * 8, [])) > 0.0
+        assert not any(box.overlaps(other) for other in (bar, *boxes[:i]))
+    assert max(place_labels(small, [Label("a long name of a law", 1.0, 0.5)] * 8, [])) > 0.0
 
 
 def test_marks_say_where_points_stand():
     axes = canvas(4.0).subplots()
     figure.draw(axes, PART.panels[0], figure.colours_of(PART.points))
-    faces = {
-        line.get_xdata()[0]: (line.get_marker(), line.get_markerfacecolor())
-        for line in axes.get_lines()
-        if line.get_marker() in ("s", "o") and len(line.get_xdata()) == 1
-    }
-    assert faces[1.0][0] == faces[2.0][0] == "s"
-    assert faces[40.0][0] == "o"
+    points = [line for line in axes.get_lines() if line.get_marker() in ("s", "o") and len(line.get_xdata()) == 1]
+    marks = {line.get_xdata()[0]: line.get_marker() for line in points}
+    assert (marks[1.0], marks[2.0], marks[40.0]) == ("s", "s", "o")
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     (steps,) = [line for line in axes.get_lines() if line.get_drawstyle() == "steps-post"]
     np.testing.assert_allclose(steps.get_xdata(), [1.0, 2.0, 2.1])  # the last two are not distinguished
@@ -86,16 +75,16 @@ def test_figure_and_table(tmp_path):
     assert lines[-1].strip() == "left out: three"
 
 
+exactly = WithSpread.exactly
+COST, ERROR = WithSpread(1.0, 0.9, 1.1), WithSpread(0.5, 0.4, 0.6)
 MEASURED = (
-    Point(
-        "p", "one", "few", WithSpread(1.0, 0.9, 1.1), WithSpread(0.5, 0.4, 0.6), WithSpread.exactly(0.7), {"photons": 3}
-    ),
-    Point("p", 'two, "quoted"', "", WithSpread.exactly(2.0), WithSpread.exactly(1 / 3), None, {"stated": 0.25}),
+    Point("p", "one", "few", COST, ERROR, exactly(0.7), {"photons": 3}),
+    Point("p", 'two, "quoted"', "", exactly(2.0), exactly(1 / 3), None, {"stated": 0.25}),
 )
 TOLD = TradeoffPart("demo", "A title", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", MEASURED),), ("left out",))
 
 
-def test_csv_reads_back_with_its_comments():
+def test_csv_reads_back_with_its_comments_and_json_has_the_same():
     text = tradeoff_tables.as_csv(TOLD, {"processor": "a chip"})
     comments = [line for line in text.splitlines() if line.startswith("#")]
     assert comments[:2] == ["# demo: A title", "# processor: a chip"]
@@ -107,6 +96,10 @@ def test_csv_reads_back_with_its_comments():
     assert (rows[0]["photons"], rows[0]["stated"], rows[1]["photons"], rows[1]["stated"]) == ("3", "", "", "0.25")
     assert (rows[1]["worst"], rows[1]["error"]) == ("", "0.333333")
     assert [row["standing"] for row in rows] == ["front", "front"]
+    numbers = tradeoff_tables.as_numbers(TOLD)
+    point = numbers["panels"]["p"]["points"][0]
+    assert (point["cost"], point["standing"]) == ({"value": 1.0, "low": 0.9, "high": 1.1}, "front")
+    assert numbers["notes"] == ["left out"]
 
 
 def test_every_column_is_documented():
@@ -117,14 +110,6 @@ def test_every_column_is_documented():
     ]
     told = re.findall(r"\w+", tradeoff_tables.__doc__)
     assert [column for column in columns if column not in told] == []
-
-
-def test_json_has_the_same():
-    numbers = tradeoff_tables.as_numbers(TOLD)
-    point = numbers["panels"]["p"]["points"][0]
-    assert point["cost"] == {"value": 1.0, "low": 0.9, "high": 1.1}
-    assert point["standing"] == "front"
-    assert numbers["notes"] == ["left out"]
 
 
 def test_machine_is_named():

@@ -1,5 +1,9 @@
-"""The explorer in a browser, from file://: what it computes by the exported texts is what Python computes."""
+"""The explorer in a browser, from file://: what it computes by the exported texts is what Python computes.
 
+A page with the explorer in it is made once for all tests.
+"""
+
+import json
 import re
 import shutil
 
@@ -9,7 +13,9 @@ import pytest
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
-from profilefit.report.explorer.offered import first, offered
+from profilefit.recipes.catalogue import profile_laws
+from profilefit.report.explorer import explorer_section
+from profilefit.report.explorer.offered import address, first, offered
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.shader.law_file import export
@@ -21,21 +27,34 @@ TABLE = 2e-5  # of the exact solution between the knots of the explorer's table
 REFRACTED = 5e-4, 5e-5  # of R_d and of the cdf from n = 1.1 up, between the knots in n, too
 NEAR_ONE = 3e-3, 3e-4  # where n is less
 # One law of each kind: the first call of a law in Python takes as long as ten in the browser.
-COMPARED = (
-    "hazard-diffuse",
-    "quantile",
-    "burley-published",
-    "liang-corrected",
-    "gaussians-4",
-    "dipole",
-    "better_dipole",
-)
+COMPARED = {"hazard-diffuse", "quantile", "burley-published", "liang-corrected", "gaussians-4"}
+COMPARED |= {"dipole", "better_dipole"}
 REFLECTANCE, MFP = [0.2, 0.6, 0.97], [0.4, 1.0, 2.5]
 CURVES = """([light, n, alphas, radii]) => alphas.map((alpha, i) => {
   const curve = explorer.state.tables[light].at(n).curve(alpha);
   return radii[i].map((x) => [curve.profile(x), curve.cdf(x), curve.edge(-x)]);
 })"""
 NO_WEBGL = "HTMLCanvasElement.prototype.getContext = () => null"
+HEAD = '<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+FITS = catalogue.fits_folder()
+
+
+@pytest.fixture(scope="module")
+def fragment():
+    return explorer_section(FITS)
+
+
+@pytest.fixture(scope="module")
+def file(fragment, tmp_path_factory):
+    """A page with nothing but the explorer: its own colours, its own font size."""
+    path = tmp_path_factory.mktemp("explorer") / "page.html"
+    path.write_text(f"<!DOCTYPE html>{HEAD}{fragment}")
+    return path
+
+
+@pytest.fixture(scope="module")
+def laws():
+    return {address(named): named.law for named in profile_laws(FITS)}
 
 
 @pytest.fixture(scope="module")
@@ -138,57 +157,51 @@ def test_errors_are_those_of_quality(explorer, laws, name):
     truth = profile_quality(laws[name], found["alpha"])
     np.testing.assert_allclose(found["rel"], truth.rel, atol=TABLE)
     np.testing.assert_allclose(found["ks"], truth.ks, atol=TABLE)
-    shown = [
-        float(text.replace("−", "-"))
-        for text in explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()
-    ]
-    np.testing.assert_allclose(shown, truth.rel, rtol=0.05)  # two digits
+    texts = explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()
+    np.testing.assert_allclose([float(text.replace("−", "-")) for text in texts], truth.rel, rtol=0.05)  # two digits
 
 
+# Without a surface that refracts; a knot, near the lowest ones where the light changes fastest, and half-way between
+# two of the others.
+@pytest.mark.parametrize(
+    ("n", "white", "nearest", "bounds"),
+    [
+        (1.0, (0.99999,), 1e-4, (TABLE, TABLE)),
+        *((n, (0.99, 0.9999), 1e-3, REFRACTED) for n in (1.4, 1.34, 1.16)),
+        (1.04, (0.99, 0.9999), 1e-3, NEAR_ONE),
+    ],
+    ids=["n1", "n1.4", "n1.34", "n1.16", "n1.04"],
+)
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
-def test_table_is_the_exact_half_space(explorer, light):
-    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99999, 1.0])[:, None], Setting(light)
-    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
-    x = outer * np.geomspace(1e-4, 1.0, 20)
-    told = explorer.evaluate(
-        CURVES,
-        [light, 1, alpha[:, 0].tolist(), x.tolist()],
-    )
-    profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
-    np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=TABLE)
-    np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=TABLE)
-    np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
-
-
-# A knot, near the lowest ones where the light changes fastest, and half-way between two of the others.
-@pytest.mark.parametrize(("n", "bounds"), [(1.4, REFRACTED), (1.34, REFRACTED), (1.16, REFRACTED), (1.04, NEAR_ONE)])
-@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
-def test_table_is_the_exact_half_space_under_a_surface_that_refracts(explorer, light, n, bounds):
-    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99, 0.9999, 1.0])[:, None], Setting(light, n)
-    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
-    x = outer * np.geomspace(1e-3, 1.0, 20)
+def test_table_is_the_exact_half_space(explorer, light, n, white, nearest, bounds):
+    alpha, setting = np.array([0.03, 0.5, 0.9, *white, 1.0])[:, None], Setting(light, n)
+    x = np.asarray(exact.quantile(0.995, alpha, setting=setting)) * np.geomspace(nearest, 1.0, 20)
     told = explorer.evaluate(CURVES, [light, n, alpha[:, 0].tolist(), x.tolist()])
-    profile, cdf, _ = np.moveaxis(np.array(told), -1, 0)
+    profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
     np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=bounds[0])
     np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=bounds[1])
+    if n == 1.0:
+        np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
 
 
 @pytest.mark.parametrize("name", ["hazard", "hazard-diffuse"])
-def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, fits, name):
+def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, name):
     light = "diffuse" if name.endswith("diffuse") else "searchlight"
+
+    def has_text_of(named):
+        return explorer.locator("[data-part='text']").text_content() == export(named, FITS, "glsl-es", "law")
+
     for n in (1.02, 1.34, 1.6):
         found = chosen(explorer, name, n)
-        named = catalogue.find(f"{name}-refracting", fits, n=n)
-        assert explorer.locator("[data-part='text']").text_content() == export(named, fits, "glsl-es", "law")
+        named = catalogue.find(f"{name}-refracting", FITS, n=n)
+        assert has_text_of(named)
         truth = profile_quality(named.law, found["alpha"])
         np.testing.assert_allclose(found["rel"], truth.rel, atol=REFRACTED[0])
         np.testing.assert_allclose(found["ks"], truth.ks, atol=REFRACTED[1])
         assert named.setting == Setting(light, n)
         assert explorer.locator("[data-part='foreign']").is_hidden()
     chosen(explorer, name)
-    assert explorer.locator("[data-part='text']").text_content() == export(
-        catalogue.find(name, fits), fits, "glsl-es", "law"
-    )
+    assert has_text_of(catalogue.find(name, FITS))
 
 
 def test_a_law_made_for_one_index_says_so_under_another(explorer):
@@ -233,12 +246,9 @@ def test_a_lost_context_shows_the_picture_until_it_is_back(open_page, file):
 
 
 def test_a_shader_that_does_not_compile_says_where(open_page, file, tmp_path):
-    broken = tmp_path / "broken.html"
-    text = file.read_text()
-    assert "float law_density(float x, law_Shape s) {" in text
-    broken.write_text(
-        text.replace("float law_density(float x, law_Shape s) {", "float law_density(float x, law_Shape s) { int x")
-    )
+    broken, text, function = tmp_path / "broken.html", file.read_text(), "float law_density(float x, law_Shape s) {"
+    assert function in text
+    broken.write_text(text.replace(function, f"{function} int x"))
     page = open_page(broken)
     told = page.locator("[data-part='fault']").inner_text()
     assert re.match(r"hazard: values does not compile, line \d+, `float law_density.* int x`: ERROR", told)
@@ -257,13 +267,14 @@ def test_the_address_keeps_what_was_chosen(open_page, file):
 
 
 def test_an_address_that_comes_later_is_followed(explorer):
-    explorer.evaluate("location.hash = '#explorer?law=burley-published&view=constructor&samples=16'")
-    explorer.wait_for_function("explorer.values.law === 'burley-published'")
-    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["rr", 16]
-    explorer.evaluate("location.hash = '#explorer?law=dipole&view=error&l=2,1,0.5'")
-    explorer.wait_for_function("explorer.values.law === 'dipole'")
     begun_anew = 64
-    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["error", begun_anew]
+    for law, more, expected in (
+        ("burley-published", "view=constructor&samples=16", ["rr", 16]),
+        ("dipole", "view=error&l=2,1,0.5", ["error", begun_anew]),
+    ):
+        explorer.evaluate(f"location.hash = '#explorer?law={law}&{more}'")
+        explorer.wait_for_function(f"explorer.values.law === '{law}'")
+        assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == expected
     assert explorer.locator("#explorer-law").input_value() == "dipole"
     assert explorer.locator("#explorer-l-red + output").inner_text() == "2.00"
 
@@ -298,12 +309,137 @@ def test_nothing_is_wider_than_a_phone(open_page, file):
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-def test_a_folder_with_one_record_has_its_law_beside_the_printed_ones(fits, tmp_path):
+def test_a_folder_with_one_record_has_its_law_beside_the_printed_ones(tmp_path):
     bare = {law.id for law in offered(tmp_path)}
     assert {"liang-published", "burley-diffuse", "dipole"} <= bare
     for ending in ("json", "npz"):
-        shutil.copy(fits / f"quantile.{ending}", tmp_path)
+        shutil.copy(FITS / f"quantile.{ending}", tmp_path)
     found = offered(tmp_path)
     assert {law.id for law in found} - bare == {"quantile"}
     assert first(found) == "quantile"
     assert "float law_profile(float r, float alpha, float mfp)" in found[0].text
+
+
+# The balls: light that goes into a sphere here and comes out there, by the texts that are exported
+
+BALL = "() => explorer.ball && explorer.ball.done >= explorer.state.samples"
+BALL_PLACE = "#explorer?law={}&A=0.3,0.6,0.9&l={}&radius={}&samples=16&turn=40,20&even=0"
+WEIGHT = "inside[c] * law_density(x, shape) / p"  # of a sample, in ball.frag
+
+
+@pytest.fixture(scope="module")
+def small(open_shared_page, file):
+    return open_shared_page(file, width=300)
+
+
+def ball(page, place):
+    """`sums` after the page was sent to a place."""
+    page.evaluate(
+        """(place) => new Promise((done) => {
+          const drawn = () => requestAnimationFrame(() => requestAnimationFrame(done));
+          addEventListener("hashchange", drawn, { once: true });
+          location.hash = place;
+        })""",
+        place,
+    )
+    return sums(page)
+
+
+def alphas(page):
+    """Of the channels (3,)."""
+    return np.array(page.evaluate("explorer.values.channels.map((one) => one.alpha)"))
+
+
+def sums(page):
+    """Unit normals (pixels, 3) of a ball well within its rim; there a sample's mean light over A, and mean weight."""
+    page.locator("canvas.ball").scroll_into_view_if_needed()
+    page.wait_for_function(BALL)
+    side = page.evaluate("explorer.ball.side")
+    y, x = np.meshgrid(*2 * [(2.0 * np.arange(side) + 1.0 - side) / (0.94 * side)], indexing="ij")
+    inside = np.hypot(x, y) < 0.97
+    normal = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=-1)
+    told = json.loads(page.evaluate("JSON.stringify(explorer.ball.told().map((one) => Array.from(one)))"))
+    light, weight = (np.reshape(one, (side, side, 4))[inside, :3] / 16 for one in told)
+    return normal[inside], light, weight
+
+
+def lit_by_a_lamp(law, alpha, mfp, radius, cosine):
+    """Radiance over A where the light comes in under `cosine` (n,): light at the chord d, around all its circle."""
+    chord = np.linspace(0.0, 2.0, 801)  # [radii]
+    within = law.cdf(radius * chord, alpha, mfp)
+    middle = 0.5 * (chord[1:] + chord[:-1])
+    up = (1.0 - 0.5 * middle**2) * cosine[:, None]
+    aside = middle * np.sqrt(1.0 - 0.25 * middle**2) * np.sqrt(1.0 - cosine[:, None] ** 2)
+    edge = np.clip(up / np.maximum(aside, 1e-12), -1.0, 1.0)
+    # The mean of max(up + aside cos phi, 0) over phi.
+    mean = (up * np.arccos(-edge) + aside * np.sqrt(1.0 - edge**2)) / np.pi
+    return mean @ np.diff(within) / within[-1]
+
+
+def test_weights_are_of_the_light_within_the_diameter(small, laws):
+    # This law draws by another map than the inverse of its cdf: its weights differ.
+    _, _, weight = ball(small, BALL_PLACE.format("liang-corrected", "0.5,1,2", 0.5))
+    expected = laws["liang-corrected"].cdf(2 * 0.5, alphas(small), np.array([0.5, 1.0, 2.0]))
+    mean, five_errors = weight.mean(axis=0), 5 * weight.std(axis=0) / np.sqrt(len(weight))
+    assert np.all(np.abs(mean - expected) < five_errors)
+    small.evaluate(
+        """(right) => {
+          explorer.rightBall = explorer.shaders.ball;
+          explorer.shaders.ball = explorer.rightBall.replace(right, "inside[c]");
+          explorer.programs = null;
+          explorer.update();
+        }""",
+        WEIGHT,
+    )
+    wrong = sums(small)[2].mean(axis=0)
+    small.evaluate("explorer.shaders.ball = explorer.rightBall; explorer.programs = null; explorer.update()")
+    assert np.all(np.abs(wrong - expected) > five_errors)
+
+
+@pytest.mark.parametrize(("mfp", "radius"), [((0.5, 1.0, 2.0), 5.0), ((30.0, 10.0, 1.0), 1.0)])
+def test_a_lamp_on_a_ball_is_what_the_law_makes_of_it(small, laws, mfp, radius):
+    law = laws["burley-published"]
+    normal, light, weight = ball(small, BALL_PLACE.format("burley-published", ",".join(map(str, mfp)), radius))
+    alpha = alphas(small)
+    within = law.cdf(2 * radius, alpha, np.array(mfp))
+    np.testing.assert_allclose(weight, np.broadcast_to(within, weight.shape), rtol=1e-4)  # each sample counts
+    around, up = np.radians([40.0, 20.0])
+    cosine = normal @ [np.cos(up) * np.sin(around), np.sin(up), np.cos(up) * np.cos(around)]
+    steps = np.linspace(-1.0, 1.0, 201)
+    for c in range(3):
+        expected = np.interp(cosine, steps, lit_by_a_lamp(law, alpha[c], mfp[c], radius, steps))
+        for low, high in ((-1.0, -0.3), (-0.3, 0.0), (0.0, 0.3), (0.3, 0.7), (0.7, 1.0)):
+            ring = (cosine >= low) & (cosine < high)
+            # A sample spreads by less than 0.4, sixteen fall into each pixel; five standard errors.
+            bound = 5 * 0.4 / np.sqrt(16 * ring.sum())
+            seen = (light[ring, c] / weight[ring, c]).mean()
+            assert seen == pytest.approx(expected[ring].mean(), abs=bound)
+            if (low, c) == (-0.3, 2):  # Lambert's ball is dark there
+                assert expected[ring].mean() > 2 * bound
+
+
+def test_paper_shows_the_ball_though_it_was_not_in_sight(open_page, file):
+    page = open_page(file, width=300, height=300, fragment="#explorer?samples=4")
+    printed = page.evaluate(
+        """() => {
+          const before = explorer.ball.done, { canvas } = explorer, copy = document.createElement("canvas");
+          dispatchEvent(new Event("beforeprint"));
+          copy.width = copy.height = 1;
+          copy.getContext("2d").drawImage(canvas, -0.72 * canvas.width, -0.4 * canvas.height);
+          return [before, explorer.ball.done, ...copy.getContext("2d").getImageData(0, 0, 1, 1).data];
+        }"""
+    )
+    assert printed[:2] == [0, 4]
+    assert min(printed[2:5]) > 50  # skin in the light
+    assert printed[5] == 255
+
+
+def test_reduced_motion_shows_the_ball_once(open_page, file):
+    page = open_page(file, width=300, reduced_motion="reduce", fragment="#explorer?samples=64")
+    page.evaluate(
+        "window.shown = []; const { show } = explorer.ball;"
+        "explorer.ball.show = function () { shown.push(this.done); show.call(this); }; explorer.ball.restart()"
+    )
+    page.locator("canvas.ball").scroll_into_view_if_needed()
+    page.wait_for_function(BALL)
+    assert page.evaluate("shown") == [64]
