@@ -64,10 +64,6 @@ SLOW = 1e4  # photons/s; faster is printed in millions
 SHORT = 0.05  # compiling that is not worth a word [s]
 
 
-def _quantities(incomplete: str) -> Iterator[str]:
-    return (name for name in QUANTITIES if name.startswith(incomplete))
-
-
 def run(
     file: Annotated[Path, typer.Argument(help="Input file of MCML 1 or 2 (.mci).")],
     photons: Annotated[
@@ -83,7 +79,7 @@ def run(
         typer.Option(
             help=f"What --precision looks at: {', '.join(QUANTITIES)}.",
             show_default=QUANTITY,
-            autocompletion=_quantities,
+            autocompletion=lambda incomplete: [name for name in QUANTITIES if name.startswith(incomplete)],
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Changes nothing: a command resumes without.")] = False,

@@ -101,9 +101,9 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
     try:
         whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
     except TypeError:
-        raise InputError(f"{name} must be {accepted}, got {shown(number)}") from None
-    if isinstance(number, bool) or whole < lowest or (highest is not None and whole > highest):
-        raise InputError(f"{name} must be {accepted}, got {shown(number)}")
+        whole = lowest - 1
+    is_inside = lowest <= whole and (highest is None or whole <= highest)
+    require(is_inside and not isinstance(number, bool), name, accepted, number)
     return whole
 
 

@@ -233,8 +233,13 @@ def read_run(lines: Lines, outputs: set[str]) -> Run:
     (word,) = lines.take(1, "the number of layers")
     number = lines.whole("the number of layers", word, MAX_LAYERS)
     n_above = _index(lines, "n above the layers")
-    layers = tuple(_layer(lines, at, number) for at in range(1, number + 1))
-    medium = Medium(layers, n_above, _index(lines, "n below the layers"))
+    layers = []
+    for at in range(1, number + 1):
+        of = f"of layer {at} of {number}"
+        *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
+        optics, got = _optics(lines, of, *words), f"{quoted(words[1])} and {quoted(words[2])}"
+        layers.append(_settled(lines, of, optics, thickness, at == number, got))
+    medium = Medium(tuple(layers), n_above, _index(lines, "n below the layers"))
     return Run(output, form, photons, dz, dr, nz, nr, na, medium)
 
 
@@ -380,13 +385,6 @@ def _output(lines: Lines, outputs: set[str], name: str, *form: str) -> tuple[str
 def _index(lines: Lines, name: str) -> float:
     (word,) = lines.take(1, name)
     return lines.decimal(name, word, INDICES)
-
-
-def _layer(lines: Lines, at: int, number: int) -> Layer:
-    of = f"of layer {at} of {number}"
-    *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
-    got = f"{quoted(words[1])} and {quoted(words[2])}"
-    return _settled(lines, of, _optics(lines, of, *words), thickness, at == number, got)
 
 
 def _is_number(word: str) -> bool:

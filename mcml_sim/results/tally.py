@@ -27,7 +27,7 @@ from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, write_whole
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, shown
+from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
 from mcml_sim.media.phase import as_table, from_table
@@ -367,10 +367,9 @@ def _results(content: bytes) -> Results:
     medium, grid = _medium(header["medium"]), _grid(first)
     photons = checked_whole("photons", header["photons"], lowest=1, highest=MAX_PHOTONS)
     version, cut = header["mcml_sim"], header["cut"]
-    if not (isinstance(version, str) and version.isprintable() and len(version) <= LONGEST_VERSION):
-        raise ValueError(f"mcml_sim must be a version, got {shown(version)}")
-    if not (is_number(cut) and 0 <= cut <= 1):
-        raise ValueError(f"cut must be a share of the light, got {shown(cut)}")
+    is_version = isinstance(version, str) and version.isprintable() and len(version) <= LONGEST_VERSION
+    require(is_version, "mcml_sim", "a version", version)
+    require(is_number(cut) and 0 <= cut <= 1, "cut", "a share of the light", cut)
     sizes = shapes(grid, len(medium.layers))
     parts = {name + end: size for name, size in sizes.items() for end in ENDS}
     arrays = read_npz(content, sum(MOST_BEFORE + WORD * math.prod(size) for size in parts.values()), parts)
@@ -388,22 +387,20 @@ def _results(content: bytes) -> Results:
 
 def _medium(value: object) -> Medium:
     table = _table("medium", value, MEDIUM)
-    layers = table.pop("layers")
-    if not isinstance(layers, list) or len(layers) > MAX_LAYERS:
-        raise ValueError(f"layers must be a list of at most {MAX_LAYERS}, got {shown(layers)}")
-    return Medium(tuple(_layer(f"layer {at}", layer) for at, layer in enumerate(layers, start=1)), **table)
+    objects, layers = table.pop("layers"), []
+    is_list = isinstance(objects, list) and len(objects) <= MAX_LAYERS
+    require(is_list, "layers", f"a list of at most {MAX_LAYERS}", objects)
+    for at, value in enumerate(objects, start=1):
+        values = dict(value) if isinstance(value, dict) else value
+        phase = values.pop(PHASE, None) if isinstance(values, dict) else None
+        layers.append(Layer(**_table(f"layer {at}", values, LAYER), phase=None if phase is None else from_table(phase)))
+    return Medium(tuple(layers), **table)
 
 
 def _as_object(layer: Layer) -> dict[str, Any]:
     """Return a layer; its phase function only where that is not Henyey and Greenstein's, as files always did."""
     values = {field.name: getattr(layer, field.name) for field in fields(Layer) if field.name != PHASE}
     return values if layer.phase is None else {**values, PHASE: as_table(layer.phase)}
-
-
-def _layer(name: str, value: object) -> Layer:
-    values = dict(value) if isinstance(value, dict) else value
-    phase = values.pop(PHASE) if isinstance(values, dict) and PHASE in values else None
-    return Layer(**_table(name, values, LAYER), phase=None if phase is None else from_table(phase))
 
 
 def _grid(arrays: Mapping[str, NDArray]) -> Grid:
@@ -417,10 +414,9 @@ def _grid(arrays: Mapping[str, NDArray]) -> Grid:
     return grid
 
 
-def _table(name: str, value: object, keys: frozenset[str]) -> dict[str, Any]:
+def _table(name: str, value: Any, keys: frozenset[str]) -> dict[str, Any]:
     """Return an object of just these keys."""
-    if not isinstance(value, dict):
-        raise ValueError(f"{name} must be an object, got {shown(value)}")
+    require(isinstance(value, dict), name, "an object", value)
     for key in sorted(keys ^ value.keys()):
         raise ValueError(f"{name} has no key {key!r}" if key in keys else f"{name} has the unknown key {shown(key)}")
     return dict(value)

@@ -218,12 +218,8 @@ def _finished(job: Job, options: RunOptions) -> Results | None:
     results = _results(job.npz)
     if results is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
-    if (results.medium, results.grid, results.seed, results.version) != (
-        job.run.medium,
-        job.run.grid,
-        job.seed,
-        __version__,
-    ):
+    here = (job.run.medium, job.run.grid, job.seed, __version__)
+    if (results.medium, results.grid, results.seed, results.version) != here:
         return None
     goal = options.goal
     is_enough = goal is not None and results.photons < job.photons and goal.is_reached(results.estimates[goal.quantity])

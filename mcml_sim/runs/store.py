@@ -79,7 +79,7 @@ class Store(Generic[R]):
     def __init__(self, folder: Path, made_by: dict[str, object], read: Callable[[Mapping[str, NDArray]], R]) -> None:
         self.folder = folder
         self._made_by = {**made_by, **maker()}
-        self._digest = _digest(self._made_by)
+        self._digest = hashlib.sha256(json.dumps(self._made_by, sort_keys=True).encode()).hexdigest()
         self._read = read
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -226,10 +226,6 @@ def cpu_class() -> str:
     except OSError:  # not Linux
         return f"{platform.machine()} {platform.processor()}"
     return " ".join([platform.machine(), *(flag for flag in ("fma", "avx2", "avx512f") if flag in flags)])
-
-
-def _digest(made_by: dict[str, object]) -> str:
-    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()
 
 
 def _apart(theirs: object, ours: object) -> tuple[str, str]:

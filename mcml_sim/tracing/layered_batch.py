@@ -23,15 +23,7 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import deposits, half_space_event, layered_event, pool, rng
 from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
-from mcml_sim.tracing.layered_event import (
-    CUT,
-    EVENTS_PER_TURN,
-    FLIGHTS,
-    ROULETTED,
-    SELECTED_LAYERS,
-    LayeredLanes,
-    Stack,
-)
+from mcml_sim.tracing.layered_event import EVENTS_PER_TURN, FLIGHTS, SELECTED_LAYERS, LayeredLanes, Stack
 
 BATCH_PHOTONS = 2**18
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same
@@ -200,8 +192,8 @@ def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layer
     transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
     rho = jnp.where(transmitted & ~scattered, BALLISTIC, rho)
-    rho = jnp.where(lanes.layer == CUT, INSIDE, rho).astype(jnp.float32)
-    weight = jnp.where(lanes.layer == ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
+    rho = jnp.where(lanes.layer == layered_event.CUT, INSIDE, rho).astype(jnp.float32)
+    weight = jnp.where(lanes.layer == layered_event.ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
     cosines = results.cosines
     if angles:
         cosines = _written(cosines, number, jnp.abs(lanes.down.imag))
