@@ -12,9 +12,9 @@ ALPHAS = np.array([[0.0], [0.05], [0.8], [0.999], [1.0], [1.1]])
 R = np.array([0.0, 1e-3, 0.02, 0.7, 6.0, 15.0, np.inf, -1.0])
 XI = np.array([0.0, 1e-3, 0.02, 0.4, 0.9, 0.99, 1.0, 1.1])
 MFP = 1.3
+NAMES = ("reflectance", "decay_rate", "profile", "cdf", "quantile")
 INSIDE = np.s_[1:-2, 1:-2]  # away from the ends of both
 STEP = 1e-5
-
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -43,42 +43,34 @@ def difference(function, x, step):
     return (8 * near - far) / (12 * step)
 
 
+def by_name(alphas, at):
+    """Numpy's answers by NAMES, at these albedos and a slice of the radii or shares, (5, alphas, radii)."""
+    totals = exact.reflectance(alphas), exact.decay_rate(alphas)
+    by_radius = exact.profile(R[at], alphas, MFP), exact.cdf(R[at], alphas, MFP), exact.quantile(XI[at], alphas, MFP)
+    return np.stack(np.broadcast_arrays(*totals, *by_radius))
+
+
 @pytest.mark.slow
 def test_mapped_answers_are_those_of_numpy(table):
-    alphas = ALPHAS[:-1]
-    expected = {
-        "reflectance": np.broadcast_to(exact.reflectance(alphas), (5, 7)),
-        "decay_rate": np.broadcast_to(exact.decay_rate(alphas), (5, 7)),
-        "profile": exact.profile(R[:-1], alphas, MFP),
-        "cdf": exact.cdf(R[:-1], alphas, MFP),
-        "quantile": exact.quantile(XI[:-1], alphas, MFP),
-    }
-    for name, values in expected.items():
+    for name, values in zip(NAMES, by_name(ALPHAS[:-1], np.s_[:-1]), strict=True):
         np.testing.assert_allclose(table[name][0][:-1, :-1], values, rtol=1e-11, err_msg=name)
 
 
 @pytest.mark.slow
 def test_what_is_out_of_range_is_nan_where_it_may_be_traced(table):
-    for name in ("profile", "cdf", "quantile"):
+    for name in NAMES[2:]:
         assert np.isnan(table[name][0][-1]).all()
         assert np.isnan(table[name][0][:, -1]).all()
-    for name in ("reflectance", "decay_rate"):
+    for name in NAMES[:2]:
         assert np.isnan(table[name][0]).all(axis=1).tolist() == [False] * 5 + [True]
 
 
 @pytest.mark.slow
 def test_slopes_in_albedo_are_central_differences(table):
     alphas = ALPHAS[1:-2]
-    asked = {
-        "reflectance": lambda a: np.broadcast_to(exact.reflectance(a), (3, 5)),
-        "decay_rate": lambda a: np.broadcast_to(exact.decay_rate(a), (3, 5)),
-        "profile": lambda a: exact.profile(R[1:-2], a, MFP),
-        "cdf": lambda a: exact.cdf(R[1:-2], a, MFP),
-        "quantile": lambda a: exact.quantile(XI[1:-2], a, MFP),
-    }
-    for name, function in asked.items():
-        slope = table[name][1] if name in ("reflectance", "decay_rate") else table[name][1][0]
-        along = difference(function, alphas, 1e-3 * alphas * (1 - alphas))
+    differences = difference(lambda a: by_name(a, np.s_[1:-2]), alphas, 1e-3 * alphas * (1 - alphas))
+    for name, along in zip(NAMES, differences, strict=True):
+        slope = table[name][1] if name in NAMES[:2] else table[name][1][0]
         np.testing.assert_allclose(slope[INSIDE], along, rtol=1e-7, atol=1e-9, err_msg=name)
 
 

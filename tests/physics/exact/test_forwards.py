@@ -63,13 +63,13 @@ def test_the_ends_are_exact(setting):
     np.testing.assert_allclose(source, ALPHAS * single_scattering.source_strength(setting), rtol=1e-4)
     assert exact.profile(0.0, 0.9, setting=setting) == np.inf
     assert exact.profile(np.inf, 0.9, setting=setting) == 0
+    np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=setting), [0.0, 0.0])
     np.testing.assert_allclose(exact.cdf([0.0, np.inf], 0.9, setting=setting), [0, 1], atol=1e-5)
 
 
 def test_lengths_and_shapes_are_those_of_the_medium():
-    np.testing.assert_allclose(
-        exact.profile(R[:, None], ALPHAS, 2.0, TISSUE), exact.profile(R[:, None] / 2, ALPHAS, setting=TISSUE) / 4
-    )
+    half = exact.profile(R[:, None] / 2, ALPHAS, setting=TISSUE)
+    np.testing.assert_allclose(exact.profile(R[:, None], ALPHAS, 2.0, TISSUE), half / 4)
     assert exact.profile(R[:0], 0.9, setting=TISSUE).shape == (0,)
     assert isinstance(exact.profile(1.0, 0.9, setting=TISSUE), float)
     xi = np.array([0.0, 0.1, 0.5, 0.99, 1.0])
@@ -101,12 +101,8 @@ def test_no_light_is_made_far_away(g):
 @pytest.mark.parametrize(
     ("setting", "alpha"),
     [
-        (Setting(n=1.4, g=0.95), 0.99),
-        (Setting("diffuse", 1.4, 0.95), 0.99),
-        (Setting(n=1.4, g=0.8), 0.2),
-        (Setting(n=1.4, g=0.05), 0.999),
-        (Setting(n=1.4, g=0.9), 1.0),
-        (Setting(n=1.4, g=0.9), 0.0),
+        *((Setting(light, 1.4, 0.95), 0.99) for light in ("searchlight", "diffuse")),
+        *((Setting(n=1.4, g=g), alpha) for g, alpha in ((0.8, 0.2), (0.05, 0.999), (0.9, 1.0), (0.9, 0.0))),
     ],
     ids=str,
 )
@@ -142,10 +138,6 @@ def test_a_profile_holds_its_reflectance(light, g):
             worst[kind] = max(worst[kind], off)
     assert worst[0.999] < 8e-4
     assert 4e-4 < worst[1.0] < 3.2e-3, "white media are worse: a test that can fail"
-
-
-def test_no_light_is_none_at_the_source():
-    np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=TISSUE), [0.0, 0.0])
 
 
 @pytest.mark.slow
