@@ -27,21 +27,3 @@ THREE_LAYERS_ABSORBED_BY_LAYER = (0.2619, 0.1488, 0.2311)
 THREE_LAYERS_ERROR = 4e-5
 THREE_LAYERS_ROUNDING_BY_LAYER = 5e-5
 THREE_LAYERS_TRANSMITTANCE_OF_RAN3 = 0.096355
-
-# Diffuse reflectance of the index-matched, isotropic half space under normal light, 1 - H(1) sqrt(1 - alpha)
-# (Chandrasekhar, Radiative Transfer, 1950, sec. 38 and 41).
-HALF_SPACE_REFLECTANCE = {
-    0.1: 0.016390,
-    0.2: 0.035231,
-    0.3: 0.057214,
-    0.4: 0.083357,
-    0.5: 0.115226,
-    0.6: 0.155415,
-    0.7: 0.208680,
-    0.8: 0.285255,
-    0.9: 0.414947,
-    0.95: 0.535541,
-    0.99: 0.752721,
-    0.999: 0.912845,
-    0.9999: 0.971418,
-}
