@@ -168,9 +168,8 @@ def test_a_broken_line_is_named(tmp_path, number, line, expected, got):
     found = re.fullmatch(rf"(.*)small\.mci:([0-9]+): expected {expected}, got (.*)", text)
     assert found, text
     assert found[3] == got
-    at = {"the end of the file": 12}.get(
-        got, 11 if line == "3" else 10 if line == "1" else number
-    )  # line 12: after the last line's end
+    # Line 12 is after the last line's end.
+    at = {"the end of the file": 12}.get(got, {"3": 11, "1": 10}.get(line, number))
     assert int(found[2]) == at
 
 
@@ -304,20 +303,20 @@ def test_both_runs_of_mcml_2_are_read():
     ("old", "new", "line", "told"),
     [
         (
-            "  skin	1.4	1	100	0.9",
-            "  skin	1.4	1	100	1",
+            "skin	1.4	1	100	0.9",
+            "skin	1.4	1	100	1",
             9,
             "g of 'skin' between -1 and 1, or 1 where nothing",
         ),
         (
-            "  skin	1.4	1	100	0.9",
-            "  skin	1.4	1	100",
+            "skin	1.4	1	100	0.9",
+            "skin	1.4	1	100",
             9,
             "a medium's name, n, mu_a, mu_s and g, 1000 media",
         ),
         (
-            "  skin	1.4	1",
-            "  skin	1.4	" + "9" * 5000,
+            "skin	1.4	1",
+            "skin	1.4	" + "9" * 5000,
             9,
             f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'",
         ),

@@ -159,9 +159,8 @@ def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
 
 def test_a_scheduler_that_leaves_is_one_line(lonely):
     threading.Timer(0.5, lonely.close).start()
-    with pytest.raises(
-        ClusterError, match=r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
-    ):
+    gone = r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
+    with pytest.raises(ClusterError, match=gone):
         run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
 
 
@@ -210,12 +209,9 @@ def test_no_address_is_refused(address):
         run_batches(TRACE, BATCH, BATCH, scheduler=address)
 
 
-def test_the_optional_package_is_named(monkeypatch):
+def test_the_optional_package_is_named_and_workers_here_and_there_are_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"the package distributed is missing; pip install distributed$"):
         run_batches(TRACE, BATCH, BATCH, scheduler="tcp://127.0.0.1:8786")
-
-
-def test_workers_here_and_there_are_refused():
     with pytest.raises(InputError, match="workers must be None where a scheduler is given"):
         run_batches(TRACE, BATCH, BATCH, workers=2, scheduler="tcp://127.0.0.1:8786")
