@@ -98,20 +98,27 @@ def test_a_worker_that_would_give_other_bits_is_refused_by_name(workers, monkeyp
         run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
-def test_an_error_on_a_worker_rises_here(workers):
-    with pytest.raises(TypeError, match="trace_batch"):
-        run_batches(partial(orders_batch.trace_batch, nonsense=1), BATCH, BATCH, scheduler=workers.scheduler_address)
+LACKING = r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"
+
+
+@pytest.mark.parametrize(
+    ("trace", "error", "message"),
+    [
+        (partial(orders_batch.trace_batch, nonsense=1), TypeError, "trace_batch"),
+        (lambda *_: __import__("mcml_sim_"), ClusterError, LACKING),
+        (lambda *_: (_ for _ in ()).throw(TimeoutError("mine")), TimeoutError, "mine"),
+    ],
+    ids=["any error", "without the package", "a time-out, which is no silence"],
+)
+def test_an_error_on_a_worker_rises_here(workers, trace, error, message):
+    with pytest.raises(error, match=message):
+        run_batches(trace, BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
 def test_a_batch_that_kills_its_workers_is_given_up_by_name(workers, monkeypatch):
     monkeypatch.setattr(workers.scheduler, "allowed_failures", 0)
     with pytest.raises(ClusterError, match=r"^batch 0 was on 1 workers of tcp://.* when they died, .*; look at their"):
         run_batches(lambda batch, photons: os._exit(1), BATCH, BATCH, scheduler=workers.scheduler_address)
-
-
-def test_a_worker_without_the_package_is_told_from_other_errors(workers):
-    with pytest.raises(ClusterError, match=r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"):
-        run_batches(lambda *_: __import__("mcml_sim_"), BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
 def test_a_scheduler_without_the_package_is_refused(workers, monkeypatch):
@@ -141,13 +148,6 @@ def test_a_cluster_without_workers_is_said_once(lonely, alone, monkeypatch):
     with pytest.warns(cluster.Deserted, match=r"^no worker has come to the scheduler at tcp://.* so far") as said:
         assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=lonely.scheduler_address), alone)
     assert len(said) == 1
-
-
-def test_a_batch_that_times_out_is_no_silence(workers):
-    with pytest.raises(TimeoutError, match="mine"):
-        run_batches(
-            lambda *_: (_ for _ in ()).throw(TimeoutError("mine")), BATCH, BATCH, scheduler=workers.scheduler_address
-        )
 
 
 @pytest.mark.usefixtures("python_handles_sigint")

@@ -14,15 +14,12 @@ ALPHAS = np.concatenate([[0.0, 1e-3], np.linspace(0.05, 0.95, 19), 1 - np.geomsp
 VALUES = np.random.default_rng(0).exponential(2, 10**5).astype(np.float32)
 
 
-def test_uneven_bins_are_found_exactly():
+def test_uneven_bins_are_found_exactly_and_even_ones_but_for_rounding_at_an_edge():
     edges = np.geomspace(1, 9, 11) - 1
     found = deposits.axis(edges, 1.5)
     assert not found.even
     expected = np.searchsorted(edges[1:] / 1.5, VALUES.astype(float), "right")
     np.testing.assert_array_equal(found.index(jnp.asarray(VALUES)), expected)
-
-
-def test_even_bins_are_found_but_for_rounding_at_an_edge():
     found = deposits.axis(Grid(0.3, 10).r_edges, 1.5)
     assert found.even
     assert found.bins == 10
@@ -81,19 +78,14 @@ def test_light_that_turns_slowly_has_more_orders():
     assert order_bins.bins_of(Setting(g=0.9)).stops[[0, -1]].tolist() == [512, 65536]
 
 
-def test_weights_are_powers_where_orders_are_exact():
+def test_weights_are_powers_where_orders_are_exact_and_have_derivatives():
+    """And are what they must be at the ends of alpha."""
     expected = bins.roulette_weights[:256] * ALPHAS[:, None] ** np.arange(1, 257)
     np.testing.assert_allclose(bins.weights(ALPHAS)[:, :256], expected, rtol=1e-13, atol=1e-300)
-
-
-def test_weights_at_the_ends_of_alpha():
     assert np.all(bins.weights(np.array(0.0)) == 0)
     np.testing.assert_allclose(bins.weights(np.array(1.0)), bins.roulette_weights, rtol=1e-13)
     assert bins.weight_derivatives(np.array(0.0))[0] == 1
     np.testing.assert_allclose(bins.weight_derivatives(np.array(1.0)), bins.roulette_weights * bins.mean_orders)
-
-
-def test_derivative_is_that_of_the_weights():
     alpha, step = np.linspace(0.1, 0.999, 10), 1e-7
     slope = (bins.weights(alpha + step) - bins.weights(alpha - step)) / (2 * step)
     np.testing.assert_allclose(bins.weight_derivatives(alpha), slope, rtol=1e-5, atol=1e-6)

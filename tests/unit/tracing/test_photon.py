@@ -102,9 +102,7 @@ def test_each_interaction_takes_its_share_and_waiting_takes_none():
     assert abs(flew.mean() - (1 - np.exp(-1))) < 4 * 0.5 / np.sqrt(NUMBER)
     np.testing.assert_array_equal(np.asarray(after.weight)[~flew], -1)
     np.testing.assert_array_equal(np.asarray(after.down)[~flew], np.complex64(0.1 - 1j))
-
-
-def test_those_who_wait_or_have_ended_stay_as_they_are():
+    # Those who wait or have ended stay as they are.
     before = lanes(unit(1, 0, 1), weight=-0.3)
     after, left = scatter(before)
     assert not np.any(left)
@@ -137,10 +135,9 @@ def test_an_interface_reflects_by_fresnel_and_bends_by_snell():
 
 def test_total_reflection_lets_nobody_out_and_the_normal_lets_most():
     assert np.all(settle(lanes(unit(2, 0, -1), layer=1, weight=-1)).layer == 1)
-    out = np.mean(np.asarray(settle(lanes((0, 0, -1), layer=1, weight=-1)).layer) == REFLECTED)
-    assert abs(1 - out - (0.4 / 2.4) ** 2) < 4 * np.sqrt(0.03 / NUMBER)
-    out = np.mean(np.asarray(settle(lanes((0, 0, 1), layer=3, weight=-1)).layer) == 4)
-    assert abs(1 - out - (0.6 / 2.6) ** 2) < 4 * np.sqrt(0.06 / NUMBER)
+    for uz, layer, beyond, share, most in ((-1, 1, REFLECTED, 0.4 / 2.4, 0.03), (1, 3, 4, 0.6 / 2.6, 0.06)):
+        out = np.mean(np.asarray(settle(lanes((0, 0, uz), layer=layer, weight=-1)).layer) == beyond)
+        assert abs(1 - out - share**2) < 4 * np.sqrt(most / NUMBER)
 
 
 def test_what_has_left_is_marked_and_stays_as_it_is():
