@@ -95,7 +95,7 @@ def test_slopes_in_mfp_are_those_of_a_scale(table):
 
 
 @pytest.mark.slow
-def test_slopes_at_the_ends_of_the_albedo(table):
+def test_slopes_at_the_ends(table):
     """Finite where the law is smooth, infinite where it is not: 1 - A ends in a root, and the cdf divides by A."""
     black, conservative, r = table["profile"][1][0][0], table["profile"][1][0][4], np.s_[1:-2]
     assert table["reflectance"][1][0, 0] == pytest.approx(exact.reflectance(1e-7) / 1e-7, rel=1e-5)
@@ -107,11 +107,7 @@ def test_slopes_at_the_ends_of_the_albedo(table):
     assert table["decay_rate"][1][4, 0] == -np.inf
     assert np.all(table["cdf"][1][0][4, r] == -np.inf)
     assert np.all(table["quantile"][1][0][4, r] == np.inf)
-
-
-@pytest.mark.slow
-def test_slopes_at_the_ends_of_radius_and_share(table):
-    """2 pi r R_d is alpha/2 at the source; at infinity nothing is left."""
+    # And at the ends of radius and share: 2 pi r R_d is alpha/2 at the source; at infinity nothing is left.
     ratio = exact.reflectance(0.8) / 0.8
     profile, cdf, quantile = (table[name][1][1][2] for name in ("profile", "cdf", "quantile"))
     assert cdf[0] == pytest.approx(0.5 / (ratio * MFP), rel=1e-4)  # r ln r: 1e-5 at 1e-6 mfp

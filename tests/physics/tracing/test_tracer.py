@@ -50,12 +50,6 @@ def test_every_photon_ends_at_a_place_and_inside_at_roulettes_and_the_cap_only(e
     assert abs(stopped - went_on) < 4 * np.sqrt(stopped + went_on)
 
 
-def test_photons_that_were_not_asked_for_are_not_started():
-    found = traced(100)
-    assert np.all(np.asarray(found.order)[:100] != 0)
-    assert np.all(np.asarray(found.order)[100:] == 0)
-
-
 @pytest.mark.parametrize(
     ("photons", "lanes", "x64"),
     [(5000, LANES, False), *slow((PHOTONS, 512, False), (PHOTONS, 16384, False), (PHOTONS, LANES, True))],
@@ -66,6 +60,7 @@ def test_no_bit_changes_with(ends, photons, lanes, x64):
         found = traced(photons, lanes)
     np.testing.assert_array_equal(np.asarray(found.rho)[:photons], ends[0][:photons])
     np.testing.assert_array_equal(np.asarray(found.order)[:photons], ends[1][:photons])
+    assert np.all(np.asarray(found.order)[photons:] == 0), "they were not asked for, and not started"
     assert found.rho.dtype == np.float32
 
 
@@ -138,17 +133,11 @@ def test_histogram_keeps_every_order_below_256(ends):
     assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
-def azimuth_words():
-    """All corners of the range and a million points between."""
-    near_ends = np.concatenate(
-        [np.arange(2**31 - 2**17, 2**31 + 2**17), np.arange(2**17), 2**32 - 1 - np.arange(2**17)]
-    )
-    between = np.random.default_rng(0).integers(0, 2**32, 10**6)
-    return np.concatenate([near_ends, between]).astype(np.uint32)
-
-
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
-    words = azimuth_words()
+    """At all corners of the range and a million points between."""
+    near = np.arange(2**17)
+    between = np.random.default_rng(0).integers(0, 2**32, 10**6)
+    words = np.concatenate([2**31 - 1 - near, 2**31 + near, near, 2**32 - 1 - near, between]).astype(np.uint32)
     cosine = np.asarray(jax.jit(half_space_event.azimuth_cosine)(words), np.float64)
     exact = np.sin(np.pi * (words.view(np.int32) + 0.5) / 2.0**32)
     assert np.abs(cosine - exact).max() < 5e-7
@@ -244,16 +233,13 @@ def test_photons_are_stopped_at_their_last_order_and_nowhere_else():
         assert np.all(np.asarray(after.order) == min(last, 35))
 
 
-def test_half_the_photons_win_each_toss():
-    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS).last)
+def test_half_the_photons_win_each_toss_independently_of_the_depth_it_is_drawn_with():
+    entered = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
+    z, last = np.asarray(entered.place.imag, np.float64), np.asarray(entered.last)
     counts = np.array([np.sum(last == stop) for stop in STOPS])
     expected = 2**18 * np.append(0.5 ** np.arange(1, 8), 0.5**7)
     assert counts.sum() == 2**18
     assert STOPS[-1] == MAX_ORDER
     assert np.all(np.abs(counts - expected) < 4 * np.sqrt(expected))
-
-
-def test_tosses_are_independent_of_the_depth_they_are_drawn_with():
-    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
-    z, loses = np.asarray(pool.place.imag, np.float64), np.asarray(pool.last) == FIRST_ROULETTE
+    loses = last == FIRST_ROULETTE
     assert abs(z[loses].mean() - z[~loses].mean()) < 4 * np.sqrt(4 / 2**18)

@@ -14,6 +14,7 @@ from profilefit.recipes.phases import read_phase
 PETZOLD = read_phase(shipped("fits") / "phases" / "petzold.csv").table
 FORAND = FournierForand(1.1054, 3.582)
 SEA = Mixture((0.317, 0.6813, 0.0017), (HenyeyGreenstein(0.9933), HenyeyGreenstein(0.8957), HenyeyGreenstein(-0.635)))
+ANY = Mixture((0.3, 0.3, 0.4), (PETZOLD, FORAND, HenyeyGreenstein(-0.2)))
 ALL = pytest.mark.parametrize("phase", [PETZOLD, FORAND, SEA], ids=["table", "Fournier-Forand", "mixture"])
 STRATA = 2 * 10**6
 
@@ -38,10 +39,15 @@ def drawn(phase, v):
     return jax.jit(lambda phase, v: phase.deflection(v)[0])(phase.for_kernel(), v)
 
 
-@ALL
-def test_stratified_draws_of_a_kernel(phase):
+@pytest.mark.parametrize(
+    ("phase", "most"),
+    # Each of three terms may gain or lose a stratum at its end.
+    [(PETZOLD, 1e-6), (FORAND, 1e-6), (SEA, 1e-6), (ANY, 3 / STRATA + 1e-6)],
+    ids=["table", "Fournier-Forand", "mixture", "mixture of any"],
+)
+def test_stratified_draws_of_a_kernel(phase, most):
     v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
-    assert apart(drawn(phase, v), phase) < 1e-6
+    assert apart(drawn(phase, v), phase) < most
     assert apart(drawn(HenyeyGreenstein(0.924), v), phase) > 1e-3
 
 
@@ -120,13 +126,6 @@ def test_tables_of_files(phase):
     setting = Setting("diffuse", n=1.3, phase=phase)
     assert Setting.of(setting.as_table()) == setting
     assert Setting().as_table() == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
-
-
-def test_a_kernel_takes_a_mixture_of_any():
-    """Each of three terms may gain or lose a stratum at its end."""
-    mixture = Mixture((0.3, 0.3, 0.4), (PETZOLD, FORAND, HenyeyGreenstein(-0.2)))
-    v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
-    assert apart(drawn(mixture, v), mixture) < 3 / STRATA + 1e-6
 
 
 def test_a_layer_has_one_phase_function():

@@ -81,6 +81,8 @@ def test_depths_and_rings_are_not_mixed_up(tmp_path):
         SMALL.removesuffix("\n"),
         SMALL + "\x1a",
         SMALL.replace("0.01 0.02", "+1e-2 .2E-1").replace("1.1\n", "1.1e+0\n").replace("1000", "+1000"),
+        # Comments may have any bytes.
+        SMALL.encode().replace(b"1000\n", b"1000 \xb5 photons # \xe9t\xe9\n").replace(b"1.2\n", b"1.2\n# \xff\n"),
     ],
 )
 def test_form_does_not_matter(tmp_path, text):
@@ -95,16 +97,14 @@ def test_format_is_the_first_letter_as_in_v1(tmp_path, line, form):
     assert (run.output, run.format) == ("out.mco", form)
 
 
-def test_last_layer_may_be_endless(tmp_path):
+def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
     for word in ("inf", "Inf", "INFINITY", "+inf"):
         (run,) = read_mci(written(tmp_path, with_line(10, f"1.5 2 80 0.8 {word}")))
         assert run.medium.layers[-1].thickness == math.inf
         assert run.medium.is_half_space
     with pytest.raises(InputError, match=r"small.mci:9: expected thickness of layer 1 of 2 in cm, .*, got 'inf'"):
         read_mci(written(tmp_path, with_line(9, "1.4 1 90 0.9 inf")))
-
-
-def test_clear_glass_may_have_any_mean_cosine_up_to_one(tmp_path):
+    # Clear glass may have any mean cosine up to one.
     (run,) = read_mci(written(tmp_path, with_line(9, "1.5 0 0 1 0.1")))
     assert run.medium.layers[0] == Layer(1.5, 0, 0, 1, 0.1)
 
@@ -196,11 +196,6 @@ def test_two_runs_cannot_have_one_output(tmp_path):
 def test_what_is_no_text_is_said(tmp_path, content, message):
     with pytest.raises(InputError, match=message):
         read_mci(written(tmp_path, content))
-
-
-def test_comments_may_have_any_bytes(tmp_path):
-    text = SMALL.encode().replace(b"1000\n", b"1000 \xb5 photons # \xe9t\xe9\n").replace(b"1.2\n", b"1.2\n# \xff\n")
-    assert read_mci(written(tmp_path, text)) == read_mci(written(tmp_path, SMALL))
 
 
 def test_what_cannot_be_opened_is_said(tmp_path):

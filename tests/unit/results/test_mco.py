@@ -232,9 +232,7 @@ def test_arguments_may_come_in_either_order(tally, tmp_path):
     write_mco(str(tmp_path / "a.mco"), tally)
     write_mco(tmp_path / "b.mco", tally)
     assert (tmp_path / "b.mco").read_text() == (tmp_path / "a.mco").read_text().replace("a.mco", "b.mco")
-
-
-def test_a_name_with_blanks_stays_one_word(tally, tmp_path):
+    # A name with blanks stays one word.
     write_mco(tally, tmp_path / "my #1\n.mco")
     assert by_lines(tmp_path / "my #1\n.mco")["photons"] == 1000
     assert "\nmy__1_.mco \tA\t\t# output file name" in (tmp_path / "my #1\n.mco").read_text()

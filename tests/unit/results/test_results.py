@@ -177,13 +177,10 @@ def test_estimate_is_mean_and_error_of_the_photons_one_by_one():
         assert found.effective_samples[row] == pytest.approx(each.sum() ** 2 / np.sum(each**2))
 
 
-def test_empty_bins_have_no_samples_and_no_nan():
+def test_empty_bins_have_no_samples_and_equal_weights_count_as_themselves():
     found = estimate(np.zeros((1, 3), np.int64), np.ones(3), 10)
     assert (found.value[0], found.standard_error[0], found.effective_samples[0]) == (0, 0, 0)
     assert not found.is_sampled()[0]
-
-
-def test_equal_weights_count_as_themselves():
     found = estimate(np.array([[99], [101]]), np.array([0.1]), 1000)
     np.testing.assert_allclose(found.effective_samples, [99, 101])
     np.testing.assert_array_equal(found.is_sampled(), [False, True])

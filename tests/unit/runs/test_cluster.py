@@ -50,12 +50,9 @@ def pids(workers):
 
 
 @pytest.mark.slow
-def test_two_processes_give_the_bits_of_one(workers, alone):
+def test_two_processes_give_the_bits_of_one(workers, alone, monkeypatch):
+    """Also of a batch that ends as the wait for it does."""
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
-
-
-@pytest.mark.slow
-def test_a_batch_that_ends_as_the_wait_for_it_does_is_taken(workers, alone, monkeypatch):
     real, waited = distributed.Future.result, set()
 
     def late(task, timeout=None):

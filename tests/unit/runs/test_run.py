@@ -108,9 +108,7 @@ def test_sums_are_added_in_the_order_of_batches(workers):
     np.testing.assert_array_equal(total.value, in_order(40).value)
     assert total.started == 400
     assert (order == sorted(order)) == (workers == 1), "else the order of finishing was not tried"
-
-
-def test_another_order_gives_other_bits():
+    # Another order gives other bits.
     backwards = reduce(operator.add, (Noise.of(batch, 10) for batch in reversed(range(40))))
     assert np.any(backwards.value != in_order(40).value)
 
@@ -152,12 +150,9 @@ def test_enough_is_asked_on_a_fixed_schedule_and_ends_the_run_there(tmp_path, wo
 
 
 @pytest.mark.parametrize("batches", [5, 8, 20])
-def test_a_run_that_never_has_enough_traces_all_its_photons(batches):
+def test_a_run_that_never_has_enough_traces_all_its_photons_and_an_error_in_enough_rises(batches):
     total = run_batches(jittery, 10, 10 * batches - 3, enough=lambda result: False)
     assert total.started == 10 * batches - 3
-
-
-def test_an_error_in_enough_rises():
     with pytest.raises(ZeroDivisionError):
         run_batches(one, 10, 1000, enough=lambda result: 1 / 0)
 
@@ -223,10 +218,8 @@ def test_shares_are_the_run_and_a_share_again_is_nothing(tmp_path):
     assert np.array_equal(together.ring_order_counts, alone.ring_order_counts)
     assert together.ledger == alone.ledger
     assert files(tmp_path) == before
-
-
-def test_a_longer_run_traces_a_short_batch_again(tmp_path):
-    assert [trace_share(0, 1, GRID, photons, 9, store=tmp_path) for photons in (500, 1000, 500)] == [1, 1, 0]
+    other = tmp_path / "a longer run traces a short batch again"
+    assert [trace_share(0, 1, GRID, photons, 9, store=other) for photons in (500, 1000, 500)] == [1, 1, 0]
 
 
 def test_what_is_no_share_is_said(tmp_path):

@@ -163,10 +163,13 @@ def test_any_flipped_bit_is_noticed(store, tmp_path):
     assert store.load(0).started == 15, "else anything would be noticed"
 
 
-def test_a_batch_whose_photons_do_not_add_up_is_damaged(store):
+def test_a_batch_whose_photons_do_not_add_up_or_that_cannot_be_read_is_damaged(store, tmp_path):
     store.save(0, Counts(COUNTS.exits, 4, 5, 16))
     with pytest.warns(DamagedBatch, match="its photons do not add up"):
         assert store.load(0) is None
+    (tmp_path / "batch-00000001.npz").mkdir()
+    with pytest.warns(DamagedBatch, match=r"batch-00000001.npz is damaged \(Is a directory\)"):
+        assert store.load(1) is None
 
 
 @pytest.mark.parametrize(
@@ -209,12 +212,6 @@ def test_a_seal_is_no_proof(store, tmp_path, monkeypatch, arrays, reason):
     body = file.getvalue()[:-2] + (64).to_bytes(2, "little")
     (tmp_path / "batch-00000000.npz").write_bytes(body + hashlib.sha256(body).hexdigest().encode())
     with pytest.warns(DamagedBatch, match=rf"is damaged \({reason}"):
-        assert store.load(0) is None
-
-
-def test_a_batch_that_cannot_be_read_is_damaged(store, tmp_path):
-    (tmp_path / "batch-00000000.npz").mkdir()
-    with pytest.warns(DamagedBatch, match=r"batch-00000000.npz is damaged \(Is a directory\)"):
         assert store.load(0) is None
 
 
