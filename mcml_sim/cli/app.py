@@ -185,11 +185,9 @@ def with_error(estimate: Estimate) -> str:
 
 def speed(photons: int, seconds: float, compiling: float) -> str:
     """Return the seconds of a run, and photons per second of the time that was not spent in compiling [s]."""
-    tracing = max(seconds - compiling, 1e-3)
-    rate = photons / tracing
-    return f"{times(seconds, compiling)}, " + (
-        f"{rate / 1e6:.3g} M photons/s" if rate >= SLOW else f"{rate:.0f} photons/s"
-    )
+    rate = photons / max(seconds - compiling, 1e-3)
+    shown = f"{rate / 1e6:.3g} M" if rate >= SLOW else f"{rate:.0f}"
+    return f"{times(seconds, compiling)}, {shown} photons/s"
 
 
 def times(seconds: float, compiling: float) -> str:

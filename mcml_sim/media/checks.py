@@ -109,10 +109,8 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
 
 def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
     """Return a number of threads, or None for one per core; a scheduler has workers of its own."""
-    if workers is not None and scheduler is not None:
-        raise InputError(
-            f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}"
-        )
+    accepted = "None where a scheduler is given, whose workers they are"
+    require(workers is None or scheduler is None, "workers", accepted, workers)
     return None if workers is None else checked_whole("workers", workers, lowest=1, highest=MAX_WORKERS)
 
 

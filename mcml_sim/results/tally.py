@@ -24,7 +24,7 @@ from mcml_sim.exact.single_scattering import entered
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import checked_path, write_whole
+from mcml_sim.files.whole_file import checked_path, reason_of, write_whole
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
@@ -323,8 +323,7 @@ def results_bytes(tally: Tally) -> bytes:
     }
     if tally.illumination != "searchlight":  # which files said nothing of when there was no other
         header[LIGHT] = tally.illumination
-    edges = {"r_edges": tally.grid.r_edges, "z_edges": tally.grid.z_edges, "a_edges": tally.grid.a_edges}
-    arrays = {name: values for name, values in edges.items() if values is not None}
+    arrays = {name: edges for name in EDGES if (edges := getattr(tally.grid, name)) is not None}
     for name in tally.quantities:
         estimate = tally.quantity(name)
         parts = (estimate.value, estimate.standard_error, estimate.effective_samples)
@@ -340,8 +339,7 @@ def read_results(path: str | os.PathLike[str]) -> Results:
         with Path(path).open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected results of mcml_sim, got: {reason}") from None
+        raise InputError(f"{path}: expected results of mcml_sim, got: {reason_of(error)}") from None
     return parse_results(content, str(path))
 
 
@@ -405,9 +403,8 @@ def _as_object(layer: Layer) -> dict[str, Any]:
 
 def _grid(arrays: Mapping[str, NDArray]) -> Grid:
     angles = arrays.get("a_edges")
-    grid = Grid.from_edges(
-        r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=None if angles is None else angles.size - 1
-    )
+    number = None if angles is None else angles.size - 1
+    grid = Grid.from_edges(r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=number)
     require_resolved(grid)
     if angles is not None and not (angles.ndim == 1 and np.allclose(angles, np.asarray(grid.a_edges), rtol=1e-12)):
         raise ValueError("a_edges must be even from 0 to pi/2")

@@ -236,7 +236,6 @@ def _apart(theirs: object, ours: object) -> tuple[str, str]:
     differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)
     start = max(next(differ, 0) - SHARED_SHOWN, 0)
     end = start + LONGEST_SHOWN
-    theirs, ours = (
-        ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "") for text in (there, here)
-    )
+    before = "..." if start else ""
+    theirs, ours = (before + text[start:end] + ("..." if end < len(text) else "") for text in (there, here))
     return theirs, ours

@@ -168,9 +168,7 @@ def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelS
     if len(lanes.absorbed) == 1:
         absorbed = (lanes.absorbed[0] + left,)
     else:
-        absorbed = tuple(
-            old + jnp.where(lanes.layer == number, left, 0) for number, old in enumerate(lanes.absorbed, start=1)
-        )
+        absorbed = tuple(old + jnp.where(lanes.layer == at, left, 0) for at, old in enumerate(lanes.absorbed, start=1))
     lanes = layered_event.settle(go, key, stack, lanes, lanes.event + FLIGHTS)
     return lanes._replace(event=lanes.event + EVENTS_PER_TURN, absorbed=absorbed), by_layer, by_cell
 
@@ -216,9 +214,8 @@ def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
     angles = len(bins.cosines) or 1
     if len(bins.cosines):
         # Edges fall from 1, so those above the cosine are counted.
-        angle = jnp.searchsorted(
-            -bins.cosines[1:], -results.cosines[:BATCH_PHOTONS], side="right", method="scan_unrolled"
-        )
+        rising, values = -bins.cosines[1:], -results.cosines[:BATCH_PHOTONS]
+        angle = jnp.searchsorted(rising, values, side="right", method="scan_unrolled")
         cell = cell * angles + angle.astype(jnp.int32)
     size = 2 * (bins.r.bins + 1) * angles
     sums = [jnp.zeros(size, jnp.float64).at[cell].add(w, mode="promise_in_bounds") for w in (weight, weight * weight)]

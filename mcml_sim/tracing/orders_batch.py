@@ -52,9 +52,8 @@ def trace_batch(
     columns[bins.max_order + 1 :] = bins.bin_of_order
     edges, count = jnp.asarray(rounded_up(grid.r_edges)), bins.last_orders.size + 2
     cells = np.asarray(histogram(ends, edges, jnp.asarray(columns), count)).astype(np.int64)
-    counts = Counts(
-        exits=cells[:, :-2], rouletted=int(cells[:, -2].sum()), cut=int(cells[:, -1].sum()), started=photons
-    )
+    rouletted, cut = (int(cells[:, column].sum()) for column in (-2, -1))
+    counts = Counts(cells[:, :-2], rouletted, cut, started=photons)
     counts.require_closed()
     return counts
 

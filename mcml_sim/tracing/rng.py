@@ -35,9 +35,8 @@ def batch_key(seed: int, batch: int) -> NDArray[np.uint32]:
 
 def draw(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array, Array]:
     """Return four independent uint32 words for each (photon, event), uint32 arrays of one shape; `key` is uint32[4]."""
-    x, y, z, w = (
-        v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2], key[3])
-    )
+    words = (photon + key[0], event + key[1], key[2], key[3])
+    x, y, z, w = (v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in words)
     for _ in range(2):
         x = x + y * w
         y = y + z * x
