@@ -44,6 +44,11 @@ def require(holds: object, name: str, accepted: str, value: object) -> None:
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
 
 
+def require_index(name: str, value: object) -> None:
+    """Raise InputError unless that is a refractive index."""
+    require(is_number(value) and math.isfinite(value) and value > 0, name, "a refractive index > 0", value)
+
+
 def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     """Return real numbers as float64, of any shape; `accepted` says what they are.
 

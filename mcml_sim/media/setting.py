@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mcml_sim.media import phase as phases
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.checks import is_number, require, require_index
 
 ILLUMINATIONS = ("searchlight", "diffuse")
 FORWARD_N, FORWARD_G = (1.33, 1.45), 0.95
@@ -39,8 +38,8 @@ class Setting:
         if self.phase is not None:
             phases.settle(self)
         require_illumination(self.illumination)
-        is_index = is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)
-        require(is_index, "n", "a refractive index > 0", self.n)
+        if not is_traced(self.n):
+            require_index("n", self.n)
         require(is_number(self.g) and -1 < self.g < 1, "g", "a mean cosine in (-1, 1)", self.g)
 
     @property
