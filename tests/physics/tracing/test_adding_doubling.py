@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, Layer, Medium, exact, simulate
-from tests.physics.tracing import published
+from tests.physics.tracing import test_published as published
 from tests.physics.tracing.adding_doubling import solve
 
 ANGLES = 18

@@ -22,15 +22,12 @@ BATCH = layered_batch.BATCH_PHOTONS
 class Found:
     """What became of each photon."""
 
-    side: np.ndarray
-    """-1 above, 1 below, 2 below without scattering, 0 if it ended inside."""
+    side: np.ndarray  # -1 above, 1 below, 2 below without scattering, 0 if it ended inside
     rho: np.ndarray
     cosine: np.ndarray
     weight: np.ndarray
-    by_layer: np.ndarray
-    """Weight left in each layer, (photons, layers)."""
-    by_depth: np.ndarray
-    """Weight left at each depth, the overflow last, (photons, depths + 1)."""
+    by_layer: np.ndarray  # weight left in each layer, (photons, layers)
+    by_depth: np.ndarray  # weight left at each depth, the overflow last, (photons, depths + 1)
 
 
 def slow_twin(medium, z_edges, photons, seed):

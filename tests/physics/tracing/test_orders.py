@@ -25,9 +25,7 @@ def test_reflectance_is_the_exact_one(run):
     assert np.abs(deviations(found, exact.reflectance(ALPHAS))).max() < 4
     assert np.all(found.standard_error < 2e-3 * found.value)
     assert np.abs(deviations(found, exact.reflectance(ALPHAS + 0.004))).min() > 4, "a wrong albedo is seen"
-
-
-def test_reflectance_at_0_999_is_exact_but_for_what_the_cap_cut(run):
+    # At 0.999 it is but for what the cap cut.
     found = run.reflectance(0.999)
     missing = exact.reflectance(0.999) - found.value
     assert -4 * found.standard_error < missing < 4 * found.standard_error + run.cut(0.999)
@@ -61,15 +59,13 @@ def test_estimates_add_up(run):
     np.testing.assert_allclose(run.energy(0.7).value, run.once(0.7)[:-1] + again)
 
 
-def test_derivative_is_the_slope_of_the_profile(run):
+def test_derivative_is_the_slope_of_the_profile(run, sidak):
     step = 1e-6
     for alpha in (0.2, 0.9, 0.99):
         below, above = (run.profile(a).value for a in (alpha - step, alpha + step))
         slope = (above - below) / (2 * step)
         np.testing.assert_allclose(run.profile_derivative(alpha).value, slope, rtol=1e-4, atol=1e-12 * slope.max())
-
-
-def test_derivative_is_that_of_the_exact_energy(run, sidak):
+    # And that of the exact energy.
     alpha, step = 0.9, 1e-4
     truth = (exact_energy(run.grid.r_edges, alpha + step) - exact_energy(run.grid.r_edges, alpha - step)) / (2 * step)
     found = run.profile_derivative(alpha).scaled(run.grid.r_areas)
@@ -108,11 +104,14 @@ def test_no_albedo_no_light_and_conservative_half_spaces_return_all_but_what_is_
     assert abs(found.value + run.cut(1.0) - 1) < 4 * found.standard_error + 0.2 * run.cut(1.0)
 
 
-def test_every_photon_is_in_the_ledger(run):
+def test_every_photon_is_in_the_ledger_and_seeds_have_photons_of_their_own(run):
     ledger = run.ledger
     assert ledger.started == run.photons == 2**22
     assert ledger.exited == run.counts.exits.sum()
     assert ledger.exited + ledger.rouletted + ledger.cut == ledger.started
+    a, b, c = (simulate_orders(Grid(0.5, 4), 20_000, seed=s) for s in (1, 1, 2))
+    np.testing.assert_array_equal(a.counts.exits, b.counts.exits)
+    assert np.any(a.counts.exits != c.counts.exits)
 
 
 @pytest.mark.slow
@@ -145,13 +144,6 @@ def test_covariance_of_many_albedos_fits_in_rank_8(run):
     variance = run.energy(alphas).standard_error ** 2
     big = variance > 1e-2 * variance.max(axis=0)
     np.testing.assert_allclose(np.sum(factors**2, axis=2).T[big], variance[big], rtol=0.02)
-
-
-def test_same_seed_same_bits_other_seed_others():
-    grid = Grid(0.5, 4)
-    a, b, c = (simulate_orders(grid, 20_000, seed=s) for s in (1, 1, 2))
-    np.testing.assert_array_equal(a.counts.exits, b.counts.exits)
-    assert np.any(a.counts.exits != c.counts.exits)
 
 
 @pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2], "half", None])

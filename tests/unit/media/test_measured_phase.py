@@ -134,9 +134,7 @@ def test_a_layer_has_one_phase_function():
     assert layer.similar == Layer(1.3, 0.1, 1 - SEA.mean_cosine, 0.0)
     assert Layer(1.3, 0.1, 1.0, 0.0, phase=HenyeyGreenstein(0.8)) == Layer(1.3, 0.1, 1.0, 0.8)
     assert Layer(1.3, 0.1, 1.0, 0.3, phase=Isotropic()) == Layer(1.3, 0.1, 1.0, 0.0)
-
-
-def test_no_preferred_mean_is_not_isotropic():
+    # One without a preferred mean is not isotropic.
     both = Mixture((0.5, 0.5), (HenyeyGreenstein(0.5), HenyeyGreenstein(-0.5)))
     assert Setting(phase=both).g == 0
     assert not Setting(phase=both).is_matched_isotropic
