@@ -54,28 +54,22 @@ def by_name(alphas, at):
 def test_mapped_answers_are_those_of_numpy(table):
     for name, values in zip(NAMES, by_name(ALPHAS[:-1], np.s_[:-1]), strict=True):
         np.testing.assert_allclose(table[name][0][:-1, :-1], values, rtol=1e-11, err_msg=name)
-
-
-@pytest.mark.slow
-def test_what_is_out_of_range_is_nan_where_it_may_be_traced(table):
+    # What is out of range is nan where it may be traced; no radii are traced too.
     for name in NAMES[2:]:
         assert np.isnan(table[name][0][-1]).all()
         assert np.isnan(table[name][0][:, -1]).all()
     for name in NAMES[:2]:
         assert np.isnan(table[name][0]).all(axis=1).tolist() == [False] * 5 + [True]
+    assert exact.profile(jnp.zeros(0), 0.5).shape == exact.reflectance(jnp.zeros((0, 2))).shape[:1] == (0,)
 
 
 @pytest.mark.slow
-def test_slopes_in_albedo_are_central_differences(table):
+def test_slopes_in_albedo_and_in_radius_and_share_are_central_differences(table):
     alphas = ALPHAS[1:-2]
     differences = difference(lambda a: by_name(a, np.s_[1:-2]), alphas, 1e-3 * alphas * (1 - alphas))
     for name, along in zip(NAMES, differences, strict=True):
         slope = table[name][1] if name in NAMES[:2] else table[name][1][0]
         np.testing.assert_allclose(slope[INSIDE], along, rtol=1e-7, atol=1e-9, err_msg=name)
-
-
-@pytest.mark.slow
-def test_slopes_in_radius_and_share_are_central_differences(table):
     for name, x, room in (("profile", R, R), ("cdf", R, R), ("quantile", XI, XI * (1 - XI))):
         function, inner = getattr(exact, name), np.s_[1:-2]
         along = difference(lambda v, f=function: f(v, ALPHAS[1:-2], MFP), x[inner], 1e-4 * room[inner])
@@ -129,11 +123,6 @@ def test_second_derivatives():
     along = lambda t: exact.profile(0.7 + t, 0.8 + t)  # noqa: E731
     near, far = (along(h) - 2 * along(0.0) + along(-h) for h in (1e-3, 2e-3))
     assert jax.jit(slope(slope(along)))(0.0) == pytest.approx((16 * near - far) / 12e-6, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_no_radii_are_traced_too():
-    assert exact.profile(jnp.zeros(0), 0.5).shape == exact.reflectance(jnp.zeros((0, 2))).shape[:1] == (0,)
 
 
 def test_numbers_inside_a_jitted_function_stay_numbers():

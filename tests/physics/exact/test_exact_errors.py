@@ -34,6 +34,10 @@ def test_the_estimate_is_the_error():
     error, estimate = np.abs(coarse / truth - 1), np.abs(coarse / finer - 1)
     assert error.max() > 1e-6
     assert estimate.max() == pytest.approx(error.max(), rel=0.5)
+    # It has the shape of the profile, and is 0 at its ends.
+    assert type(exact.error_estimate(1.0, 0.5)) is float
+    np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)
+    assert exact.error_estimate(2.0, 0.5, 2.0) == exact.error_estimate(1.0, 0.5)
 
 
 @pytest.mark.slow
@@ -42,13 +46,6 @@ def test_every_quadrature_needs_its_nodes(rule):
     """Negative control: few nodes of any of the three are seen."""
     r = np.geomspace(1e-2, 10.0, 12)
     assert np.abs(sampled(rule, r) / sampled(STANDARD, r) - 1).max() > 1e-7
-
-
-@pytest.mark.slow
-def test_an_estimate_has_the_shape_of_the_profile_and_is_0_at_its_ends():
-    assert type(exact.error_estimate(1.0, 0.5)) is float
-    np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)
-    assert exact.error_estimate(2.0, 0.5, 2.0) == exact.error_estimate(1.0, 0.5)
 
 
 def test_numbers_give_numbers_and_arrays_broadcast():

@@ -161,10 +161,7 @@ def test_narrow_and_far_rings_add_up_to_wide_ones():
     for ring in (100, 300, 399):
         assert beyond[ring] == pytest.approx(single_scattering.ring_shares([0, fine[ring]], setting)[-1], rel=1e-12)
     assert np.all(shares > 0)
-
-
-def test_the_denser_the_medium_the_less_comes_out():
-    """Light leaves through a cone of the solid angle ~ pi / n^2."""
+    # The denser the medium the less comes out, through a cone of the solid angle ~ pi / n^2.
     shares = [single_scattering.ring_shares([0, 1], Setting("diffuse", n=n)).sum() for n in (1.0, 1.5, 3.0)]
     assert shares[0] > 2 * shares[1] > 8 * shares[2]
 

@@ -32,33 +32,24 @@ def rays(first, last, moduli=(1e-30, 1e-12, 1e-3, 0.3, 0.99, 1.5, 30.0, 1e11)):
     return np.multiply.outer(moduli, np.exp(1j * np.radians(np.linspace(first, last, 9))))
 
 
-def test_square_root():
+def test_square_root_and_logarithm():
     z = rays(-179.0, 180.0)
     np.testing.assert_allclose(square_root(z), np.sqrt(z), rtol=1e-15)
     assert square_root(np.array(-4.0 + 0j)) == 2j
     slope = jax.grad(square_root, holomorphic=True)(-3.0 + 4.0j)
     assert slope == pytest.approx(0.5 / (1 + 2j), rel=1e-15)
-
-
-def test_logarithm():
     z = rays(-170.0, 170.0)
     np.testing.assert_allclose(logarithm(z), np.log(z), rtol=1e-13)  # ln |z| is small where |z| is nearly 1
     assert jax.grad(logarithm, holomorphic=True)(3.0 - 4.0j) == pytest.approx(1 / (3 - 4j), rel=1e-15)
 
 
-def test_arctangent():
+def test_arctangent_and_hyperbolic_functions():
     z = rays(-80.0, 80.0)
     np.testing.assert_allclose(arctangent(z), np.arctan(z), rtol=1e-14)
     below = np.array([0.0, 0.3j, 0.81j])  # on the imaginary axis, before the branch point at i
     np.testing.assert_allclose(arctangent(below), np.arctan(below), rtol=1e-14)
-
-
-def test_inverse_sinh():
     z = np.concatenate([rays(0.0, 80.0), [[0.3j] * 4 + [0.9j] * 5]])
     np.testing.assert_allclose(inverse_sinh(z, np.sqrt(1 + z * z)), np.arcsinh(z), rtol=2e-15)
-
-
-def test_sinh_and_cosh():
     z = rays(0.0, 90.0, (1e-30, 1e-12, 1e-3, 0.3, 0.99, 1.5, 20.0))
     sinh, cosh = sinh_and_cosh(z)
     np.testing.assert_allclose(sinh, np.sinh(z), rtol=1e-14)
@@ -89,16 +80,13 @@ def test_derivatives_are_central_differences(order):
     np.testing.assert_allclose(slope(z), difference(lambda z: kv(order, z), z, 1e-4), rtol=1e-8)
 
 
-def test_dispersion_is_its_formula():
+def test_dispersion_is_its_formula_and_keeps_the_digits_of_small_arguments():
     root = np.multiply.outer(np.geomspace(0.1, 1e8, 60), np.exp(1j * np.linspace(0.0, 0.8, 5)))
     found, plain = jax.jit(dispersion)(0.7, root**2), 1 - 0.7 * np.arctan(root) / root
     np.testing.assert_allclose(found, plain, rtol=1e-14)
     # On the imaginary axis, before the branch point.
     below = dispersion(jnp.float64(0.7), jnp.array(-0.25 + 0j))
     assert below == pytest.approx(1 - 0.7 * np.arctanh(0.5) / 0.5, rel=1e-14)
-
-
-def test_small_arguments_keep_their_digits():
     square = np.array([1e-30, 1e-9, SMALL_SQUARE * (1 - 1e-9), SMALL_SQUARE * (1 + 1e-9)]) + 0j
     found = np.asarray(dispersion(jnp.float64(1.0), square)).real
     np.testing.assert_allclose(found[:2], square[:2].real / 3, rtol=1e-8)

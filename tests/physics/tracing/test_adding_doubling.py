@@ -90,26 +90,21 @@ def test_thick_layer_is_the_exact_half_space(alpha):
     assert answer.transmitted.sum() < 1e-15
 
 
-def test_conservative_layers_lose_no_light():
+def test_conservative_layers_lose_no_light_and_indices_that_differ_are_refused():
     conservative = Medium((Layer(1.5, 0.0, 20.0, 0.9, 1.0), Layer(1.5, 0.0, 5.0, -0.3, 0.2)))
     answer = solve(conservative, angles=6)
     total = answer.specular + answer.reflected.sum() + answer.transmitted.sum() + answer.ballistic
     assert total == pytest.approx(1, abs=1e-11)
+    with pytest.raises(ValueError, match="share one index"):
+        solve(Medium((Layer(1.3, 1, 1, 0, 1), Layer(1.5, 1, 1, 0, 1))))
 
 
-def test_more_bundles_change_little():
+def test_more_bundles_and_more_layers_change_little():
     coarse, fine = solve(TWO_LAYERS, angles=9, nodes=4), solve(TWO_LAYERS, angles=9, nodes=6)
     np.testing.assert_allclose(coarse.reflected, fine.reflected, rtol=1e-5)
     np.testing.assert_allclose(coarse.transmitted, fine.transmitted, rtol=1e-5)
-
-
-def test_layer_cut_in_two_is_the_same_layer():
+    # A layer cut in two is the same layer.
     (whole,) = published.VAN_DE_HULST_SLAB.layers
     cut = Medium((replace(whole, thickness=0.005), replace(whole, thickness=0.015)))
     expected = solve(published.VAN_DE_HULST_SLAB, ANGLES).reflected
     np.testing.assert_allclose(solve(cut, ANGLES).reflected, expected, rtol=1e-10)
-
-
-def test_indices_that_differ_are_refused():
-    with pytest.raises(ValueError, match="share one index"):
-        solve(Medium((Layer(1.3, 1, 1, 0, 1), Layer(1.5, 1, 1, 0, 1))))

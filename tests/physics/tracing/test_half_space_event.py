@@ -134,14 +134,11 @@ def test_diffuse_light_enters_at_the_exact_cosines(n):
     np.testing.assert_allclose(found, np.interp(xi.astype(float) * cdf[-1], cdf, mu), atol=2e-6)
 
 
-def test_another_setting_does_not_compile_again():
+def test_another_setting_does_not_compile_again_and_double_precision_elsewhere_does_not_change_a_bit():
     traced(Setting(n=1.31), 100)
     with Compiling() as again:
         traced(Setting("diffuse", n=1.2, g=0.3), 100)
     assert again.seconds == 0
-
-
-def test_double_precision_elsewhere_does_not_change_a_bit():
     setting = Setting("diffuse", n=1.4, g=0.7)
     alone = traced(setting, 2000)
     with jax.enable_x64(True):

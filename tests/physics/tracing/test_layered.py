@@ -260,15 +260,12 @@ def test_conservative_half_space_ends_and_says_what_it_cut():
     assert abs(reflected + cut / 2 - d.started) > 2 * error
 
 
-def test_conservative_slab_sends_everything_back_or_through():
+def test_conservative_slab_sends_everything_back_or_through_and_without_scattering_beers_law_holds():
     d = one_layer(Medium((Layer(1.5, 0, 50, 0.7, 0.2),)))
     reflected, transmitted, absorbed, cut = shares(d)
     error = np.sqrt(d.accounted_squares - d.accounted**2 / d.started)
     assert absorbed == cut == 0
     assert abs(reflected + transmitted - d.started) < 4 * error + 1e-6 * d.started
-
-
-def test_absorption_without_scattering_is_beers_law():
     d = one_layer(Medium((Layer(1.0, 2, 0, 0, 0.5),)))
     assert d.reflected.sum() == d.transmitted.sum() == 0
     assert abs(d.ballistic / d.started - np.exp(-1)) < 4 * 0.5 / np.sqrt(d.started)

@@ -74,6 +74,12 @@ def test_rings_are_those_of_float64_edges(ends):
     ring = np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1
     expected = np.bincount(ring, minlength=grid.rings + 1)
     np.testing.assert_array_equal(counts.exits.sum(axis=1), expected)
+    # And every order below 256 has its own bin.
+    counts = orders_batch.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
+    expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
+    np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
+    assert counts.is_closed
+    assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
 RADII = np.concatenate([[0.0], np.geomspace(0.03, 5, 12)])
@@ -125,14 +131,6 @@ def test_other_settings_take_the_general_kernel():
     assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
 
 
-def test_histogram_keeps_every_order_below_256(ends):
-    counts = orders_batch.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
-    expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
-    np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
-    assert counts.is_closed
-    assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
-
-
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
     """At all corners of the range and a million points between."""
     near = np.arange(2**17)
@@ -142,9 +140,7 @@ def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
     exact = np.sin(np.pi * (words.view(np.int32) + 0.5) / 2.0**32)
     assert np.abs(cosine - exact).max() < 5e-7
     assert np.abs(cosine).max() <= 1
-
-
-def test_azimuth_cosine_is_that_of_a_uniform_angle():
+    # It is that of a uniform angle.
     words = np.random.default_rng(1).integers(0, 2**32, 10**6).astype(np.uint32)
     angle = np.arccos(np.asarray(half_space_event.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
     # Kolmogorov-Smirnov: 1.95 / sqrt(N) has a chance of 1e-3.
@@ -170,13 +166,6 @@ def placed(z, order, last=MAX_ORDER, count=2**14):
 KEY = jnp.asarray(rng.batch_key(0, 0))
 ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
 FLY = jax.jit(half_space_event.fly, static_argnames="events")
-
-
-def test_first_scatterings_lie_straight_below_at_exponential_depths():
-    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), STOPS)
-    assert np.all(pool.place.real == 0)
-    assert np.all(pool.order == 0)
-    assert abs(np.mean(pool.place.imag) - 1) < 4 / 2**8
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():
@@ -235,6 +224,10 @@ def test_photons_are_stopped_at_their_last_order_and_nowhere_else():
 
 def test_half_the_photons_win_each_toss_independently_of_the_depth_it_is_drawn_with():
     entered = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
+    # First scatterings lie straight below at exponential depths.
+    assert np.all(entered.place.real == 0)
+    assert np.all(entered.order == 0)
+    assert abs(np.mean(entered.place.imag[: 2**16]) - 1) < 4 / 2**8
     z, last = np.asarray(entered.place.imag, np.float64), np.asarray(entered.last)
     counts = np.array([np.sum(last == stop) for stop in STOPS])
     expected = 2**18 * np.append(0.5 ** np.arange(1, 8), 0.5**7)

@@ -7,13 +7,6 @@ import pytest
 from mcml_sim import Grid, InputError
 
 
-def test_even_rings_have_the_edges_and_areas_of_circles():
-    grid = Grid(0.5, 4)
-    np.testing.assert_array_equal(grid.r_edges, [0, 0.5, 1, 1.5, 2])
-    np.testing.assert_allclose(np.cumsum(grid.r_areas), np.pi * grid.r_edges[1:] ** 2, rtol=1e-15)
-    assert grid.rings == 4
-
-
 def test_grids_are_equal_by_value_and_cannot_change():
     grid, same, other = Grid(0.5, 2), Grid.from_edges(r=[0, 0.5, 1]), Grid.from_edges(r=[0, 0.5, np.nextafter(1, 2)])
     assert grid == same
@@ -52,8 +45,11 @@ def test_digests_are_those_that_stores_hold_and_a_grid_tells_of_itself():
     assert Grid(0.5, 2, 0.25, 3, na=4).digest == "0e2cb61b5b804b55a01d345d56dc14d6237259ab9fd8e70d7f0790ef0f2228e9"
 
 
-def test_depths_are_even_or_as_given():
+def test_rings_and_depths_are_even_or_as_given():
     grid = Grid(0.5, 4, 0.25, 3, na=2)
+    np.testing.assert_array_equal(grid.r_edges, [0, 0.5, 1, 1.5, 2])
+    np.testing.assert_allclose(np.cumsum(grid.r_areas), np.pi * grid.r_edges[1:] ** 2, rtol=1e-15)
+    assert grid.rings == 4
     np.testing.assert_array_equal(grid.z_edges, [0, 0.25, 0.5, 0.75])
     np.testing.assert_array_equal(grid.z_widths, [0.25] * 3)
     uneven = Grid.from_edges(r=[0, 1, 4], z=[0, 2, 3], na=2)

@@ -26,14 +26,11 @@ def test_derived_numbers_of_a_layer():
     assert (glass.mu_t, glass.alpha, glass.mfp) == (0, 0, math.inf)
 
 
-def test_depths_of_the_interfaces():
+def test_media_are_values_and_have_interfaces():
     medium = Medium([TISSUE, TISSUE, Layer(1.4, 1, 9, 0)])
     np.testing.assert_allclose(medium.z_edges, [0, 0.1, 0.2, math.inf])
     assert medium.is_half_space
     assert not Medium((TISSUE,)).is_half_space
-
-
-def test_media_are_values():
     medium = Medium([TISSUE, TISSUE], n_above=1.1)
     assert medium == Medium((TISSUE, TISSUE), 1.1, 1)
     assert medium != Medium((TISSUE, TISSUE))
@@ -97,12 +94,9 @@ def test_a_layer_names_what_physics_forbids(name, value):
         Layer(**{"n": 1.4, "mu_a": 1, "mu_s": 9, "g": 0, "thickness": 1, name: value})
 
 
-def test_extinction_must_be_finite_too():
+def test_a_medium_names_what_is_wrong():
     with pytest.raises(InputError, match=r"mu_a \+ mu_s must be finite, got 1.7e\+308 and 1.7e\+308"):
         Layer(1, 1.7e308, 1.7e308, 0, 1)
-
-
-def test_a_medium_names_what_is_wrong():
     with pytest.raises(InputError, match="layers must be Layer objects, got 3"):
         Medium((TISSUE, 3))
     with pytest.raises(InputError, match="layers must be Layer objects, got 'tissue'"):

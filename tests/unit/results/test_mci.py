@@ -41,7 +41,7 @@ def with_line(number: int, line: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_reads_the_two_runs_of_the_template():
+def test_reads_the_runs_of_the_template_and_the_example():
     first, second = read_mci(DATA / "template.mci")
     assert (first.output, first.format, first.photons) == ("temp1.mco", "A", 10)
     assert (first.dz, first.dr, first.nz, first.nr, first.na) == (20e-4, 20e-4, 10, 20, 30)
@@ -49,9 +49,7 @@ def test_reads_the_two_runs_of_the_template():
     assert not first.medium.is_half_space, "1E8 cm stays a length, as in V1"
     assert (second.output, second.photons, second.medium.layers) == ("temp2.mco", 20, (Layer(1.4, 10, 200, 0.7, 1e8),))
     assert second.grid == Grid(20e-4, 80, 20e-4, 80, na=30)
-
-
-def test_reads_the_three_layers_of_the_example():
+    # And the three layers of the example.
     (run,) = read_mci(str(DATA / "example.mci"))
     rows = [(1.37, 1, 100, 0.9, 0.1), (1.37, 1, 10, 0, 0.1), (1.37, 2, 10, 0.7, 0.2)]
     assert run.medium.layers == tuple(Layer(*row) for row in rows)

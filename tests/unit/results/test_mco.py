@@ -203,9 +203,7 @@ def test_totals_are_the_sums_of_the_tables(tally, tmp_path):
         assert found[f"{side}_r"] @ areas == pytest.approx(total, rel=1e-4)
         assert found[f"{side}_a"] @ np.sin(angles) * 2 * math.pi * da == pytest.approx(total, rel=1e-4)
     np.testing.assert_allclose(areas @ found["A_rz"], found["A_z"], rtol=1e-4)
-
-
-def test_angles_that_are_not_resolved_are_one_bin(tally, tmp_path):
+    # Angles that are not resolved are one bin.
     write_mco(made_up(tally.medium, Grid(0.03, 4, 0.02, 3)), tmp_path / "out.mco")
     found = by_lines(tmp_path / "out.mco")
     assert found["Rd_ra"].shape == (4, 1)

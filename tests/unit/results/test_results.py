@@ -193,12 +193,9 @@ def test_only_scalar_estimates_are_floats():
         float(Estimate(np.zeros(2), np.zeros(2), np.zeros(2)))
 
 
-def test_counts_beyond_float32_stay_exact():
+def test_counts_beyond_float32_stay_exact_and_a_lost_photon_is_found():
     one = Counts(np.full((1, 1), 2**60 + 1), 0, 0, 2**60 + 1)
     assert (one + one).exits[0, 0] == 2**61 + 2
-
-
-def test_a_lost_photon_is_found():
     good = Counts(np.array([[2, 3]]), 4, 1, 10)
     good.require_closed()
     assert not Counts(good.exits, 4, 1, 11).is_closed

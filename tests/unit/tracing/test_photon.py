@@ -161,13 +161,11 @@ def test_roulette_keeps_the_weight_of_all(weight, event, chance):
     assert np.all(np.asarray(after.layer)[~goes_on] == ROULETTED)
 
 
-def test_long_paths_toss_once_an_octave_and_not_where_they_are_cut():
+def test_nothing_ends_for_good_but_by_weight_zero_and_the_cap():
+    # Long paths toss once an octave, and not where they are cut.
     events = np.arange(0, MAX_EVENTS + EVENTS_PER_TURN, EVENTS_PER_TURN, dtype=np.uint32) + EVENTS_PER_TURN - 1
     late = np.asarray(layered_event.is_late(jnp.asarray(events)))
     assert np.sum(late) == np.log2(MAX_EVENTS // FIRST_TOSS)
-
-
-def test_nothing_ends_for_good_but_by_weight_zero_and_the_cap():
     above = settle(lanes(weight=1.01 * THRESHOLD))  # which is left alone
     assert not np.any(above.ended)
     np.testing.assert_array_equal(above.weight, np.float32(1.01 * THRESHOLD))
