@@ -173,6 +173,5 @@ def require_resolved(grid: Grid) -> None:
                 f"got one from {float(lower[at])!r} to {float(upper[at])!r}"
             )
         if upper[0] < SHORTEST or upper[-1] > LONGEST:
-            raise InputError(
-                f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {upper[0]:g} to {upper[-1]:g} of {name}"
-            )
+            got = f"{upper[0]:g} to {upper[-1]:g} of {name}"
+            raise InputError(f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {got}")

@@ -171,9 +171,8 @@ def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
     name = Path(run.output)
     if name.is_absolute() or ".." in name.parts:
         if folder is None or name.name in ("", ".."):
-            raise InputError(
-                f"output files must lie in the current folder, or have a name and {NAMED}, got {run.output}"
-            )
+            accepted = f"in the current folder, or have a name and {NAMED}"
+            raise InputError(f"output files must lie {accepted}, got {run.output}")
         name = Path(name.name)
     mco = (folder or Path()) / name
     bare = mco.with_suffix("") if mco.suffix.lower() == ".mco" else mco

@@ -24,6 +24,7 @@ GLAZED = Medium(
 )
 REFRACTING = Medium((Layer(1.4, 0.1, 2.0, 0.0, 0.5), Layer(1.4, 0.5, 0.5, 0.0, 0.7), Layer(1.4, 0.05, 1.5, 0.0)))
 PLATE = Medium((Layer(1.4, 0.01, 1.0, 0.0, 0.05), Layer(1.4, 0.1, 1.0, 0.0, 0.05)))
+LAYER = Layer(1.3, 1.0, 1.0, 0.0, 1.0)
 UNDER_GLASS = Medium((Layer(1.3, 0.1, 2.0, 0.0, 0.3), Layer(1.3, 0.5, 1.5, 0.0, 0.4)), n_above=1.5)
 
 
@@ -42,13 +43,8 @@ def milkier(medium):
 def cut(alpha, n=1.0, change=1e-9):
     """A half space of one mean free path cut into three layers, none quite equal to another."""
     absorbs, scatters = 1 - alpha, alpha
-    return Medium(
-        (
-            Layer(n, absorbs, scatters, 0.0, 0.3),
-            Layer(n, absorbs * (1 + change), scatters, 0.0, 1.0),
-            Layer(n, absorbs, scatters * (1 + change), 0.0),
-        )
-    )
+    above = Layer(n, absorbs, scatters, 0.0, 0.3), Layer(n, absorbs * (1 + change), scatters, 0.0, 1.0)
+    return Medium((*above, Layer(n, absorbs, scatters * (1 + change), 0.0)))
 
 
 def random_stack(rng, white=False):
@@ -242,11 +238,8 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
     ("medium", "message"),
     [
         (half_space(0.9, g=0.5), r"must scatter with g = 0, got 0.5 in layer 1"),
-        (
-            Medium((Layer(1.3, 1.0, 1.0, 0.0, 1.0), Layer(1.4, 1.0, 1.0, 0.0))),
-            r"one n in all layers, got 1.3 in layer 1 and 1.4 in layer 2",
-        ),
-        (Medium((Layer(1.3, 1.0, 1.0, 0.0, 1.0),) * 21), r"must have at most 20 layers, got 21"),
+        (Medium((LAYER, Layer(1.4, 1.0, 1.0, 0.0))), r"one n in all layers, got 1.3 in layer 1 and 1.4 in layer 2"),
+        (Medium((LAYER,) * 21), r"must have at most 20 layers, got 21"),
         (0.9, r"medium must be a mcml_sim.Medium, got 0.9"),
     ],
 )

@@ -13,6 +13,7 @@ from mcml_sim.media import fresnel
 from mcml_sim.media.medium import MAX_LAYERS
 
 TISSUE = Layer(n=1.4, mu_a=1, mu_s=99, g=0.9, thickness=0.1)
+NO_NUMBERS = (np.nan, None, True, False, np.complex128(0.5), np.complex128(1.4))
 
 
 def test_derived_numbers_of_a_layer():
@@ -144,16 +145,8 @@ def test_any_difference_makes_another_setting_and_light_does_not_unmatch_it(sett
         (half_space, [-0.1, 1.1, math.nan, None, True], r"alpha must be a single-scattering albedo in \[0, 1\]"),
         (lambda mfp: half_space(0.5, mfp=mfp), [0, -1, math.inf, math.nan, "1"], "mfp must be a mean free path > 0"),
         (Setting, ["laser", "", None, 3, ["diffuse"]], "illumination must be one of searchlight, diffuse"),
-        (
-            lambda n: Setting(n=n),
-            [0.0, -1.4, np.inf, np.nan, "glass", None, True, np.complex128(1.4)],
-            "n must be a refractive index > 0",
-        ),
-        (
-            lambda g: Setting(g=g),
-            [-1.0, 1.0, 2.0, np.nan, "forward", None, False, np.complex128(0.5)],
-            r"g must be a mean cosine in \(-1, 1\)",
-        ),
+        (lambda n: Setting(n=n), [0.0, -1.4, np.inf, "glass", *NO_NUMBERS], "n must be a refractive index > 0"),
+        (lambda g: Setting(g=g), [-1.0, 1.0, 2.0, "forward", *NO_NUMBERS], r"g must be a mean cosine in \(-1, 1\)"),
     ],
     ids=["albedo", "mean free path", "illumination", "index", "mean cosine"],
 )

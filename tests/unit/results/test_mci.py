@@ -274,6 +274,9 @@ what follows is not read
 """
 
 
+SKIN, LONG = "  skin\t1.4\t1\t100\t0.9", "9" * 5000
+
+
 def parsed_2(text: str):
     return parse_mci(text.encode(), "two.mci")
 
@@ -295,24 +298,9 @@ def test_both_runs_of_mcml_2_are_read():
 @pytest.mark.parametrize(
     ("old", "new", "line", "told"),
     [
-        (
-            "skin	1.4	1	100	0.9",
-            "skin	1.4	1	100	1",
-            9,
-            "g of 'skin' between -1 and 1, or 1 where nothing",
-        ),
-        (
-            "skin	1.4	1	100	0.9",
-            "skin	1.4	1	100",
-            9,
-            "a medium's name, n, mu_a, mu_s and g, 1000 media",
-        ),
-        (
-            "skin	1.4	1",
-            "skin	1.4	" + "9" * 5000,
-            9,
-            f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'",
-        ),
+        (SKIN, SKIN.replace("0.9", "1"), 9, "g of 'skin' between -1 and 1, or 1 where nothing"),
+        (SKIN, SKIN.removesuffix("\t0.9"), 9, "a medium's name, n, mu_a, mu_s and g, 1000 media"),
+        (SKIN, SKIN.replace("\t1\t", f"\t{LONG}\t"), 9, f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'"),
         ("  glass	1.5", "  air	1.5", 8, "each medium once, got 'air' again"),
         ("  skin	0.2", "  bone	0.2", 15, "one of the media air, glass, skin, got 'bone'"),
         ("  skin	0.2", "  skin", 17, "a medium above, layers with their thickness, and a medium below, got 4 lines"),
@@ -327,7 +315,7 @@ def test_both_runs_of_mcml_2_are_read():
         ("a_z\n", "rd_t\n", 37, "quantities of .*none resolved in time, got 'rd_t'"),
         ("1E3	10:00", "10:00	", 23, "the number of photons, a whole number from 1 to 10+, got '10:00'"),
         ("1E3	10:00", "1.5", 23, "the number of photons, a whole number"),
-        ("1E3	10:00", "9" * 5000, 23, f"the number of photons, .*, got '{'9' * 37}\\.\\.\\.'"),
+        ("1E3	10:00", LONG, 23, f"the number of photons, .*, got '{'9' * 37}\\.\\.\\.'"),
         ("1E-4	", "2	", 24, "the threshold weight, a number from 0 to 1, got '2'"),
         ("7					#", "-7 #", 25, "the seed, a whole number from 0 to 2147483647, got '-7'"),
         ("two.mco	B", "./one.mco	B", 27, "an output file that no other run has"),
