@@ -96,13 +96,7 @@ def test_the_twins_are_that_sharp():
     assert wrong != pytest.approx(profile_along_contour(np.array([0.6]), 0.8)[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("r", [0.01, 0.3, 1.0, 5.0, 20.0])
-def test_little_scattering_is_single_scattering(r):
-    alpha = 1e-7  # twice scattered light adds of order alpha r
-    assert exact.profile(r, alpha) / alpha == pytest.approx(single_scattering(r), rel=1e-5)
-
-
-def test_the_cdf_without_scattering_is_that_of_single_scattering():
+def test_little_scattering_is_single_scattering():
     """The light from depth z leaves within r with the cosines from z/d to 1, alike: half the integral of e^-z/c."""
 
     def energy(r):
@@ -112,6 +106,9 @@ def test_the_cdf_without_scattering_is_that_of_single_scattering():
 
         return quad(along, 0, np.inf, epsabs=0, epsrel=1e-10, limit=200)[0]
 
+    for r in (0.01, 0.3, 1.0, 5.0, 20.0):
+        alpha = 1e-7  # twice scattered light adds of order alpha r
+        assert exact.profile(r, alpha) / alpha == pytest.approx(single_scattering(r), rel=1e-5)
     total = quad(lambda z: 0.5 * np.exp(-z) * expn(2, z), 0, np.inf, epsabs=0, epsrel=1e-11)[0]
     for r in (0.2, 1.0, 4.0):
         assert exact.cdf(r, 0.0) == pytest.approx(energy(r) / total, rel=1e-7)
@@ -216,15 +213,12 @@ def test_nothing_jumps_where_the_limit_at_the_source_takes_over_and_quantile_inv
     assert exact.cdf(exact.quantile(xi, 0.5, setting=setting), 0.5, setting=setting) == pytest.approx(xi, rel=1e-9)
 
 
-def test_near_conservative_the_loss_is_2_91_times_the_root():
+def test_near_conservative_the_loss_is_2_91_times_the_root_and_conservative_light_ends_in_a_power():
+    """Where nothing is absorbed R^(k) = 1 - H(1) k / sqrt(3) + ..., so 1 - cdf = H(1) / (sqrt(3) r)."""
     for exponent in (6, 8, 10):
         s = 10.0 ** (-exponent / 2)
         # The next term of the expansion is O(s) relative, about 4 s.
         assert (1 - exact.reflectance(1 - s**2)) / s == pytest.approx(H_NORMAL_CONSERVATIVE, rel=6 * s)
-
-
-def test_conservative_light_ends_in_a_power():
-    """Where nothing is absorbed R^(k) = 1 - H(1) k / sqrt(3) + ..., so 1 - cdf = H(1) / (sqrt(3) r)."""
     for r in (1e3, 1e4, FARTHEST_RADIUS, 100 * FARTHEST_RADIUS):
         end = 2 * np.pi * r**3 * exact.profile(r, 1.0)
         assert end == pytest.approx(H_NORMAL_CONSERVATIVE / np.sqrt(3), rel=10 / r)

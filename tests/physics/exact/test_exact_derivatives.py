@@ -74,11 +74,7 @@ def test_slopes_in_albedo_and_in_radius_and_share_are_central_differences(table)
         function, inner = getattr(exact, name), np.s_[1:-2]
         along = difference(lambda v, f=function: f(v, ALPHAS[1:-2], MFP), x[inner], 1e-4 * room[inner])
         np.testing.assert_allclose(table[name][1][1][INSIDE], along, rtol=1e-8, atol=1e-10, err_msg=name)
-
-
-@pytest.mark.slow
-def test_slopes_in_mfp_are_those_of_a_scale(table):
-    """R_d(r; l) = R_d(r / l; 1) / l^2, and the like."""
+    # Slopes in mfp are those of a scale: R_d(r; l) = R_d(r / l; 1) / l^2, and the like.
     profile, cdf, quantile = (
         [table[n][0][INSIDE], *(s[INSIDE] for s in table[n][1])] for n in ("profile", "cdf", "quantile")
     )

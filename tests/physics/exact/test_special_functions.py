@@ -108,10 +108,7 @@ def test_decay_rate_at_its_ends():
     assert exact.decay_rate([0.5, 0.9]).shape == (2,)
     around = exact.decay_rate(LEAST_ALBEDO * np.array([1 - 1e-9, 1 + 1e-9]))
     assert around[0] == around[1]
-
-
-def test_the_square_is_smooth_up_to_alpha_1():
-    """Its slope is -3 there; kappa's is infinite."""
+    # Its square is smooth up to alpha = 1: the slope is -3 there; kappa's is infinite.
     slope = jax.vmap(jax.grad(squared_decay_rate))(jnp.array([0.0, 0.5, 1 - 1e-6, 1.0]))
     h = 1e-6
     middle = (exact.decay_rate(0.5 + h) ** 2 - exact.decay_rate(0.5 - h) ** 2) / (2 * h)

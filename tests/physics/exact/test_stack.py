@@ -163,10 +163,7 @@ def test_fewer_nodes_state_the_larger_error_that_they_have(illumination):
     right, few = (exact.solve(GLAZED, illumination, nodes) for nodes in (solution.FINE, exact.Nodes(6, 5, 5)))
     assert abs(few.reflectance / right.reflectance - 1) < few.error
     assert few.error > 1e3 * exact.solve(GLAZED, illumination).error
-
-
-@BOTH
-def test_a_white_half_space_sends_all_light_back(illumination):
+    # A white half space sends all light back.
     medium = Medium((Layer(1.4, 0.0, 1.0, 0.0, 0.5), Layer(1.4, 0.0, 3.0, 0.0)))
     found = exact.solve(medium, illumination)
     assert found.reflectance == pytest.approx(entered(Setting(illumination, n=1.4)), rel=1e-6)

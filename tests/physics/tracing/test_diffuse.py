@@ -74,15 +74,13 @@ def test_orders_agree(n):
         assert (chi2.sf(np.sum(z**2), z.size) > CHANCE) == is_likely
 
 
-def test_adding_and_doubling_agrees_where_scattering_is_forward():
+def test_adding_and_doubling_agrees():
     tally, twin = shone(FORWARD), adding_doubling.solve(FORWARD, diffuse=True)
     assert agrees(tally.diffuse_reflectance, twin.reflected.sum())
     assert agrees(tally.transmittance, twin.transmitted.sum())
     assert tally.specular_reflectance.value == pytest.approx(twin.specular, abs=1e-5)
     assert not agrees(tally.transmittance, adding_doubling.solve(FORWARD).transmitted.sum())
-
-
-def test_adding_and_doubling_of_diffuse_light_is_exact_light():
+    # And it is exact light where scattering is isotropic.
     medium = replace(STACK, n_below=1.0)
     twin, found = adding_doubling.solve(medium, 9, 8, diffuse=True), exact.solve(medium, "diffuse")
     assert twin.reflected.sum() == pytest.approx(found.reflectance, rel=1e-6)

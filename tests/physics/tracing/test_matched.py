@@ -209,16 +209,13 @@ def test_weights_are_powers_of_alpha_times_the_tosses_won(alpha):
             assert values.visiting[n] == pytest.approx(alpha ** (n - 1) * 2.0**won)
 
 
-def test_fixed_point_sums_hold_the_longest_batch():
+def test_fixed_point_sums_hold_the_longest_batch_and_a_lost_photon_is_noticed():
     """All visits of a batch where alpha = 1, in units, stay inside int64."""
     key = jnp.asarray(rng.batch_key(0, 0))
     values = matched_batch.weights(1.0)
     order = np.abs(np.asarray(orders_batch.trace(key, jnp.int32(2**14), jnp.asarray(values.stops)).order)[: 2**14])
     visits = np.cumsum(values.visiting)[order].mean()
     assert visits * orders_batch.BATCH_PHOTONS / matched_batch.UNIT < 2**62
-
-
-def test_a_lost_photon_is_noticed():
     orders = np.zeros(2 * matched_batch.MAX_ORDER + 1, np.int32)
     exits, weights, visited = np.zeros((2, 1), complex), matched_batch.weights(0.5), [np.zeros(0)] * 4
     with pytest.raises(RuntimeError, match="photons were lost or made: 5 started and 0 ended"):

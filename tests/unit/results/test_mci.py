@@ -41,7 +41,7 @@ def with_line(number: int, line: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_reads_the_runs_of_the_template_and_the_example():
+def test_reads_the_runs_of_the_template_and_the_example(tmp_path):
     first, second = read_mci(DATA / "template.mci")
     assert (first.output, first.format, first.photons) == ("temp1.mco", "A", 10)
     assert (first.dz, first.dr, first.nz, first.nr, first.na) == (20e-4, 20e-4, 10, 20, 30)
@@ -55,9 +55,7 @@ def test_reads_the_runs_of_the_template_and_the_example():
     assert run.medium.layers == tuple(Layer(*row) for row in rows)
     assert (run.medium.n_above, run.medium.n_below) == (1, 1)
     assert (run.photons, run.grid) == (1_000_000, Grid(0.01, 50, 0.01, 40, na=1))
-
-
-def test_depths_and_rings_are_not_mixed_up(tmp_path):
+    # Depths and rings are not mixed up.
     (run,) = read_mci(written(tmp_path, SMALL))
     assert (run.medium.n_above, run.medium.n_below) == (1.1, 1.2)
     np.testing.assert_allclose(run.grid.z_edges, [0, 0.01, 0.02, 0.03])

@@ -185,9 +185,7 @@ def test_empty_bins_have_no_samples_and_equal_weights_count_as_themselves():
     np.testing.assert_allclose(found.effective_samples, [99, 101])
     np.testing.assert_array_equal(found.is_sampled(), [False, True])
     np.testing.assert_array_equal(found.is_sampled(at_least=50), [True, True])
-
-
-def test_only_scalar_estimates_are_floats():
+    # Only scalar estimates are floats.
     assert float(Estimate(0.25, 0.1, 7.0)) == 0.25
     with pytest.raises(TypeError, match=r"this one has shape \(2,\)"):
         float(Estimate(np.zeros(2), np.zeros(2), np.zeros(2)))
