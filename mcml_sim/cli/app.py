@@ -64,10 +64,6 @@ SLOW = 1e4  # photons/s; faster is printed in millions
 SHORT = 0.05  # compiling that is not worth a word [s]
 
 
-def _quantities(incomplete: str) -> Iterator[str]:
-    return (name for name in QUANTITIES if name.startswith(incomplete))
-
-
 def run(
     file: Annotated[Path, typer.Argument(help="Input file of MCML 1 or 2 (.mci).")],
     photons: Annotated[
@@ -83,7 +79,7 @@ def run(
         typer.Option(
             help=f"What --precision looks at: {', '.join(QUANTITIES)}.",
             show_default=QUANTITY,
-            autocompletion=_quantities,
+            autocompletion=lambda incomplete: [name for name in QUANTITIES if name.startswith(incomplete)],
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Changes nothing: a command resumes without.")] = False,
@@ -189,11 +185,9 @@ def with_error(estimate: Estimate) -> str:
 
 def speed(photons: int, seconds: float, compiling: float) -> str:
     """Return the seconds of a run, and photons per second of the time that was not spent in compiling [s]."""
-    tracing = max(seconds - compiling, 1e-3)
-    rate = photons / tracing
-    return f"{times(seconds, compiling)}, " + (
-        f"{rate / 1e6:.3g} M photons/s" if rate >= SLOW else f"{rate:.0f} photons/s"
-    )
+    rate = photons / max(seconds - compiling, 1e-3)
+    shown = f"{rate / 1e6:.3g} M" if rate >= SLOW else f"{rate:.0f}"
+    return f"{times(seconds, compiling)}, {shown} photons/s"
 
 
 def times(seconds: float, compiling: float) -> str:

@@ -147,9 +147,8 @@ class Program:
 
     def say(self, text: object) -> None:
         """Print one line on stderr, whatever the text holds."""
-        Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(
-            f"{self.name}: {one_line(str(text))}", markup=False
-        )
+        console = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+        console.print(f"{self.name}: {one_line(str(text))}", markup=False)
 
     def _status(self) -> int:
         """Run the subcommand, and print what went wrong; return the exit status."""

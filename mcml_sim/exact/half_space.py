@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -58,20 +59,16 @@ def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = S
     """
     require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
-    if setting.is_isotropic:
-        values = by_alpha(by_albedo.profile, radius / length, albedo, setting)
-    else:
-        values = forwards.profile(radius / length, albedo, setting)
-    return scalar_or_array(values / length**2)
+    of_kind: Callable[..., Any] = partial(by_alpha, by_albedo.profile) if setting.is_isotropic else forwards.profile
+    return scalar_or_array(of_kind(radius / length, albedo, setting) / length**2)
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Return the share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
     require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
-    if not setting.is_isotropic:
-        return scalar_or_array(forwards.cdf(radius / length, albedo, setting))
-    return scalar_or_array(by_alpha(by_albedo.cdf, radius / length, albedo, setting))
+    of_kind: Callable[..., Any] = partial(by_alpha, by_albedo.cdf) if setting.is_isotropic else forwards.cdf
+    return scalar_or_array(of_kind(radius / length, albedo, setting))
 
 
 def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:

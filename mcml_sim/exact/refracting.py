@@ -26,6 +26,7 @@ from threadpoolctl import threadpool_limits
 
 from mcml_sim.exact import cone
 from mcml_sim.exact.compiled import jit
+from mcml_sim.exact.light import nodes as chebyshev_nodes
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import dispersion, panels, square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
@@ -129,13 +130,18 @@ def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
     """Return the table of one n > 1, or its derivative by n, in seconds."""
     with jax.enable_x64(True), jax.core.eval_context():
         lines = np.stack([_line(n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
-        lines = np.concatenate([lines, _totals(n, rule, slope)[:, :, None]], axis=2)
+        # And the polynomials at k = 0.
+        first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
+        alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * chebyshev_nodes(rule.degree)) ** 2
+        origins = np.full(alpha.shape[0], ORIGIN)
+        totals = _polynomials(_resolvents(n, origins, alpha, *_sizes(rule, MIDDLE_NODES), slope))
+        lines = np.concatenate([lines, totals[:, :, None]], axis=2)
         ray = _ray(rule.line).k
-        last = np.abs(ray) > MIDDLE
+        beyond = np.abs(ray) > MIDDLE
         sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
         parts = [
             _in_chunks(partial(_series, n, x_nodes=x_nodes, angles=angles, slope=slope), part)
-            for part, (x_nodes, angles) in zip((ray[~last], ray[last]), sizes, strict=True)
+            for part, (x_nodes, angles) in zip((ray[~beyond], ray[beyond]), sizes, strict=True)
         ]
     if not slope:  # what enters comes out again where nothing is absorbed, z = -1
         for light, name in enumerate(ILLUMINATIONS):
@@ -154,7 +160,7 @@ def shapes(rule: Rule) -> Table:
 
 def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Complexes:
     """Return the polynomials of a group: (2, k, degree)."""
-    z, own = _nodes(rule.degree), line.k[line.dk != 0]
+    z, own = chebyshev_nodes(rule.degree), line.k[line.dk != 0]
 
     def values(part: Complexes) -> Complexes:
         first, last = (np.asarray(_root(jnp.asarray(ALPHAS[group + end]), part)) for end in (0, 1))
@@ -166,22 +172,11 @@ def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Comp
     return np.pad(coefficients, ((0, 0), (0, line.k.size - own.size), (0, 0)), mode="edge")
 
 
-def _totals(n: float, rule: Rule, slope: bool) -> Complexes:
-    """Return the polynomials at k = 0, of all groups: (2, groups, degree)."""
-    first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
-    alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * _nodes(rule.degree)) ** 2
-    origins = np.full(alpha.shape[0], ORIGIN)
-    return _polynomials(_resolvents(n, origins, alpha, *_sizes(rule, MIDDLE_NODES), slope))
-
-
-def _nodes(degree: int) -> Floats:
-    return np.cos(np.pi * (np.arange(degree) + 0.5) / degree)
-
-
 def _polynomials(values: Complexes) -> Complexes:
     """Return coefficients of Chebyshev polynomials from values on their nodes, the last axis of both."""
     degree = values.shape[-1]
-    coefficients: Complexes = 2.0 / degree * values @ np.cos(np.outer(np.arccos(_nodes(degree)), np.arange(degree)))
+    angles = np.arccos(chebyshev_nodes(degree))
+    coefficients: Complexes = 2.0 / degree * values @ np.cos(np.outer(angles, np.arange(degree)))
     coefficients[..., 0] *= 0.5
     return coefficients
 

@@ -39,7 +39,6 @@ from mcml_sim.exact.special_functions import (
     square_root,
     squared_decay_rate,
 )
-from mcml_sim.media.arrays import Floats
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].
 NEAREST_RADIUS = 1e-6
@@ -182,22 +181,17 @@ def _h_function(
 ) -> tuple[jax.Array, jax.Array]:
     """Return H_k(1/s) for k and sqrt(1 + k^2) of shape (n, 1) and s of shape (n, m), and L(k), (n,)."""
     square = squared_decay_rate(alpha)
-    sinh_u, cosh_u, weights = _x_nodes(rule)
+    # The first node, u = 0, has no weight and is there for its integrand.
+    step = np.log(2.0 * X_LAST / X_SCALE) / rule.x
+    u = np.append(0.0, step * (np.arange(rule.x) + 0.5))
+    du = np.append(0.0, np.full(rule.x, step))
+    du[-1] = step / -np.expm1(-2.0 * step)  # beyond, the integrand falls as e^{-2u}: a geometric series
     ray = 0.5 * X_SCALE * (branch + jnp.sqrt(branch.real**2 + branch.imag**2))  # halves the argument of the branch
-    x = ray * sinh_u
+    x = ray * np.sinh(u)
     squared = k * k + x * x
     values = dispersion(alpha, squared)
-    rest = logarithm(values * (squared + 1.0) / (squared + square)) * (ray * cosh_u * weights)
+    rest = logarithm(values * (squared + 1.0) / (squared + square)) * (ray * np.cosh(u) * du)
     # Held, or XLA works out each of them anew for every term of the sum.
     rest, s_square, x_square = jax.lax.optimization_barrier((rest, s * s, x * x))
     integral = s * jnp.sum(rest[:, None, :] / (s_square[:, :, None] + x_square[:, None, :]), axis=2)
     return (s + branch) / (s + square_root(k * k + square)) * jnp.exp(-integral / np.pi), values[:, 0]
-
-
-def _x_nodes(rule: Rule) -> tuple[Floats, Floats, Floats]:
-    """Return sinh(u), cosh(u) and du; the first node, u = 0, has no weight and is there for its integrand."""
-    step = np.log(2.0 * X_LAST / X_SCALE) / rule.x
-    u = np.append(0.0, step * (np.arange(rule.x) + 0.5))
-    weights = np.append(0.0, np.full(rule.x, step))
-    weights[-1] = step / -np.expm1(-2.0 * step)  # beyond, the integrand falls as e^{-2u}: a geometric series
-    return np.sinh(u), np.cosh(u), weights

@@ -12,7 +12,7 @@ import os
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
@@ -149,18 +149,16 @@ def _checked(value: Any) -> Any:
     """Return a parsed value; ValueError if it nests too deep, or has half a character."""
     level = [value]
     for _ in range(MOST_LEVELS + 1):
-        level = [inner for outer in level for inner in _inside(outer)]
-        if not level:
+        inside: list[Any] = []
+        for outer in level:
+            if isinstance(outer, dict | list):
+                inside += [*outer, *outer.values()] if isinstance(outer, dict) else outer
+            elif isinstance(outer, str):
+                outer.encode()  # UnicodeEncodeError is a ValueError, in one line
+        if not inside:
             return value
+        level = inside
     raise ValueError(TOO_DEEP)
-
-
-def _inside(value: Any) -> Iterable[Any]:
-    if isinstance(value, str) and not value.isascii():
-        value.encode()  # UnicodeEncodeError is a ValueError, in one line
-    if isinstance(value, dict):
-        return [*value, *value.values()]
-    return value if isinstance(value, list) else ()
 
 
 def _short(text: str) -> str:

@@ -54,8 +54,7 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
         with Path(path).open("rb") as file:
             return file.read(most + 1)
     except (OSError, ValueError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
+        raise InputError(f"{path}: expected a file that can be read, got: {reason_of(error)}") from None
 
 
 def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = True) -> None:

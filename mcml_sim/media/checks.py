@@ -44,6 +44,11 @@ def require(holds: object, name: str, accepted: str, value: object) -> None:
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
 
 
+def require_index(name: str, value: object) -> None:
+    """Raise InputError unless that is a refractive index."""
+    require(is_number(value) and math.isfinite(value) and value > 0, name, "a refractive index > 0", value)
+
+
 def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     """Return real numbers as float64, of any shape; `accepted` says what they are.
 
@@ -101,18 +106,16 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
     try:
         whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
     except TypeError:
-        raise InputError(f"{name} must be {accepted}, got {shown(number)}") from None
-    if isinstance(number, bool) or whole < lowest or (highest is not None and whole > highest):
-        raise InputError(f"{name} must be {accepted}, got {shown(number)}")
+        whole = lowest - 1
+    is_inside = lowest <= whole and (highest is None or whole <= highest)
+    require(is_inside and not isinstance(number, bool), name, accepted, number)
     return whole
 
 
 def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
     """Return a number of threads, or None for one per core; a scheduler has workers of its own."""
-    if workers is not None and scheduler is not None:
-        raise InputError(
-            f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}"
-        )
+    accepted = "None where a scheduler is given, whose workers they are"
+    require(workers is None or scheduler is None, "workers", accepted, workers)
     return None if workers is None else checked_whole("workers", workers, lowest=1, highest=MAX_WORKERS)
 
 

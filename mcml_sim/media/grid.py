@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import operator
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import is_number, require
 
 MAX_BINS = 65_536  # along one axis
 # Float32 places are 1.2e-7 of themselves apart; this much of its photons (1 %) a bin may gain or lose by that.
@@ -117,10 +119,7 @@ class Grid:
 
 
 def _even_edges(axis: str, width: float, number: int) -> Floats:
-    if not (
-        isinstance(width, (int, float, np.number)) and not isinstance(width, bool) and np.isfinite(width) and width > 0
-    ):
-        raise InputError(f"d{axis} must be a width > 0 of the bins, got {width!r}")
+    require(is_number(width) and math.isfinite(width) and width > 0, f"d{axis}", "a width > 0 of the bins", width)
     return width * np.arange(_checked_number(f"n{axis}", number) + 1, dtype=np.float64)
 
 
@@ -133,8 +132,8 @@ def _checked_number(name: str, value: int) -> int:
         number = operator.index(value)
     except TypeError:
         number = 0
-    if isinstance(value, bool) or not 1 <= number <= MAX_BINS:
-        raise InputError(f"{name} must be a whole number of bins from 1 to {MAX_BINS}, got {value!r}")
+    is_count = not isinstance(value, bool) and 1 <= number <= MAX_BINS
+    require(is_count, name, f"a whole number of bins from 1 to {MAX_BINS}", value)
     return number
 
 
@@ -174,6 +173,5 @@ def require_resolved(grid: Grid) -> None:
                 f"got one from {float(lower[at])!r} to {float(upper[at])!r}"
             )
         if upper[0] < SHORTEST or upper[-1] > LONGEST:
-            raise InputError(
-                f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {upper[0]:g} to {upper[-1]:g} of {name}"
-            )
+            got = f"{upper[0]:g} to {upper[-1]:g} of {name}"
+            raise InputError(f"grid must have edges from {SHORTEST:g} to {LONGEST:g}, got {got}")

@@ -10,7 +10,7 @@ import numpy as np
 from mcml_sim.errors import InputError
 from mcml_sim.media import phase as phases
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, require, shown
+from mcml_sim.media.checks import is_number, require, require_index, shown
 
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
 
@@ -37,7 +37,7 @@ class Layer:
     def __post_init__(self) -> None:
         if self.phase is not None:
             phases.settle(self)
-        _require_index("n", self.n)
+        require_index("n", self.n)
         for name in ("mu_a", "mu_s"):
             value = getattr(self, name)
             require(is_number(value) and math.isfinite(value) and value >= 0, name, "a coefficient >= 0", value)
@@ -94,8 +94,8 @@ class Medium:
             require(isinstance(layer, Layer), "layers", "Layer objects", layer)
         if not 1 <= len(layers) <= MAX_LAYERS:
             raise InputError(f"a medium must have 1 to {MAX_LAYERS} layers, got {len(layers)}")
-        _require_index("n_above", self.n_above)
-        _require_index("n_below", self.n_below)
+        require_index("n_above", self.n_above)
+        require_index("n_below", self.n_below)
         for number, layer in enumerate(layers[:-1], start=1):
             if math.isinf(layer.thickness):
                 raise InputError(f"thickness may be infinite in the last layer only, got it in layer {number}")
@@ -136,7 +136,3 @@ def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -
     require(is_number(alpha) and 0 <= alpha <= 1, "alpha", "a single-scattering albedo in [0, 1]", alpha)
     require(is_number(mfp) and math.isfinite(mfp) and mfp > 0, "mfp", "a mean free path > 0", mfp)
     return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp, g=g),))
-
-
-def _require_index(name: str, value: object) -> None:
-    require(is_number(value) and math.isfinite(value) and value > 0, name, "a refractive index > 0", value)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mcml_sim.errors import InputError
 from mcml_sim.media import phase as phases
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require, require_index
 
 ILLUMINATIONS = ("searchlight", "diffuse")
 FORWARD_N, FORWARD_G = (1.33, 1.45), 0.95
@@ -40,10 +38,9 @@ class Setting:
         if self.phase is not None:
             phases.settle(self)
         require_illumination(self.illumination)
-        if not (is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)):
-            raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
-        if not (is_number(self.g) and -1 < self.g < 1):
-            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
+        if not is_traced(self.n):
+            require_index("n", self.n)
+        require(is_number(self.g) and -1 < self.g < 1, "g", "a mean cosine in (-1, 1)", self.g)
 
     @property
     def is_matched_isotropic(self) -> bool:
@@ -88,8 +85,7 @@ class Setting:
 
 def require_illumination(name: object) -> None:
     """Raise InputError unless that is one of ILLUMINATIONS."""
-    if name not in ILLUMINATIONS:
-        raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(name)}")
+    require(name in ILLUMINATIONS, "illumination", f"one of {', '.join(ILLUMINATIONS)}", name)
 
 
 def is_traced(n: object) -> bool:

@@ -79,9 +79,8 @@ def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, 
     silent = np.concatenate([weights, np.zeros((len(weights), 1))], axis=1)
     for row, hits in enumerate(counts):
         number = np.append(hits, photons - hits.sum()).astype(np.float64)
-        centred = (silent - (silent @ number / photons)[:, None]) * np.sqrt(
-            number / (photons * max(photons - 1.0, 1.0))
-        )
+        share = np.sqrt(number / (photons * max(photons - 1.0, 1.0)))
+        centred = (silent - (silent @ number / photons)[:, None]) * share
         deviation = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
         unit = np.divide(centred, deviation, out=np.zeros_like(centred), where=deviation > 0)
         left, singular, _ = np.linalg.svd(unit, full_matrices=False)

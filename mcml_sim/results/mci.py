@@ -52,9 +52,9 @@ import itertools
 import os
 import posixpath
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import read_whole
@@ -90,6 +90,7 @@ STRAY = re.compile(r"[\udc80-\udcff]")
 CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 LONGEST_SHOWN = 40  # characters of a word in a message
 OUTPUT = "the name of an output file, and A or B"
+V = TypeVar("V", int, float)
 
 
 @dataclass(frozen=True)
@@ -149,9 +150,8 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
         return tuple(_runs_of_2(lines, read_media(lines)))
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
         raise lines.error("the file version, 1.0 or mcmli2.0", quoted(version))
-    (word,) = lines.take(1, "the number of runs")
     outputs: set[str] = set()
-    return tuple(read_run(lines, outputs) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
+    return tuple(read_run(lines, outputs) for _ in range(_alone(lines, lines.whole, "the number of runs", MAX_RUNS)))
 
 
 class Lines:
@@ -224,17 +224,20 @@ class Lines:
 def read_run(lines: Lines, outputs: set[str]) -> Run:
     """Return the run of the next lines; `outputs` are the output files of those before it."""
     output, form = _output(lines, outputs, *lines.take(1, OUTPUT, optional=1))
-    (word,) = lines.take(1, "the number of photons")
-    photons = lines.whole("the number of photons", word, MAX_PHOTONS)
+    photons = _alone(lines, lines.whole, "the number of photons", MAX_PHOTONS)
     words = lines.take(2, "dz and dr")
     dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words, strict=True))
     words = lines.take(3, "nz, nr and na")
     nz, nr, na = _bins(lines, dict(zip(("nz", "nr", "na"), words, strict=True)))
-    (word,) = lines.take(1, "the number of layers")
-    number = lines.whole("the number of layers", word, MAX_LAYERS)
-    n_above = _index(lines, "n above the layers")
-    layers = tuple(_layer(lines, at, number) for at in range(1, number + 1))
-    medium = Medium(layers, n_above, _index(lines, "n below the layers"))
+    number = _alone(lines, lines.whole, "the number of layers", MAX_LAYERS)
+    n_above = _alone(lines, lines.decimal, "n above the layers", INDICES)
+    layers = []
+    for at in range(1, number + 1):
+        of = f"of layer {at} of {number}"
+        *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
+        optics, got = _optics(lines, of, *words), f"{quoted(words[1])} and {quoted(words[2])}"
+        layers.append(_settled(lines, of, optics, thickness, at == number, got))
+    medium = Medium(tuple(layers), n_above, _alone(lines, lines.decimal, "n below the layers", INDICES))
     return Run(output, form, photons, dz, dr, nz, nr, na, medium)
 
 
@@ -324,10 +327,8 @@ def read_run_2(lines: Lines, media: dict[str, Optics], output: str, form: str, s
     _require_scored(lines, scored)
     word, *rest = lines.take(1, "the number of photons", optional=1)
     photons = lines.whole("the number of photons", word, MAX_PHOTONS, decimal=True)
-    (word,) = lines.take(1, "the threshold weight")
-    lines.decimal("the threshold weight", word, (0.0, 1.0))
-    (word,) = lines.take(1, "the seed")
-    seed = lines.whole("the seed", word, MOST_SEED, least=0)
+    _alone(lines, lines.decimal, "the threshold weight", (0.0, 1.0))
+    seed = _alone(lines, lines.whole, "the seed", MOST_SEED, 0)
     return Run(output, form, photons, dz, dr, nz, nr, na, medium, seed, rest[0] if rest else "")
 
 
@@ -377,16 +378,10 @@ def _output(lines: Lines, outputs: set[str], name: str, *form: str) -> tuple[str
     return name, "B" if form and form[0][0] in "bB" else "A"
 
 
-def _index(lines: Lines, name: str) -> float:
+def _alone(lines: Lines, read: Callable[..., V], name: str, *bounds: object) -> V:
+    """Read the only value of the next line, a whole or a decimal number within bounds."""
     (word,) = lines.take(1, name)
-    return lines.decimal(name, word, INDICES)
-
-
-def _layer(lines: Lines, at: int, number: int) -> Layer:
-    of = f"of layer {at} of {number}"
-    *words, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
-    got = f"{quoted(words[1])} and {quoted(words[2])}"
-    return _settled(lines, of, _optics(lines, of, *words), thickness, at == number, got)
+    return read(name, word, *bounds)
 
 
 def _is_number(word: str) -> bool:

@@ -160,9 +160,8 @@ def _even_width(name: str, edges: Floats) -> float:
     width = float(edges[1])
     widths = np.diff(edges)
     if not np.allclose(edges, width * np.arange(len(edges)), rtol=EVEN, atol=0):
-        raise InputError(
-            f"grid must have {name} of equal width for an .mco, got widths from {widths.min():g} to {widths.max():g}"
-        )
+        got = f"widths from {widths.min():g} to {widths.max():g}"
+        raise InputError(f"grid must have {name} of equal width for an .mco, got {got}")
     return width
 
 

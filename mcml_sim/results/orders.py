@@ -19,8 +19,6 @@ from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing import order_bins
 from mcml_sim.tracing.order_bins import Counts, Ledger, OrderBins
 
-SEARCHLIGHT = Setting()
-
 
 @dataclass(frozen=True, eq=False)
 class Orders:

@@ -24,10 +24,10 @@ from mcml_sim.exact.single_scattering import entered
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import checked_path, write_whole
+from mcml_sim.files.whole_file import checked_path, reason_of, write_whole
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, shown
+from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
 from mcml_sim.media.phase import as_table, from_table
@@ -323,8 +323,7 @@ def results_bytes(tally: Tally) -> bytes:
     }
     if tally.illumination != "searchlight":  # which files said nothing of when there was no other
         header[LIGHT] = tally.illumination
-    edges = {"r_edges": tally.grid.r_edges, "z_edges": tally.grid.z_edges, "a_edges": tally.grid.a_edges}
-    arrays = {name: values for name, values in edges.items() if values is not None}
+    arrays = {name: edges for name in EDGES if (edges := getattr(tally.grid, name)) is not None}
     for name in tally.quantities:
         estimate = tally.quantity(name)
         parts = (estimate.value, estimate.standard_error, estimate.effective_samples)
@@ -340,8 +339,7 @@ def read_results(path: str | os.PathLike[str]) -> Results:
         with Path(path).open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected results of mcml_sim, got: {reason}") from None
+        raise InputError(f"{path}: expected results of mcml_sim, got: {reason_of(error)}") from None
     return parse_results(content, str(path))
 
 
@@ -367,10 +365,9 @@ def _results(content: bytes) -> Results:
     medium, grid = _medium(header["medium"]), _grid(first)
     photons = checked_whole("photons", header["photons"], lowest=1, highest=MAX_PHOTONS)
     version, cut = header["mcml_sim"], header["cut"]
-    if not (isinstance(version, str) and version.isprintable() and len(version) <= LONGEST_VERSION):
-        raise ValueError(f"mcml_sim must be a version, got {shown(version)}")
-    if not (is_number(cut) and 0 <= cut <= 1):
-        raise ValueError(f"cut must be a share of the light, got {shown(cut)}")
+    is_version = isinstance(version, str) and version.isprintable() and len(version) <= LONGEST_VERSION
+    require(is_version, "mcml_sim", "a version", version)
+    require(is_number(cut) and 0 <= cut <= 1, "cut", "a share of the light", cut)
     sizes = shapes(grid, len(medium.layers))
     parts = {name + end: size for name, size in sizes.items() for end in ENDS}
     arrays = read_npz(content, sum(MOST_BEFORE + WORD * math.prod(size) for size in parts.values()), parts)
@@ -388,10 +385,14 @@ def _results(content: bytes) -> Results:
 
 def _medium(value: object) -> Medium:
     table = _table("medium", value, MEDIUM)
-    layers = table.pop("layers")
-    if not isinstance(layers, list) or len(layers) > MAX_LAYERS:
-        raise ValueError(f"layers must be a list of at most {MAX_LAYERS}, got {shown(layers)}")
-    return Medium(tuple(_layer(f"layer {at}", layer) for at, layer in enumerate(layers, start=1)), **table)
+    objects, layers = table.pop("layers"), []
+    is_list = isinstance(objects, list) and len(objects) <= MAX_LAYERS
+    require(is_list, "layers", f"a list of at most {MAX_LAYERS}", objects)
+    for at, value in enumerate(objects, start=1):
+        values = dict(value) if isinstance(value, dict) else value
+        phase = values.pop(PHASE, None) if isinstance(values, dict) else None
+        layers.append(Layer(**_table(f"layer {at}", values, LAYER), phase=None if phase is None else from_table(phase)))
+    return Medium(tuple(layers), **table)
 
 
 def _as_object(layer: Layer) -> dict[str, Any]:
@@ -400,27 +401,19 @@ def _as_object(layer: Layer) -> dict[str, Any]:
     return values if layer.phase is None else {**values, PHASE: as_table(layer.phase)}
 
 
-def _layer(name: str, value: object) -> Layer:
-    values = dict(value) if isinstance(value, dict) else value
-    phase = values.pop(PHASE) if isinstance(values, dict) and PHASE in values else None
-    return Layer(**_table(name, values, LAYER), phase=None if phase is None else from_table(phase))
-
-
 def _grid(arrays: Mapping[str, NDArray]) -> Grid:
     angles = arrays.get("a_edges")
-    grid = Grid.from_edges(
-        r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=None if angles is None else angles.size - 1
-    )
+    number = None if angles is None else angles.size - 1
+    grid = Grid.from_edges(r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=number)
     require_resolved(grid)
     if angles is not None and not (angles.ndim == 1 and np.allclose(angles, np.asarray(grid.a_edges), rtol=1e-12)):
         raise ValueError("a_edges must be even from 0 to pi/2")
     return grid
 
 
-def _table(name: str, value: object, keys: frozenset[str]) -> dict[str, Any]:
+def _table(name: str, value: Any, keys: frozenset[str]) -> dict[str, Any]:
     """Return an object of just these keys."""
-    if not isinstance(value, dict):
-        raise ValueError(f"{name} must be an object, got {shown(value)}")
+    require(isinstance(value, dict), name, "an object", value)
     for key in sorted(keys ^ value.keys()):
         raise ValueError(f"{name} has no key {key!r}" if key in keys else f"{name} has the unknown key {shown(key)}")
     return dict(value)

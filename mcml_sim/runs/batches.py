@@ -218,9 +218,8 @@ def _dask() -> ModuleType:
     try:
         import distributed
     except ModuleNotFoundError:
-        raise InputError(
-            "scheduler must be None where the package distributed is missing; pip install distributed"
-        ) from None
+        remedy = "the package distributed is missing; pip install distributed"
+        raise InputError(f"scheduler must be None where {remedy}") from None
     return distributed
 
 
@@ -250,8 +249,6 @@ def _trace_alike(made_by: dict[str, object], trace: Callable[[int, int], R], bat
     here = maker()
     for name, value in made_by.items():
         if here.get(name) != value:
-            address = _dask().get_worker().address
-            raise ClusterError(
-                f"worker {address} would give other bits: {name} is {here.get(name)} there, {value} here"
-            )
+            at = _dask().get_worker().address
+            raise ClusterError(f"worker {at} would give other bits: {name} is {here.get(name)} there, {value} here")
     return trace(batch, photons)

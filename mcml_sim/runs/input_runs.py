@@ -171,9 +171,8 @@ def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
     name = Path(run.output)
     if name.is_absolute() or ".." in name.parts:
         if folder is None or name.name in ("", ".."):
-            raise InputError(
-                f"output files must lie in the current folder, or have a name and {NAMED}, got {run.output}"
-            )
+            accepted = f"in the current folder, or have a name and {NAMED}"
+            raise InputError(f"output files must lie {accepted}, got {run.output}")
         name = Path(name.name)
     mco = (folder or Path()) / name
     bare = mco.with_suffix("") if mco.suffix.lower() == ".mco" else mco
@@ -218,12 +217,8 @@ def _finished(job: Job, options: RunOptions) -> Results | None:
     results = _results(job.npz)
     if results is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
-    if (results.medium, results.grid, results.seed, results.version) != (
-        job.run.medium,
-        job.run.grid,
-        job.seed,
-        __version__,
-    ):
+    here = (job.run.medium, job.run.grid, job.seed, __version__)
+    if (results.medium, results.grid, results.seed, results.version) != here:
         return None
     goal = options.goal
     is_enough = goal is not None and results.photons < job.photons and goal.is_reached(results.estimates[goal.quantity])

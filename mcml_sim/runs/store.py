@@ -79,7 +79,7 @@ class Store(Generic[R]):
     def __init__(self, folder: Path, made_by: dict[str, object], read: Callable[[Mapping[str, NDArray]], R]) -> None:
         self.folder = folder
         self._made_by = {**made_by, **maker()}
-        self._digest = _digest(self._made_by)
+        self._digest = hashlib.sha256(json.dumps(self._made_by, sort_keys=True).encode()).hexdigest()
         self._read = read
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -228,10 +228,6 @@ def cpu_class() -> str:
     return " ".join([platform.machine(), *(flag for flag in ("fma", "avx2", "avx512f") if flag in flags)])
 
 
-def _digest(made_by: dict[str, object]) -> str:
-    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()
-
-
 def _apart(theirs: object, ours: object) -> tuple[str, str]:
     """Return two values, long ones from shortly before where they differ."""
     there, here = json.dumps(theirs), json.dumps(ours)
@@ -240,7 +236,6 @@ def _apart(theirs: object, ours: object) -> tuple[str, str]:
     differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)
     start = max(next(differ, 0) - SHARED_SHOWN, 0)
     end = start + LONGEST_SHOWN
-    theirs, ours = (
-        ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "") for text in (there, here)
-    )
+    before = "..." if start else ""
+    theirs, ours = (before + text[start:end] + ("..." if end < len(text) else "") for text in (there, here))
     return theirs, ours

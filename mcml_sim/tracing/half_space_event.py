@@ -109,9 +109,7 @@ def fly(key: Array, lanes: OrderLanes, events: int, where: HalfSpace | None = No
     """Scatter every photon up to `events` times, until it ends; those that have ended stay where they are."""
     if where is None:
         unrolled = min(events, UNROLLED if pool.on_cpu() else GPU_UNROLLED)
-        place = lax.fori_loop(
-            0, events, lambda number, place: scatter(key, lanes, place, number), lanes.place, unroll=unrolled
-        )
+        place = lax.fori_loop(0, events, lambda at, place: scatter(key, lanes, place, at), lanes.place, unroll=unrolled)
         return landed(lanes, place, events)
     first, left = lanes.order.astype(jnp.uint32) + 1, lanes.last - lanes.order
 

@@ -23,15 +23,7 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import deposits, half_space_event, layered_event, pool, rng
 from mcml_sim.tracing.deposits import Axis, Deposits, axis, groups
-from mcml_sim.tracing.layered_event import (
-    CUT,
-    EVENTS_PER_TURN,
-    FLIGHTS,
-    ROULETTED,
-    SELECTED_LAYERS,
-    LayeredLanes,
-    Stack,
-)
+from mcml_sim.tracing.layered_event import EVENTS_PER_TURN, FLIGHTS, SELECTED_LAYERS, LayeredLanes, Stack
 
 BATCH_PHOTONS = 2**18
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same
@@ -176,9 +168,7 @@ def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelS
     if len(lanes.absorbed) == 1:
         absorbed = (lanes.absorbed[0] + left,)
     else:
-        absorbed = tuple(
-            old + jnp.where(lanes.layer == number, left, 0) for number, old in enumerate(lanes.absorbed, start=1)
-        )
+        absorbed = tuple(old + jnp.where(lanes.layer == at, left, 0) for at, old in enumerate(lanes.absorbed, start=1))
     lanes = layered_event.settle(go, key, stack, lanes, lanes.event + FLIGHTS)
     return lanes._replace(event=lanes.event + EVENTS_PER_TURN, absorbed=absorbed), by_layer, by_cell
 
@@ -200,8 +190,8 @@ def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layer
     transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
     rho = jnp.where(transmitted & ~scattered, BALLISTIC, rho)
-    rho = jnp.where(lanes.layer == CUT, INSIDE, rho).astype(jnp.float32)
-    weight = jnp.where(lanes.layer == ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
+    rho = jnp.where(lanes.layer == layered_event.CUT, INSIDE, rho).astype(jnp.float32)
+    weight = jnp.where(lanes.layer == layered_event.ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
     cosines = results.cosines
     if angles:
         cosines = _written(cosines, number, jnp.abs(lanes.down.imag))
@@ -224,9 +214,8 @@ def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
     angles = len(bins.cosines) or 1
     if len(bins.cosines):
         # Edges fall from 1, so those above the cosine are counted.
-        angle = jnp.searchsorted(
-            -bins.cosines[1:], -results.cosines[:BATCH_PHOTONS], side="right", method="scan_unrolled"
-        )
+        rising, values = -bins.cosines[1:], -results.cosines[:BATCH_PHOTONS]
+        angle = jnp.searchsorted(rising, values, side="right", method="scan_unrolled")
         cell = cell * angles + angle.astype(jnp.int32)
     size = 2 * (bins.r.bins + 1) * angles
     sums = [jnp.zeros(size, jnp.float64).at[cell].add(w, mode="promise_in_bounds") for w in (weight, weight * weight)]

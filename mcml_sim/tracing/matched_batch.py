@@ -136,9 +136,8 @@ def _trace_visits(
             weight = visiting.at[flying.order + number.astype(jnp.int32) + 1].get(mode="clip")
             # Those that have ended add nothing, somewhere: a branch that no processor can foresee costs more.
             weight = jnp.where(place.imag < 0, 0, weight)
-            return half_space_event.scatter(key, flying, place, number), table.at[cell].add(
-                weight, mode="promise_in_bounds"
-            )
+            after = half_space_event.scatter(key, flying, place, number)
+            return after, table.at[cell].add(weight, mode="promise_in_bounds")
 
         table, ends = state
         place, table = lax.fori_loop(0, VISITS_PER_TURN, event, (flying.place, table))
@@ -188,9 +187,8 @@ def deposited(
     number = np.concatenate([orders[MAX_ORDER + 1 :], orders[MAX_ORDER - 1 :: -1]]).astype(np.float64)
     if number.sum() != photons:
         raise RuntimeError(f"photons were lost or made: {photons} started and {number.sum():.0f} ended")
-    left = np.concatenate(
-        [values.leaving[1:], np.where(np.arange(1, MAX_ORDER + 1) == values.last, values.leaving[1:], 0)]
-    )
+    inside = np.where(np.arange(1, MAX_ORDER + 1) == values.last, values.leaving[1:], 0)
+    left = np.concatenate([values.leaving[1:], inside])
     absorbed = np.tile(values.absorbed[1:], 2)
     accounted = left + absorbed
     cut = number[MAX_ORDER + values.last - 1] * values.leaving[values.last]

@@ -12,14 +12,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from numpy.typing import NDArray
 
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import half_space_event, order_bins, pool, rng
 from mcml_sim.tracing.deposits import rounded_up
 from mcml_sim.tracing.half_space_event import OrderLanes
-from mcml_sim.tracing.order_bins import Counts, OrderBins
+from mcml_sim.tracing.order_bins import Counts
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
 MATCHED = Setting()
@@ -47,11 +46,14 @@ def trace_batch(
         ends = trace(key, number, stops, None, lanes, illumination=setting.illumination)
     else:
         ends = trace(key, number, stops, half_space_event.half_space(setting), lanes)
-    edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns(bins))
-    cells = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
-    counts = Counts(
-        exits=cells[:, :-2], rouletted=int(cells[:, -2].sum()), cut=int(cells[:, -1].sum()), started=photons
-    )
+    # The histogram's column for each end, at index order + max_order: bins, then roulette, then the cut.
+    columns = np.full(2 * bins.max_order + 1, bins.last_orders.size, np.int32)
+    columns[0] = bins.last_orders.size + 1
+    columns[bins.max_order + 1 :] = bins.bin_of_order
+    edges, count = jnp.asarray(rounded_up(grid.r_edges)), bins.last_orders.size + 2
+    cells = np.asarray(histogram(ends, edges, jnp.asarray(columns), count)).astype(np.int64)
+    rouletted, cut = (int(cells[:, column].sum()) for column in (-2, -1))
+    counts = Counts(cells[:, :-2], rouletted, cut, started=photons)
     counts.require_closed()
     return counts
 
@@ -110,11 +112,3 @@ def histogram(ends: Ends, edges: Array, columns: Array, count: int) -> Array:
     size = len(edges) * count
     cell = jnp.where(ends.order == 0, size, ring * count + columns[ends.order + len(columns) // 2])
     return jnp.zeros(size, jnp.int32).at[cell].add(1, mode="drop").reshape(len(edges), count)
-
-
-def _columns(bins: OrderBins) -> NDArray[np.int32]:
-    """Return the histogram's column for each end, at index order + max_order: bins, then roulette, then the cut."""
-    columns = np.full(2 * bins.max_order + 1, bins.last_orders.size, np.int32)
-    columns[0] = bins.last_orders.size + 1
-    columns[bins.max_order + 1 :] = bins.bin_of_order
-    return columns

@@ -35,11 +35,14 @@ def batch_key(seed: int, batch: int) -> NDArray[np.uint32]:
 
 def draw(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array, Array]:
     """Return four independent uint32 words for each (photon, event), uint32 arrays of one shape; `key` is uint32[4]."""
-    x, y, z, w = (
-        v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2], key[3])
-    )
+    words = (photon + key[0], event + key[1], key[2], key[3])
+    x, y, z, w = (v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in words)
     for _ in range(2):
-        x, y, z, w = _xor_shift(*_round(x, y, z, w))
+        x = x + y * w
+        y = y + z * x
+        z = z + x * y
+        w = w + y * z
+        x, y, z, w = (word ^ (word >> 16) for word in (x, y, z, w))
     return x, y, z, w
 
 
@@ -48,7 +51,10 @@ def draw_three(key: Array, photon: Array, event: Array) -> tuple[Array, Array, A
     x, y, z = (v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2]))
     z = z | jnp.uint32(1)  # the one word that no event changes: odd, or its first product would lose some of `event`
     for _ in range(2):
-        x, y, z = _xor_shift(*_round_three(x, y, z))
+        x = x + y * z
+        y = y + z * x
+        z = z + x * y
+        x, y, z = (word ^ (word >> 16) for word in (x, y, z))
     return x, y, z
 
 
@@ -82,22 +88,3 @@ def symmetric(words: Array) -> Array:
     """Return float32 in [-1, 1], never 0, with steps of 2^-31 near 0."""
     signed = lax.bitcast_convert_type(words, jnp.int32)
     return (signed.astype(jnp.float32) + 0.5) * jnp.float32(2.0**-31)
-
-
-def _round(x: Array, y: Array, z: Array, w: Array) -> tuple[Array, Array, Array, Array]:
-    x = x + y * w
-    y = y + z * x
-    z = z + x * y
-    w = w + y * z
-    return x, y, z, w
-
-
-def _xor_shift(*words: Array) -> tuple[Array, ...]:
-    return tuple(word ^ (word >> 16) for word in words)
-
-
-def _round_three(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    x = x + y * z
-    y = y + z * x
-    z = z + x * y
-    return x, y, z

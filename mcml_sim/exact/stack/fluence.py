@@ -25,25 +25,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.stack.quadrature import (
-    DARK,
-    Complexes,
-    Depths,
-    Nodes,
-    Slants,
-    cones,
-    deepest,
-    directions,
-    gauss,
-    near_end,
-    near_node,
-    reflectance,
-    slowest,
-    steepest,
-)
+from mcml_sim.exact.stack import quadrature
+from mcml_sim.exact.stack.quadrature import Complexes, Depths, Nodes, Slants, directions, gauss, reflectance
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
@@ -71,7 +56,7 @@ def direct(optical: Floats, height: Floats, k: float) -> Floats:
     a = 0.5 * (length + optical)
     b = 0.25 * across**2 / a
     value = np.zeros_like(a)
-    close, seen = a < 1.0, (a >= 1.0) & (length < DARK)
+    close, seen = a < 1.0, (a >= 1.0) & (length < quadrature.DARK)
     value[close] = _direct_close(a[close], b[close])
     value[seen] = _direct_far(a[seen], b[seen])
     return value
@@ -136,8 +121,11 @@ def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
     for mirror in _mirrors(here):
         matrix += _by_panel(here, k, mirror)
     matrix += _slanted(here, slants) * here.weight
-    if here.tail.size:
-        matrix[:, -1] += _below(here, k)
+    if here.tail.size:  # below the last node, per fluence there: the slowest mode never ends
+        z, tau, weight = here.tail
+        decay = np.hypot(here.last.mu_t * quadrature.slowest(here.last.alpha), k)
+        mode = weight * np.exp(-decay * (z - here.z[-1]))
+        matrix[:, -1] += direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
     return matrix
 
 
@@ -152,7 +140,11 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
     if mirror is not None:
         z, tau, z_ends, tau_ends = mirror[0] - z, mirror[1] - tau, mirror[0] - z_ends[::-1], mirror[1] - tau_ends[::-1]
-    close = _is_close(here, z_ends, tau_ends)
+    # Whether K varies on a source panel (second axis) faster than its nodes follow, from a target panel.
+    close = np.zeros((here.panels, here.panels), bool)
+    for targets, ends in ((here.z_ends, z_ends), (here.tau_ends, tau_ends)):
+        gap = np.maximum(targets[0][:, None] - ends[1], ends[0] - targets[1][:, None])
+        close |= gap < CLOSE * (ends[1] - ends[0])
     own = np.eye(here.panels, dtype=bool) & (mirror is None)
     matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
     far = ~(close | own)
@@ -162,7 +154,7 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
     whole[column, row] = whole[row, column]
     whole *= here.weight
     target, source = np.nonzero(close & ~own)
-    rule = near_end(here.nodes)
+    rule = quadrature.near_end(here.nodes)
     # The panel's end on the target's side, and whether that is its lower one.
     below = tau_ends[0, source] < here.tau_ends[0, target]
     upwards = np.where(below, 1, 0)
@@ -184,18 +176,9 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
     return whole
 
 
-def _is_close(here: Depths, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_]:
-    """Return whether K varies on a source panel (second axis) faster than its nodes follow, from a target panel."""
-    close = np.zeros((here.panels, here.panels), bool)
-    for own, ends in ((here.z_ends, z_ends), (here.tau_ends, tau_ends)):
-        gap = np.maximum(own[0][:, None] - ends[1], ends[0] - own[1][:, None])
-        close |= gap < CLOSE * (ends[1] - ends[0])
-    return close
-
-
 def _own(here: Depths, k: float) -> Floats:
     """Return mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
-    rule = near_node(here.nodes)
+    rule = quadrature.near_node(here.nodes)
     tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
     upwards = rule.height[:, : rule.height.shape[1] // 2]
     above = direct(tau_length * upwards, z_length * upwards, k)
@@ -229,18 +212,11 @@ def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Float
     return np.asarray(both.T @ (weights * np.concatenate([right.real, right.imag])))
 
 
-def _below(here: Depths, k: float) -> Floats:
-    """Return mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode never ends."""
-    z, tau, weight = here.tail
-    decay = np.hypot(here.last.mu_t * slowest(here.last.alpha), k)
-    mode = weight * np.exp(-decay * (z - here.z[-1]))
-    return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
-
-
 def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
     """Return X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
-    t, d_mu = cones(here, rule.slope + int(0.55 * k * deepest(here) * min(steepest(here), 1.5)))
+    phase = 0.55 * k * quadrature.deepest(here) * min(quadrature.steepest(here), 1.5)
+    t, d_mu = quadrature.cones(here, rule.slope + int(phase))
     a, b = reflectance(here.above, t), reflectance(here.below, t)
     ways = [(here.z, here.tau, 1 - a - matched)]
     if here.height < np.inf and here.below != 1:

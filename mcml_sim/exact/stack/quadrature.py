@@ -106,6 +106,11 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     at = np.stack([1 - x, x], axis=1)
     length = np.diff(z_ends, axis=0)[0][:, None] * (d_s * d_x)
     mu_s, mu_a = np.reshape([(layer.mu_s, layer.mu_a) for layer in scatters], (-1, 2)).T[:, :, None]
+    last, tail = layers[-1], np.empty((3, 0))
+    if medium.is_half_space and np.any(tau_ends[1:] == tau_tops[-2] + DEEPEST):
+        share, weight = double_exponential()
+        depth = DEEPEST + DARK * share
+        tail = np.stack([tops[-2] + depth / last.mu_t, tau_tops[-2] + depth, last.alpha * DARK * weight])
     return Depths(
         z=(at @ z_ends).T.ravel(),
         tau=(at @ tau_ends).T.ravel(),
@@ -114,8 +119,8 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
         z_ends=z_ends,
         tau_ends=tau_ends,
         alpha=np.array([layer.alpha for layer in scatters]),
-        tail=_tail(layers[-1], tops[-2], tau_tops[-2], seen=bool(np.any(tau_ends[1:] == tau_tops[-2] + DEEPEST))),
-        last=layers[-1],
+        tail=tail,
+        last=last,
         height=float(tops[-1]),
         optical=float(tau_tops[-1]),
         above=layers[0].n / medium.n_above,
@@ -163,14 +168,6 @@ def _cuts(optical: float, first: float, last: float) -> Floats:
     down = from_top[from_top < middle - 0.25 * min(first, middle)]
     up = from_bottom[from_bottom < middle - 0.25 * min(last, middle)]
     return np.concatenate([down, optical - up[::-1]])
-
-
-def _tail(layer: Layer, top: float, tau_top: float, seen: bool) -> Floats:
-    if np.isfinite(layer.thickness) or not seen:
-        return np.empty((3, 0))
-    share, weight = double_exponential()
-    depth = DEEPEST + DARK * share
-    return np.stack([top + depth / layer.mu_t, tau_top + depth, layer.alpha * DARK * weight])
 
 
 @lru_cache(maxsize=512)

@@ -9,9 +9,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require
 from mcml_sim.media.phase.phase import Phase
 from mcml_sim.media.phase.tabulated import STRAIGHT, Pieces, Tabulated
 
@@ -39,10 +38,8 @@ class FournierForand(Phase):
     def __post_init__(self) -> None:
         for name, (low, high) in (("n", INDICES), ("mu", SLOPES)):
             value = getattr(self, name)
-            if isinstance(value, jax.Array):
-                continue
-            if not (is_number(value) and low < value < high):
-                raise InputError(f"{name} must be in ({low:g}, {high:g}), got {shown(value)}")
+            is_inside = isinstance(value, jax.Array) or (is_number(value) and low < value < high)
+            require(is_inside, name, f"in ({low:g}, {high:g})", value)
 
     def pdf(self, cosine: Any) -> Any:
         return self._density(namespace(self.n, self.mu, cosine).maximum(1 - cosine, STRAIGHT))

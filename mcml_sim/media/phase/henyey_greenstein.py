@@ -8,9 +8,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number, require
 from mcml_sim.media.phase.phase import Phase
 
 
@@ -28,10 +27,9 @@ class HenyeyGreenstein(Phase):
     g: Any
 
     def __post_init__(self) -> None:
-        if isinstance(self.g, jax.Array):
-            return
-        if not ((is_number(self.g) or isinstance(self.g, np.ndarray)) and np.all(np.abs(self.g) < 1)):
-            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
+        is_real = is_number(self.g) or isinstance(self.g, np.ndarray)
+        is_cosine = isinstance(self.g, jax.Array) or (is_real and np.all(np.abs(self.g) < 1))
+        require(is_cosine, "g", "a mean cosine in (-1, 1)", self.g)
 
     def pdf(self, cosine: Any) -> Any:
         xp = namespace(self.g, cosine)

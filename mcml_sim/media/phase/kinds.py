@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import shown
+from mcml_sim.media.checks import require, shown
 from mcml_sim.media.phase.fournier_forand import FournierForand
 from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein, Isotropic
 from mcml_sim.media.phase.mixture import Mixture
@@ -29,8 +29,7 @@ def settle(of: Any) -> None:
 
     Henyey and Greenstein's, and isotropic, is said by g alone. InputError on what is no phase function.
     """
-    if not isinstance(of.phase, Phase):
-        raise InputError(f"phase must be a phase function of mcml_sim.phase, got {shown(of.phase)}")
+    require(isinstance(of.phase, Phase), "phase", "a phase function of mcml_sim.phase", of.phase)
     phase = of.phase.simplest
     object.__setattr__(of, "g", float(phase.mean_cosine))
     object.__setattr__(of, "phase", None if isinstance(phase, HenyeyGreenstein | Isotropic) else phase)

@@ -176,9 +176,8 @@ class Tabulated(Phase):
         pieces = self.through(angles, values)
         total = pieces.total
         if not abs(total - 1) <= TOLERANCE:  # infinite, or NaN, where the first power law has no integral
-            raise InputError(
-                f"values must be densities per steradian, whose integral over all directions is 1, got {total:.4g}"
-            )
+            accepted = "densities per steradian, whose integral over all directions is 1"
+            raise InputError(f"values must be {accepted}, got {total:.4g}")
         object.__setattr__(self, "angles", tuple(angles.tolist()))
         object.__setattr__(self, "values", tuple(values.tolist()))
         object.__setattr__(self, "pieces", pieces.normalised())

@@ -12,9 +12,9 @@ ALPHAS = np.array([[0.0], [0.05], [0.8], [0.999], [1.0], [1.1]])
 R = np.array([0.0, 1e-3, 0.02, 0.7, 6.0, 15.0, np.inf, -1.0])
 XI = np.array([0.0, 1e-3, 0.02, 0.4, 0.9, 0.99, 1.0, 1.1])
 MFP = 1.3
+NAMES = ("reflectance", "decay_rate", "profile", "cdf", "quantile")
 INSIDE = np.s_[1:-2, 1:-2]  # away from the ends of both
 STEP = 1e-5
-
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -43,56 +43,38 @@ def difference(function, x, step):
     return (8 * near - far) / (12 * step)
 
 
+def by_name(alphas, at):
+    """Numpy's answers by NAMES, at these albedos and a slice of the radii or shares, (5, alphas, radii)."""
+    totals = exact.reflectance(alphas), exact.decay_rate(alphas)
+    by_radius = exact.profile(R[at], alphas, MFP), exact.cdf(R[at], alphas, MFP), exact.quantile(XI[at], alphas, MFP)
+    return np.stack(np.broadcast_arrays(*totals, *by_radius))
+
+
 @pytest.mark.slow
 def test_mapped_answers_are_those_of_numpy(table):
-    alphas = ALPHAS[:-1]
-    expected = {
-        "reflectance": np.broadcast_to(exact.reflectance(alphas), (5, 7)),
-        "decay_rate": np.broadcast_to(exact.decay_rate(alphas), (5, 7)),
-        "profile": exact.profile(R[:-1], alphas, MFP),
-        "cdf": exact.cdf(R[:-1], alphas, MFP),
-        "quantile": exact.quantile(XI[:-1], alphas, MFP),
-    }
-    for name, values in expected.items():
+    for name, values in zip(NAMES, by_name(ALPHAS[:-1], np.s_[:-1]), strict=True):
         np.testing.assert_allclose(table[name][0][:-1, :-1], values, rtol=1e-11, err_msg=name)
-
-
-@pytest.mark.slow
-def test_what_is_out_of_range_is_nan_where_it_may_be_traced(table):
-    for name in ("profile", "cdf", "quantile"):
+    # What is out of range is nan where it may be traced; no radii are traced too.
+    for name in NAMES[2:]:
         assert np.isnan(table[name][0][-1]).all()
         assert np.isnan(table[name][0][:, -1]).all()
-    for name in ("reflectance", "decay_rate"):
+    for name in NAMES[:2]:
         assert np.isnan(table[name][0]).all(axis=1).tolist() == [False] * 5 + [True]
+    assert exact.profile(jnp.zeros(0), 0.5).shape == exact.reflectance(jnp.zeros((0, 2))).shape[:1] == (0,)
 
 
 @pytest.mark.slow
-def test_slopes_in_albedo_are_central_differences(table):
+def test_slopes_in_albedo_and_in_radius_and_share_are_central_differences(table):
     alphas = ALPHAS[1:-2]
-    asked = {
-        "reflectance": lambda a: np.broadcast_to(exact.reflectance(a), (3, 5)),
-        "decay_rate": lambda a: np.broadcast_to(exact.decay_rate(a), (3, 5)),
-        "profile": lambda a: exact.profile(R[1:-2], a, MFP),
-        "cdf": lambda a: exact.cdf(R[1:-2], a, MFP),
-        "quantile": lambda a: exact.quantile(XI[1:-2], a, MFP),
-    }
-    for name, function in asked.items():
-        slope = table[name][1] if name in ("reflectance", "decay_rate") else table[name][1][0]
-        along = difference(function, alphas, 1e-3 * alphas * (1 - alphas))
+    differences = difference(lambda a: by_name(a, np.s_[1:-2]), alphas, 1e-3 * alphas * (1 - alphas))
+    for name, along in zip(NAMES, differences, strict=True):
+        slope = table[name][1] if name in NAMES[:2] else table[name][1][0]
         np.testing.assert_allclose(slope[INSIDE], along, rtol=1e-7, atol=1e-9, err_msg=name)
-
-
-@pytest.mark.slow
-def test_slopes_in_radius_and_share_are_central_differences(table):
     for name, x, room in (("profile", R, R), ("cdf", R, R), ("quantile", XI, XI * (1 - XI))):
         function, inner = getattr(exact, name), np.s_[1:-2]
         along = difference(lambda v, f=function: f(v, ALPHAS[1:-2], MFP), x[inner], 1e-4 * room[inner])
         np.testing.assert_allclose(table[name][1][1][INSIDE], along, rtol=1e-8, atol=1e-10, err_msg=name)
-
-
-@pytest.mark.slow
-def test_slopes_in_mfp_are_those_of_a_scale(table):
-    """R_d(r; l) = R_d(r / l; 1) / l^2, and the like."""
+    # Slopes in mfp are those of a scale: R_d(r; l) = R_d(r / l; 1) / l^2, and the like.
     profile, cdf, quantile = (
         [table[n][0][INSIDE], *(s[INSIDE] for s in table[n][1])] for n in ("profile", "cdf", "quantile")
     )
@@ -103,7 +85,7 @@ def test_slopes_in_mfp_are_those_of_a_scale(table):
 
 
 @pytest.mark.slow
-def test_slopes_at_the_ends_of_the_albedo(table):
+def test_slopes_at_the_ends(table):
     """Finite where the law is smooth, infinite where it is not: 1 - A ends in a root, and the cdf divides by A."""
     black, conservative, r = table["profile"][1][0][0], table["profile"][1][0][4], np.s_[1:-2]
     assert table["reflectance"][1][0, 0] == pytest.approx(exact.reflectance(1e-7) / 1e-7, rel=1e-5)
@@ -115,11 +97,7 @@ def test_slopes_at_the_ends_of_the_albedo(table):
     assert table["decay_rate"][1][4, 0] == -np.inf
     assert np.all(table["cdf"][1][0][4, r] == -np.inf)
     assert np.all(table["quantile"][1][0][4, r] == np.inf)
-
-
-@pytest.mark.slow
-def test_slopes_at_the_ends_of_radius_and_share(table):
-    """2 pi r R_d is alpha/2 at the source; at infinity nothing is left."""
+    # And at the ends of radius and share: 2 pi r R_d is alpha/2 at the source; at infinity nothing is left.
     ratio = exact.reflectance(0.8) / 0.8
     profile, cdf, quantile = (table[name][1][1][2] for name in ("profile", "cdf", "quantile"))
     assert cdf[0] == pytest.approx(0.5 / (ratio * MFP), rel=1e-4)  # r ln r: 1e-5 at 1e-6 mfp
@@ -141,11 +119,6 @@ def test_second_derivatives():
     along = lambda t: exact.profile(0.7 + t, 0.8 + t)  # noqa: E731
     near, far = (along(h) - 2 * along(0.0) + along(-h) for h in (1e-3, 2e-3))
     assert jax.jit(slope(slope(along)))(0.0) == pytest.approx((16 * near - far) / 12e-6, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_no_radii_are_traced_too():
-    assert exact.profile(jnp.zeros(0), 0.5).shape == exact.reflectance(jnp.zeros((0, 2))).shape[:1] == (0,)
 
 
 def test_numbers_inside_a_jitted_function_stay_numbers():

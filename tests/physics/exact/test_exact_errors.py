@@ -34,6 +34,10 @@ def test_the_estimate_is_the_error():
     error, estimate = np.abs(coarse / truth - 1), np.abs(coarse / finer - 1)
     assert error.max() > 1e-6
     assert estimate.max() == pytest.approx(error.max(), rel=0.5)
+    # It has the shape of the profile, and is 0 at its ends.
+    assert type(exact.error_estimate(1.0, 0.5)) is float
+    np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)
+    assert exact.error_estimate(2.0, 0.5, 2.0) == exact.error_estimate(1.0, 0.5)
 
 
 @pytest.mark.slow
@@ -42,13 +46,6 @@ def test_every_quadrature_needs_its_nodes(rule):
     """Negative control: few nodes of any of the three are seen."""
     r = np.geomspace(1e-2, 10.0, 12)
     assert np.abs(sampled(rule, r) / sampled(STANDARD, r) - 1).max() > 1e-7
-
-
-@pytest.mark.slow
-def test_an_estimate_has_the_shape_of_the_profile_and_is_0_at_its_ends():
-    assert type(exact.error_estimate(1.0, 0.5)) is float
-    np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)
-    assert exact.error_estimate(2.0, 0.5, 2.0) == exact.error_estimate(1.0, 0.5)
 
 
 def test_numbers_give_numbers_and_arrays_broadcast():
@@ -65,68 +62,57 @@ def test_numbers_give_numbers_and_arrays_broadcast():
     assert exact.profile([], 0.5).shape == exact.reflectance([]).shape == (0,)
 
 
-@pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2.0], "half", None])
+# Masked, complex, text, other objects, ragged: numpy would make numbers of the first three.
+NO_NUMBERS = (np.ma.masked_less([0.1, 0.5], 0.3), np.array([0.5 + 0j]), "0.5", [None], [[1], [1, 2]])
+BY_SETTING = (  # every function of an albedo under a setting
+    lambda alpha, setting: exact.reflectance(alpha, setting),
+    lambda alpha, setting: exact.profile(1.0, alpha, setting=setting),
+    lambda alpha, setting: exact.cdf(1.0, alpha, setting=setting),
+    lambda alpha, setting: exact.quantile(0.5, alpha, setting=setting),
+    lambda alpha, setting: exact.error_estimate(1.0, alpha, setting=setting),
+)
+
+
+@pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2.0], "half", None, *NO_NUMBERS])
 def test_albedo_must_be_in_0_to_1(alpha):
-    for call in (
-        lambda: exact.reflectance(alpha),
-        lambda: exact.profile(1.0, alpha),
-        lambda: exact.cdf(1.0, alpha),
-        lambda: exact.quantile(0.5, alpha),
-        lambda: exact.decay_rate(alpha),
-        lambda: exact.error_estimate(1.0, alpha),
-    ):
-        with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got"):
-            call()
+    for call in (*BY_SETTING, lambda alpha, _: exact.decay_rate(alpha)):
+        with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got \S"):
+            call(alpha, exact.SEARCHLIGHT)
 
 
-@pytest.mark.parametrize("r", [-1.0, np.nan, [1.0, -2.0], "far"])
-def test_radius_must_not_be_negative(r):
-    with pytest.raises(InputError, match=r"r must be a radius >= 0, got"):
-        exact.profile(r, 0.5)
-
-
-@pytest.mark.parametrize("mfp", [0.0, -1.0, np.inf, np.nan, "long"])
-def test_mfp_must_be_a_length(mfp):
-    with pytest.raises(InputError, match=r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100, got"):
-        exact.profile(1.0, 0.5, mfp)
-
-
-@pytest.mark.parametrize("xi", [-0.1, 1.5, np.nan, "most"])
-def test_share_must_be_in_0_to_1(xi):
-    with pytest.raises(InputError, match=r"xi must be a share of the energy in \[0, 1\], got"):
-        exact.quantile(xi, 0.5)
-
-
-def test_the_message_names_the_first_offender():
-    with pytest.raises(InputError, match=r"got -3\.0$"):
-        exact.profile([1.0, -3.0, -4.0], 0.5)
+@pytest.mark.parametrize(
+    ("call", "values", "said"),
+    [
+        (
+            lambda r: exact.profile(r, 0.5),
+            [-1.0, np.nan, [1.0, -2.0], "far", *NO_NUMBERS],
+            r"r must be a radius >= 0, got \S",
+        ),
+        (lambda r: exact.profile(r, 0.5), [[1.0, -3.0, -4.0]], r"got -3\.0$"),
+        (
+            lambda mfp: exact.profile(1.0, 0.5, mfp),
+            [0.0, -1.0, np.inf, np.nan, "long"],
+            r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100, got",
+        ),
+        (
+            lambda xi: exact.quantile(xi, 0.5),
+            [-0.1, 1.5, np.nan, "most", *NO_NUMBERS],
+            r"xi must be a share of the energy in \[0, 1\], got \S",
+        ),
+    ],
+    ids=["radius", "first offender", "mean free path", "share"],
+)
+def test_other_arguments_must_be_in_their_ranges(call, values, said):
+    for value in values:
+        with pytest.raises(InputError, match=said):
+            call(value)
 
 
 @pytest.mark.parametrize("setting", [Setting(n=0.9), Setting(g=0.5), Setting("diffuse", n=1.5, g=0.1), "diffuse", None])
 def test_other_surfaces_are_refused_by_name(setting):
-    for call in (
-        lambda: exact.reflectance(0.5, setting),
-        lambda: exact.profile(1.0, 0.5, setting=setting),
-        lambda: exact.cdf(1.0, 0.5, setting=setting),
-        lambda: exact.quantile(0.5, 0.5, setting=setting),
-        lambda: exact.error_estimate(1.0, 0.5, setting=setting),
-    ):
+    for call in BY_SETTING:
         with pytest.raises(SettingError, match=r"n >= 1 where g = 0, .*got .*simulate it instead"):
-            call()
-
-
-@pytest.mark.parametrize(
-    "value", [np.ma.masked_less([0.1, 0.5], 0.3), np.array([0.5 + 0j]), "0.5", [None], [[1], [1, 2]]]
-)
-def test_what_is_no_real_number_is_named(value):
-    """Masked, complex, text, other objects, ragged: numpy would make numbers of the first three."""
-    for ask in (exact.reflectance, exact.decay_rate, lambda alpha: exact.profile(1.0, alpha)):
-        with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got \S"):
-            ask(value)
-    with pytest.raises(InputError, match=r"r must be a radius >= 0, got \S"):
-        exact.profile(value, 0.5)
-    with pytest.raises(InputError, match=r"xi must be a share of the energy in \[0, 1\], got \S"):
-        exact.quantile(value, 0.5)
+            call(0.5, setting)
 
 
 def test_shapes_that_do_not_broadcast_are_named():

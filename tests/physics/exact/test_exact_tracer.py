@@ -45,25 +45,15 @@ def run_under(setting):
     return simulate_orders(Grid.from_edges(r=EDGES), 2**20, seed=3, setting=setting)
 
 
-@pytest.fixture(params=["searchlight", "diffuse"])
-def lit(request):
-    """A run under either light, and its setting."""
-    setting = Setting(request.param)
-    return run_under(setting), setting
-
-
 @pytest.mark.slow
-def test_the_tracer_agrees_in_chi_square_over_the_rings(lit):
-    assert is_likely(*lit)
-
-
-@pytest.mark.slow
-def test_chi_square_tells_another_light_and_another_albedo(lit):
+@pytest.mark.parametrize(("illumination", "other"), [("searchlight", "diffuse"), ("diffuse", "searchlight")])
+def test_the_tracer_agrees_in_chi_square_over_the_rings(illumination, other):
     """Negative controls: 1 % less loss, and the other illumination."""
-    run, setting = lit
-    other = Setting({"searchlight": "diffuse", "diffuse": "searchlight"}[setting.illumination])
+    setting = Setting(illumination)
+    run = run_under(setting)
+    assert is_likely(run, setting)
     assert not is_likely(run, setting, wrong=0.01)
-    assert not is_likely(run, other)
+    assert not is_likely(run, Setting(other))
 
 
 @pytest.mark.slow

@@ -63,19 +63,21 @@ def test_the_ends_are_exact(setting):
     np.testing.assert_allclose(source, ALPHAS * single_scattering.source_strength(setting), rtol=1e-4)
     assert exact.profile(0.0, 0.9, setting=setting) == np.inf
     assert exact.profile(np.inf, 0.9, setting=setting) == 0
+    np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=setting), [0.0, 0.0])
     np.testing.assert_allclose(exact.cdf([0.0, np.inf], 0.9, setting=setting), [0, 1], atol=1e-5)
 
 
 def test_lengths_and_shapes_are_those_of_the_medium():
-    np.testing.assert_allclose(
-        exact.profile(R[:, None], ALPHAS, 2.0, TISSUE), exact.profile(R[:, None] / 2, ALPHAS, setting=TISSUE) / 4
-    )
+    half = exact.profile(R[:, None] / 2, ALPHAS, setting=TISSUE)
+    np.testing.assert_allclose(exact.profile(R[:, None], ALPHAS, 2.0, TISSUE), half / 4)
     assert exact.profile(R[:0], 0.9, setting=TISSUE).shape == (0,)
     assert isinstance(exact.profile(1.0, 0.9, setting=TISSUE), float)
     xi = np.array([0.0, 0.1, 0.5, 0.99, 1.0])
     radius = exact.quantile(xi, 0.99, 3.0, TISSUE)
     np.testing.assert_allclose(exact.cdf(radius[:-1], 0.99, 3.0, TISSUE), xi[:-1], atol=1e-9)
     assert (radius[0], radius[-1]) == (0.0, np.inf)
+    error = exact.error_estimate(R[:6, None], ALPHAS[1:], setting=Setting(n=1.4, g=0.87))
+    assert 1e-9 < error.max() < 5e-3, "what another table would change"
 
 
 def test_the_cdf_is_the_profiles_integral():
@@ -101,12 +103,8 @@ def test_no_light_is_made_far_away(g):
 @pytest.mark.parametrize(
     ("setting", "alpha"),
     [
-        (Setting(n=1.4, g=0.95), 0.99),
-        (Setting("diffuse", 1.4, 0.95), 0.99),
-        (Setting(n=1.4, g=0.8), 0.2),
-        (Setting(n=1.4, g=0.05), 0.999),
-        (Setting(n=1.4, g=0.9), 1.0),
-        (Setting(n=1.4, g=0.9), 0.0),
+        *((Setting(light, 1.4, 0.95), 0.99) for light in ("searchlight", "diffuse")),
+        *((Setting(n=1.4, g=g), alpha) for g, alpha in ((0.8, 0.2), (0.05, 0.999), (0.9, 1.0), (0.9, 0.0))),
     ],
     ids=str,
 )
@@ -144,10 +142,6 @@ def test_a_profile_holds_its_reflectance(light, g):
     assert 4e-4 < worst[1.0] < 3.2e-3, "white media are worse: a test that can fail"
 
 
-def test_no_light_is_none_at_the_source():
-    np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=TISSUE), [0.0, 0.0])
-
-
 @pytest.mark.slow
 def test_derivatives_at_the_ends_of_shares():
     with jax.enable_x64(True):
@@ -166,11 +160,6 @@ def test_it_has_derivatives():
             slope = jax.jit(jax.grad(lambda a, f=function, x=first: f(x, a, setting=TISSUE)))(jnp.float64(0.97))
             ends = [float(function(first, 0.97 + step, setting=TISSUE)) for step in (-1e-5, 1e-5)]
             assert float(slope) == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-4)
-
-
-def test_what_another_table_would_change_is_small():
-    error = exact.error_estimate(R[:6, None], ALPHAS[1:], setting=Setting(n=1.4, g=0.87))
-    assert 1e-9 < error.max() < 5e-3
 
 
 @pytest.mark.parametrize(

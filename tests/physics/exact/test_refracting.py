@@ -13,8 +13,10 @@ from mcml_sim.errors import Notice
 from mcml_sim.exact import cone, refracting
 from mcml_sim.exact.by_albedo import by_alpha, profile
 from mcml_sim.exact.single_scattering import entered, transform_density
+from mcml_sim.exact.special_functions import panels
 from mcml_sim.exact.transform import STANDARD
 from tests.fixtures import slow
+from tests.physics.exact.test_exact_derivatives import difference
 from tests.physics.tracing.adding_doubling import solve as added
 
 LIGHTS = ("searchlight", "diffuse")
@@ -40,10 +42,8 @@ def test_totals_of_adding_and_doubling():
 def test_all_that_enters_comes_back_where_nothing_is_absorbed(light):
     where = Setting(light, n=1.4)
     assert exact.reflectance(1.0, where) == pytest.approx(entered(where), rel=1e-14)
-    near = 1 - 1e-8
-    assert entered(where) - exact.reflectance(near, where) == pytest.approx(
-        (entered(where) - exact.reflectance(1 - 1e-6, where)) / 10, rel=4e-3
-    )
+    near, far = (entered(where) - exact.reflectance(1 - loss, where) for loss in (1e-8, 1e-6))
+    assert near == pytest.approx(far / 10, rel=4e-3)
 
 
 @each_light
@@ -64,7 +64,7 @@ def test_light_scattered_once_is_the_closed_form(light):
 def test_rotated_contour_meets_the_real_axis(light):
     """Light scattered once in closed form; of the rest the real transform, faded out where it is c / k^2."""
     where, alpha, r = Setting(light, n=1.4), 0.8, np.array([1.0, 1.4])
-    k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 4.0)))
+    k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 4.0)), 16)
     rate, weighted = transform_density(where)
     with jax.enable_x64(True):
         solve = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3})  # a thousand systems
@@ -81,14 +81,8 @@ def test_rotated_contour_meets_the_real_axis(light):
 
 @pytest.mark.slow
 @each_light
-def test_more_nodes_change_nothing(light):
-    assert np.max(exact.error_estimate(RADII, ALPHAS, setting=Setting(light, n=1.4))) < 1e-7
-
-
-@pytest.mark.slow
-@each_light
-@pytest.mark.parametrize("n", [1.001, 1.3, 1.5, 3.0])
-def test_more_nodes_change_nothing_under_other_surfaces(light, n):
+@pytest.mark.parametrize("n", [1.001, 1.3, 1.4, 1.5, 3.0])
+def test_more_nodes_change_nothing(light, n):
     assert np.max(exact.error_estimate(RADII, ALPHAS, setting=Setting(light, n=n))) < 1e-7
 
 
@@ -100,9 +94,8 @@ def test_a_surface_that_hardly_refracts_is_none(light):
     found = exact.reflectance(ALPHAS, here)
     np.testing.assert_allclose(found, exact.reflectance(ALPHAS, there), rtol=1e-7)
     r = np.geomspace(1e-3, 5.0, 30)
-    np.testing.assert_allclose(
-        exact.profile(r, ALPHAS, setting=here), exact.profile(r, ALPHAS, setting=there), rtol=1e-6
-    )
+    found, wanted = (exact.profile(r, ALPHAS, setting=where) for where in (here, there))
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
 @each_light
@@ -113,9 +106,8 @@ def test_quantile_undoes_cdf_and_profile_is_its_slope(light):
     inner = share < 1 - 1e-6
     radius = exact.quantile(share, ALPHAS, setting=where)
     assert np.abs(radius / RADII - 1)[inner].max() < 1e-9
-    slope = (exact.cdf(RADII * 1.0001, ALPHAS, setting=where) - exact.cdf(RADII / 1.0001, ALPHAS, setting=where)) / (
-        2 * np.log(1.0001)
-    )
+    above, below = (exact.cdf(RADII * ratio, ALPHAS, setting=where) for ratio in (1.0001, 1 / 1.0001))
+    slope = (above - below) / (2 * np.log(1.0001))
     ring = 2 * np.pi * RADII**2 * exact.profile(RADII, ALPHAS, setting=where) / exact.reflectance(ALPHAS, where)
     np.testing.assert_allclose(slope[inner], ring[inner], rtol=1e-5)
 
@@ -147,7 +139,7 @@ def test_derivatives_are_those_of_differences(light):
             alpha, r, mfp = (x if one == index else float(old) for one, old in enumerate(at))
             return exact.profile(r, alpha, mfp, where)
 
-        assert slope == pytest.approx(difference(value, float(at[index])), rel=1e-8)
+        assert slope == pytest.approx(difference(value, float(at[index]), 1e-3), rel=1e-8)
 
 
 @pytest.mark.slow
@@ -155,11 +147,8 @@ def test_derivatives_are_those_of_differences(light):
 def test_derivatives_by_n_are_those_of_differences(light):
     def quantities(n):
         where = Setting(light, n=n)
-        return (
-            exact.profile(1.3, 0.9, setting=where),
-            exact.reflectance(0.9, where),
-            exact.quantile(0.7, 0.9, 1.0, where),
-        )
+        profile = exact.profile(1.3, 0.9, setting=where)
+        return profile, exact.reflectance(0.9, where), exact.quantile(0.7, 0.9, 1.0, where)
 
     slopes = [difference(lambda n, one=one: quantities(n)[one], 1.4, 4e-3) for one in range(3)]
     with jax.enable_x64(True):
@@ -168,18 +157,6 @@ def test_derivatives_by_n_are_those_of_differences(light):
     np.testing.assert_allclose(values, quantities(1.4), rtol=1e-12)
     np.testing.assert_allclose(found, slopes, rtol=1e-8)
     assert backwards == pytest.approx(float(found[0]), rel=1e-12)
-
-
-def difference(function, x, step=1e-3):
-    """Of fourth order."""
-    ends = [function(x + shift * step) for shift in (-2, -1, 1, 2)]
-    return (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
-
-
-def panels(edges):
-    t, weights = np.polynomial.legendre.leggauss(16)
-    half = 0.5 * np.diff(edges)[:, None]
-    return (edges[:-1, None] + half * (t + 1)).ravel(), (half * weights).ravel()
 
 
 def test_a_table_is_kept_and_a_damaged_one_is_named_and_made_anew(monkeypatch, tmp_path):

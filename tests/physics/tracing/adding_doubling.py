@@ -22,10 +22,8 @@ class Answer:
     """What leaves, relative to the incident beam, specular light at the first interface apart."""
 
     specular: float
-    reflected: np.ndarray
-    """Diffuse reflectance by bin of exit angle, (angles,)."""
-    transmitted: np.ndarray
-    """Diffuse transmittance by bin of exit angle, (angles,)."""
+    reflected: np.ndarray  # diffuse reflectance by bin of exit angle, (angles,)
+    transmitted: np.ndarray  # diffuse transmittance by bin of exit angle, (angles,)
     ballistic: float
 
 
@@ -35,8 +33,7 @@ class Bundles:
 
     mu: np.ndarray
     weights: np.ndarray
-    bins: np.ndarray
-    """Bin of exit angle, or -1 where light is totally reflected."""
+    bins: np.ndarray  # bin of exit angle, or -1 where light is totally reflected
 
 
 def solve(medium, angles=18, nodes=4, diffuse=False):

@@ -24,9 +24,8 @@ def test_reflectance_is_the_exact_one(run):
     # 4 standard errors: a chance of 6e-5 each; the albedos share their photons.
     assert np.abs(deviations(found, exact.reflectance(ALPHAS))).max() < 4
     assert np.all(found.standard_error < 2e-3 * found.value)
-
-
-def test_reflectance_at_0_999_is_exact_but_for_what_the_cap_cut(run):
+    assert np.abs(deviations(found, exact.reflectance(ALPHAS + 0.004))).min() > 4, "a wrong albedo is seen"
+    # At 0.999 it is but for what the cap cut.
     found = run.reflectance(0.999)
     missing = exact.reflectance(0.999) - found.value
     assert -4 * found.standard_error < missing < 4 * found.standard_error + run.cut(0.999)
@@ -49,30 +48,24 @@ def test_without_the_gate_far_rings_look_many_errors_wrong(run, sidak):
     assert np.abs(z).max() > 2 * sidak(seen.sum())
 
 
-def test_a_wrong_albedo_is_seen(run):
-    assert np.abs(deviations(run.reflectance(ALPHAS), exact.reflectance(ALPHAS + 0.004))).min() > 4
-
-
-def test_rings_and_overflow_add_up_to_the_reflectance(run):
+def test_estimates_add_up(run):
+    """Rings and overflow to the reflectance, the profile to the energy, and what users make of the counts."""
     total = run.energy(ALPHAS).value.sum(axis=1) + run.overflow(ALPHAS).value
     np.testing.assert_allclose(total, run.reflectance(ALPHAS).value, rtol=1e-12)
-
-
-def test_profile_is_energy_by_area(run):
     profile, energy = run.profile(0.9), run.energy(0.9)
     np.testing.assert_allclose(profile.value * run.grid.r_areas, energy.value)
     np.testing.assert_allclose(profile.standard_error * run.grid.r_areas, energy.standard_error)
+    again = run.ring_order_counts[:, 1:] @ run.weights(0.7)[1:] / run.photons
+    np.testing.assert_allclose(run.energy(0.7).value, run.once(0.7)[:-1] + again)
 
 
-def test_derivative_is_the_slope_of_the_profile(run):
+def test_derivative_is_the_slope_of_the_profile(run, sidak):
     step = 1e-6
     for alpha in (0.2, 0.9, 0.99):
         below, above = (run.profile(a).value for a in (alpha - step, alpha + step))
         slope = (above - below) / (2 * step)
         np.testing.assert_allclose(run.profile_derivative(alpha).value, slope, rtol=1e-4, atol=1e-12 * slope.max())
-
-
-def test_derivative_is_that_of_the_exact_energy(run, sidak):
+    # And that of the exact energy.
     alpha, step = 0.9, 1e-4
     truth = (exact_energy(run.grid.r_edges, alpha + step) - exact_energy(run.grid.r_edges, alpha - step)) / (2 * step)
     found = run.profile_derivative(alpha).scaled(run.grid.r_areas)
@@ -94,11 +87,6 @@ def test_shapes_are_alpha_then_rings(run):
     assert run.weights([0.5, 0.6]).shape == (2, run.orders.size)
 
 
-def test_users_get_the_estimates_from_the_counts(run):
-    again = run.ring_order_counts[:, 1:] @ run.weights(0.7)[1:] / run.photons
-    np.testing.assert_allclose(run.energy(0.7).value, run.once(0.7)[:-1] + again)
-
-
 def test_light_scattered_once_is_exact_and_takes_most_of_the_error_near_the_source(run):
     """The same with the photons' own first scatterings: as right, and less precise where they are most of the light."""
     plain = estimate(run.ring_order_counts, run.weights(0.5), run.photons)
@@ -109,21 +97,21 @@ def test_light_scattered_once_is_exact_and_takes_most_of_the_error_near_the_sour
     assert np.abs(deviations(found, truth)[near]).max() < 4
 
 
-def test_no_albedo_no_light(run):
+def test_no_albedo_no_light_and_conservative_half_spaces_return_all_but_what_is_cut(run):
     assert float(run.reflectance(0.0)) == 0
     assert np.all(run.profile_derivative(0.0).value.sum() > 0)
-
-
-def test_conservative_half_space_returns_all_but_what_is_cut(run):
     found = run.reflectance(1.0)
     assert abs(found.value + run.cut(1.0) - 1) < 4 * found.standard_error + 0.2 * run.cut(1.0)
 
 
-def test_every_photon_is_in_the_ledger(run):
+def test_every_photon_is_in_the_ledger_and_seeds_have_photons_of_their_own(run):
     ledger = run.ledger
     assert ledger.started == run.photons == 2**22
     assert ledger.exited == run.counts.exits.sum()
     assert ledger.exited + ledger.rouletted + ledger.cut == ledger.started
+    a, b, c = (simulate_orders(Grid(0.5, 4), 20_000, seed=s) for s in (1, 1, 2))
+    np.testing.assert_array_equal(a.counts.exits, b.counts.exits)
+    assert np.any(a.counts.exits != c.counts.exits)
 
 
 @pytest.mark.slow
@@ -158,69 +146,49 @@ def test_covariance_of_many_albedos_fits_in_rank_8(run):
     np.testing.assert_allclose(np.sum(factors**2, axis=2).T[big], variance[big], rtol=0.02)
 
 
-def test_same_seed_same_bits_other_seed_others():
-    grid = Grid(0.5, 4)
-    a, b, c = (simulate_orders(grid, 20_000, seed=s) for s in (1, 1, 2))
-    np.testing.assert_array_equal(a.counts.exits, b.counts.exits)
-    assert np.any(a.counts.exits != c.counts.exits)
-
-
 @pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2], "half", None])
 def test_albedo_must_be_in_0_to_1(run, alpha):
-    for method in (
-        run.reflectance,
-        run.profile,
-        run.profile_derivative,
-        run.energy,
-        run.overflow,
-        run.cut,
-        run.weights,
-    ):
+    estimates = run.reflectance, run.profile, run.profile_derivative, run.energy, run.overflow
+    for method in (*estimates, run.cut, run.weights):
         with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got"):
             method(alpha)
 
 
-@pytest.mark.parametrize("photons", [0, -5, 2.5, np.nan, np.inf, "many", None, True, 10**20])
-def test_photons_must_be_a_sensible_whole_number(photons):
-    with pytest.raises(InputError, match=r"photons must be a whole number >= 1 and <= 1e\+13, got"):
-        simulate_orders(Grid(0.1, 3), photons)
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        (
+            "photons",
+            [0, -5, 2.5, np.nan, np.inf, "many", None, True, 10**20],
+            r"photons must be a whole number >= 1 and <= 1e\+13, got",
+        ),
+        ("seed", [-1, 0.5], "seed must be a whole number >="),
+        ("workers", [0, 1.5], "workers must be a whole number >="),
+        ("store", [3], "store must be the path of a folder, got 3"),
+        ("setting", [None, "diffuse"], r"setting must be a mcml_sim\.Setting, got"),
+        ("grid", [[0, 1, 2]], r"must be a mcml_sim\.Grid"),
+        ("grid", [Grid(0.1, 3000, 0.1, 3000)], "at most 2097152 bins, got 3000 annuli x 3000 depths"),
+        (
+            "grid",
+            [Grid.from_edges(r=[0, 1, 1 + 1e-12, 2])],
+            r"annuli wider than 1e-05 of their place.*got one from 1\.0 to 1\.0",
+        ),
+        (
+            "grid",
+            [Grid.from_edges(r=[0, *edges]) for edges in ([1e-40, 1], [1e40])],
+            "must have edges from 1e-30 to 1e",
+        ),
+    ],
+)
+def test_bad_input_is_named(name, values, message):
+    for value in values:
+        with pytest.raises(InputError, match=message):
+            simulate_orders(**{"grid": Grid(0.1, 3), "photons": 10, name: value})
 
 
-@pytest.mark.parametrize(("name", "value"), [("seed", -1), ("seed", 0.5), ("workers", 0), ("workers", 1.5)])
-def test_seed_and_workers_must_be_whole(name, value):
-    with pytest.raises(InputError, match=f"{name} must be a whole number >="):
-        simulate_orders(Grid(0.1, 3), 10, **{name: value})
-
-
-def test_store_must_be_a_folders_path():
-    with pytest.raises(InputError, match="store must be the path of a folder, got 3"):
-        simulate_orders(Grid(0.1, 3), 10, store=3)
-
-
-def test_one_photon_says_nothing_of_its_error():
+def test_one_photon_says_nothing_of_its_error_and_photons_may_be_powers_of_ten():
     assert simulate_orders(Grid(0.1, 3), 1).reflectance(0.9).standard_error == np.inf
-
-
-def test_photons_may_be_written_as_powers_of_ten():
     assert simulate_orders(Grid(0.1, 3), 1e3).photons == 1000
-
-
-@pytest.mark.parametrize("setting", [None, "diffuse"])
-def test_setting_must_be_one(setting):
-    with pytest.raises(InputError, match=r"setting must be a mcml_sim\.Setting, got"):
-        simulate_orders(Grid(0.1, 3), 10, setting=setting)
-
-
-def test_grids_too_fine_for_single_precision_are_refused():
-    with pytest.raises(InputError, match=r"annuli wider than 1e-05 of their place.*got one from 1\.0 to 1\.0"):
-        simulate_orders(Grid.from_edges(r=[0, 1, 1 + 1e-12, 2]), 10)
-    for edges in ([0, 1e-40, 1], [0, 1e40]):
-        with pytest.raises(InputError, match="grid must have edges from 1e-30 to 1e"):
-            simulate_orders(Grid.from_edges(r=edges), 10)
-    with pytest.raises(InputError, match=r"must be a mcml_sim\.Grid"):
-        simulate_orders([0, 1, 2], 10)
-    with pytest.raises(InputError, match="at most 2097152 bins, got 3000 annuli x 3000 depths"):
-        simulate_orders(Grid(0.1, 3000, 0.1, 3000), 10)
 
 
 @pytest.mark.slow

@@ -21,17 +21,9 @@ def tally():
 
 
 def test_everything_is_an_estimate_of_its_bins_shape(tally):
-    shapes = {
-        "reflectance_r": (20,),
-        "transmittance_r": (20,),
-        "reflectance_a": (6,),
-        "transmittance_a": (6,),
-        "reflectance_ra": (20, 6),
-        "transmittance_ra": (20, 6),
-        "absorbed_z": (10,),
-        "absorbed_rz": (20, 10),
-        "absorbed_per_layer": (2,),
-    }
+    exits = {"r": (20,), "a": (6,), "ra": (20, 6)}
+    shapes = {f"{side}_{end}": size for side in ("reflectance", "transmittance") for end, size in exits.items()}
+    shapes |= {"absorbed_z": (10,), "absorbed_rz": (20, 10), "absorbed_per_layer": (2,)}
     for name in tally.quantities:
         found = tally.quantity(name)
         assert np.shape(found.value) == np.shape(found.standard_error) == shapes.get(name, ()), name
@@ -39,6 +31,9 @@ def test_everything_is_an_estimate_of_its_bins_shape(tally):
         assert np.all(np.isfinite(found.standard_error)), name
         if name not in shapes:
             assert isinstance(found.value, float), name
+    alone = simulate(SLAB, GRID, 1)  # which says nothing of its error
+    for name in set(alone.quantities) - {"specular_reflectance"}:
+        assert np.all(np.isinf(alone.quantity(name).standard_error)), name
 
 
 def test_light_that_entered_left_or_stayed(tally):
@@ -68,7 +63,10 @@ def test_bins_hold_densities_that_add_up(tally):
     assert inside.sum() > 0.9 * float(tally.absorbed)
 
 
-def test_ballistic_light_is_beers_law(tally):
+def test_the_surface_takes_its_share_first_and_ballistic_light_is_beers_law(tally):
+    assert float(tally.specular_reflectance) == pytest.approx((0.4 / 2.4) ** 2)
+    assert tally.specular_reflectance.standard_error == 0
+    assert float(simulate(half_space(0.5), GRID, 100).specular_reflectance) == 0
     surfaces = [((a - b) / (a + b)) ** 2 for a, b in ((1.0, 1.4), (1.4, 1.2), (1.2, 1.1))]
     straight = np.prod([1 - r for r in surfaces]) * np.exp(-3.0)
     # What goes to and fro inside adds a share of e^-2 times two reflectances of one percent at most.
@@ -80,27 +78,14 @@ def test_length_units_do_not_matter():
     """Millimetres for centimetres and other photons: each density changes by its own power of ten."""
     in_mm = Medium(tuple(Layer(y.n, y.mu_a / 10, y.mu_s / 10, y.g, y.thickness * 10) for y in SLAB.layers), n_below=1.1)
     cm, mm = simulate(SLAB, GRID, PHOTONS, seed=1), simulate(in_mm, Grid(0.5, 20, 0.29, 10, na=6), PHOTONS, seed=2)
-    powers = {
-        "absorbed": 0,
-        "reflectance_r": 2,
-        "reflectance_ra": 2,
-        "reflectance_a": 0,
-        "absorbed_z": 1,
-        "absorbed_rz": 3,
-    }
-    for name, power in powers.items():
+    powers = {"absorbed": 0, "reflectance_r": 2, "reflectance_ra": 2, "reflectance_a": 0, "absorbed_z": 1}
+    for name, power in {**powers, "absorbed_rz": 3}.items():
         a, b = cm.quantity(name), mm.quantity(name).scaled(10.0**power)
         seen = np.asarray(a.is_sampled(200))
         z = (np.asarray(a.value) - b.value) / np.hypot(a.standard_error, b.standard_error)
         assert seen.any(), name
         # 32 groups give the errors of absorption: Student's t of 62 degrees of freedom in up to 100 bins.
         assert np.abs(z[seen]).max() < 4.6, name
-
-
-def test_the_surface_takes_its_share_first(tally):
-    assert float(tally.specular_reflectance) == pytest.approx((0.4 / 2.4) ** 2)
-    assert tally.specular_reflectance.standard_error == 0
-    assert float(simulate(half_space(0.5), GRID, 100).specular_reflectance) == 0
 
 
 def test_workers_and_interruptions_change_no_bit(tmp_path, monkeypatch):
@@ -138,22 +123,10 @@ def test_precision_stops_at_the_first_look_that_reaches_it(monkeypatch):
     assert tighter.absorbed.standard_error <= alpha_9 / 3 * tighter.absorbed.value
     all_of_them = simulate(medium, Grid(0.1, 10), 20_000, precision=1e-6)
     assert all_of_them.photons == 20_000
-
-
-def test_precision_in_bins_waits_for_the_last_of_them(monkeypatch):
-    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched_batch, 1000)
+    # In bins it waits for the last of them; light that nobody saw is not known precisely.
     never = simulate(half_space(0.5), Grid(1.0, 60), 17_000, precision=Precision(0.5, "reflectance_r"))
     assert never.photons == 17_000
-
-
-def test_light_that_nobody_saw_is_not_known_precisely():
     assert not Precision(0.1, "transmittance").is_reached(simulate(half_space(0.5), GRID, 100).transmittance)
-
-
-def test_one_photon_says_nothing_of_its_error():
-    alone = simulate(SLAB, GRID, 1)
-    for name in set(alone.quantities) - {"specular_reflectance"}:
-        assert np.all(np.isinf(alone.quantity(name).standard_error)), name
 
 
 def test_stopping_early_leaves_the_errors_honest(monkeypatch):

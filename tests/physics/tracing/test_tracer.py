@@ -10,7 +10,8 @@ from mcml_sim.results.estimate import estimate
 from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
 from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
-from tests.physics.tracing.test_half_space_event import slow_twin
+from tests.fixtures import slow
+from tests.physics.tracing.test_half_space_event import deviations, slow_twin, table
 
 STOPS = OrderBins().stops
 PHOTONS = 200_000
@@ -29,69 +30,37 @@ def ends():
     return np.asarray(found.rho)[:PHOTONS], np.asarray(found.order)[:PHOTONS]
 
 
-def table(rho, order):
-    """Counts by 8 radii and 7 groups of orders to 64."""
-    left = (order >= 1) & (order <= 64)
-    radii = [0, 0.1, 0.3, 0.6, 1, 2, 4, 8, np.inf]
-    return np.histogram2d(rho[left], order[left], bins=[radii, [1, 2, 3, 5, 9, 17, 33, 65]])[0].ravel()
-
-
 def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
-    fast, slow = table(*ends), table(*slow_twin(Setting(), PHOTONS, 64, seed=3))
-    enough = fast + slow > 25
-    # Difference of two Poisson counts.
-    z = (fast - slow)[enough] / np.sqrt((fast + slow)[enough])
-    assert enough.sum() > 40
-    assert np.abs(z).max() < sidak(enough.sum())
-
-
-def test_the_comparison_sees_a_twin_that_is_off_by_5_percent(ends, sidak):
+    """And a twin that is off by 5 % is seen."""
     rho, order = slow_twin(Setting(), PHOTONS, 64, seed=3)
-    fast, slow = table(*ends), table(1.05 * rho, order)
-    enough = fast + slow > 25
-    assert np.abs((fast - slow)[enough] / np.sqrt((fast + slow)[enough])).max() > sidak(enough.sum())
+    z, off = (deviations(table(*ends, 64), table(scale * rho, order, 64)) for scale in (1.0, 1.05))
+    assert z.size > 40
+    assert np.abs(z).max() < sidak(z.size)
+    assert np.abs(off).max() > sidak(off.size)
 
 
-def test_every_photon_ends_and_none_at_a_place_that_is_no_number(ends):
+def test_every_photon_ends_at_a_place_and_inside_at_roulettes_and_the_cap_only(ends):
+    """And the first roulette stops half of those that reach it."""
     rho, order = ends
     assert np.all(order != 0)
     assert np.all(np.isfinite(rho))
     assert np.all(rho >= 0)
-
-
-def test_photons_end_inside_at_roulettes_and_at_the_cap_only(ends):
-    assert set(-ends[1][ends[1] < 0]) <= set(STOPS)
-
-
-def test_first_roulette_stops_half_of_those_that_reach_it(ends):
-    stopped, went_on = np.sum(ends[1] == -FIRST_ROULETTE), np.sum(np.abs(ends[1]) > FIRST_ROULETTE)
+    assert set(-order[order < 0]) <= set(STOPS)
+    stopped, went_on = np.sum(order == -FIRST_ROULETTE), np.sum(np.abs(order) > FIRST_ROULETTE)
     assert abs(stopped - went_on) < 4 * np.sqrt(stopped + went_on)
 
 
-def test_photons_that_were_not_asked_for_are_not_started():
-    found = traced(100)
-    assert np.all(np.asarray(found.order)[:100] != 0)
-    assert np.all(np.asarray(found.order)[100:] == 0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("lanes", [512, 16384])
-def test_the_number_of_lanes_does_not_change_a_bit(ends, lanes):
-    found = traced(PHOTONS, lanes)
-    np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
-    np.testing.assert_array_equal(np.asarray(found.order)[:PHOTONS], ends[1])
-
-
-def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one(ends):
-    found = traced(5000)
-    np.testing.assert_array_equal(np.asarray(found.rho)[:5000], ends[0][:5000])
-
-
-@pytest.mark.slow
-def test_double_precision_elsewhere_in_the_program_does_not_change_a_bit(ends):
-    with jax.enable_x64(True):
-        found = traced(PHOTONS)
-    np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
+@pytest.mark.parametrize(
+    ("photons", "lanes", "x64"),
+    [(5000, LANES, False), *slow((PHOTONS, 512, False), (PHOTONS, 16384, False), (PHOTONS, LANES, True))],
+    ids=["a shorter batch", "few lanes", "many lanes", "double precision elsewhere"],
+)
+def test_no_bit_changes_with(ends, photons, lanes, x64):
+    with jax.enable_x64(x64):
+        found = traced(photons, lanes)
+    np.testing.assert_array_equal(np.asarray(found.rho)[:photons], ends[0][:photons])
+    np.testing.assert_array_equal(np.asarray(found.order)[:photons], ends[1][:photons])
+    assert np.all(np.asarray(found.order)[photons:] == 0), "they were not asked for, and not started"
     assert found.rho.dtype == np.float32
 
 
@@ -102,10 +71,15 @@ def test_rings_are_those_of_float64_edges(ends):
     grid = Grid.from_edges(r=np.unique(np.concatenate([[0.0], at, at * (1 + 1e-5), np.geomspace(1e-3, 9, 30)])))
     counts = orders_batch.trace_batch(grid, 0, 0, PHOTONS)
     left = ends[1] > 0
-    expected = np.bincount(
-        np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1, minlength=grid.rings + 1
-    )
+    ring = np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1
+    expected = np.bincount(ring, minlength=grid.rings + 1)
     np.testing.assert_array_equal(counts.exits.sum(axis=1), expected)
+    # And every order below 256 has its own bin.
+    counts = orders_batch.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
+    expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
+    np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
+    assert counts.is_closed
+    assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
 RADII = np.concatenate([[0.0], np.geomspace(0.03, 5, 12)])
@@ -119,7 +93,7 @@ def lit(request):
     return request.param, orders_batch.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
 
 
-def deviations(counts, illumination):
+def from_exact(counts, illumination):
     """z of the energy in every ring and beyond the last, (alphas, rings + 1)."""
     got = estimate(counts.exits, OrderBins().weights(EXACT_ALPHAS), counts.started)
     setting = Setting(illumination)
@@ -129,14 +103,11 @@ def deviations(counts, illumination):
 
 
 def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
-    illumination, counts = lit
-    assert np.abs(deviations(counts, illumination)).max() < sidak(4 * 13)
-
-
-def test_the_exact_answer_to_the_other_light_is_told_apart(lit, sidak):
+    """And the exact answer to the other light is told apart."""
     illumination, counts = lit
     other = {"searchlight": "diffuse", "diffuse": "searchlight"}[illumination]
-    assert np.abs(deviations(counts, other)).max() > 3 * sidak(4 * 13)
+    assert np.abs(from_exact(counts, other)).max() > 3 * sidak(4 * 13)
+    assert np.abs(from_exact(counts, illumination)).max() < sidak(4 * 13)
 
 
 @pytest.mark.slow
@@ -160,32 +131,16 @@ def test_other_settings_take_the_general_kernel():
     assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
 
 
-def test_histogram_keeps_every_order_below_256(ends):
-    counts = orders_batch.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
-    expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
-    np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
-    assert counts.is_closed
-    assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
-
-
-def azimuth_words():
-    """All corners of the range and a million points between."""
-    near_ends = np.concatenate(
-        [np.arange(2**31 - 2**17, 2**31 + 2**17), np.arange(2**17), 2**32 - 1 - np.arange(2**17)]
-    )
-    between = np.random.default_rng(0).integers(0, 2**32, 10**6)
-    return np.concatenate([near_ends, between]).astype(np.uint32)
-
-
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
-    words = azimuth_words()
+    """At all corners of the range and a million points between."""
+    near = np.arange(2**17)
+    between = np.random.default_rng(0).integers(0, 2**32, 10**6)
+    words = np.concatenate([2**31 - 1 - near, 2**31 + near, near, 2**32 - 1 - near, between]).astype(np.uint32)
     cosine = np.asarray(jax.jit(half_space_event.azimuth_cosine)(words), np.float64)
     exact = np.sin(np.pi * (words.view(np.int32) + 0.5) / 2.0**32)
     assert np.abs(cosine - exact).max() < 5e-7
     assert np.abs(cosine).max() <= 1
-
-
-def test_azimuth_cosine_is_that_of_a_uniform_angle():
+    # It is that of a uniform angle.
     words = np.random.default_rng(1).integers(0, 2**32, 10**6).astype(np.uint32)
     angle = np.arccos(np.asarray(half_space_event.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
     # Kolmogorov-Smirnov: 1.95 / sqrt(N) has a chance of 1e-3.
@@ -211,13 +166,6 @@ def placed(z, order, last=MAX_ORDER, count=2**14):
 KEY = jnp.asarray(rng.batch_key(0, 0))
 ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
 FLY = jax.jit(half_space_event.fly, static_argnames="events")
-
-
-def test_first_scatterings_lie_straight_below_at_exponential_depths():
-    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), STOPS)
-    assert np.all(pool.place.real == 0)
-    assert np.all(pool.order == 0)
-    assert abs(np.mean(pool.place.imag) - 1) < 4 / 2**8
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():
@@ -274,16 +222,17 @@ def test_photons_are_stopped_at_their_last_order_and_nowhere_else():
         assert np.all(np.asarray(after.order) == min(last, 35))
 
 
-def test_half_the_photons_win_each_toss():
-    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS).last)
+def test_half_the_photons_win_each_toss_independently_of_the_depth_it_is_drawn_with():
+    entered = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
+    # First scatterings lie straight below at exponential depths.
+    assert np.all(entered.place.real == 0)
+    assert np.all(entered.order == 0)
+    assert abs(np.mean(entered.place.imag[: 2**16]) - 1) < 4 / 2**8
+    z, last = np.asarray(entered.place.imag, np.float64), np.asarray(entered.last)
     counts = np.array([np.sum(last == stop) for stop in STOPS])
     expected = 2**18 * np.append(0.5 ** np.arange(1, 8), 0.5**7)
     assert counts.sum() == 2**18
     assert STOPS[-1] == MAX_ORDER
     assert np.all(np.abs(counts - expected) < 4 * np.sqrt(expected))
-
-
-def test_tosses_are_independent_of_the_depth_they_are_drawn_with():
-    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
-    z, loses = np.asarray(pool.place.imag, np.float64), np.asarray(pool.last) == FIRST_ROULETTE
+    loses = last == FIRST_ROULETTE
     assert abs(z[loses].mean() - z[~loses].mean()) < 4 * np.sqrt(4 / 2**18)

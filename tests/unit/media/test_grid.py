@@ -7,13 +7,6 @@ import pytest
 from mcml_sim import Grid, InputError
 
 
-def test_even_rings_have_the_edges_and_areas_of_circles():
-    grid = Grid(0.5, 4)
-    np.testing.assert_array_equal(grid.r_edges, [0, 0.5, 1, 1.5, 2])
-    np.testing.assert_allclose(np.cumsum(grid.r_areas), np.pi * grid.r_edges[1:] ** 2, rtol=1e-15)
-    assert grid.rings == 4
-
-
 def test_grids_are_equal_by_value_and_cannot_change():
     grid, same, other = Grid(0.5, 2), Grid.from_edges(r=[0, 0.5, 1]), Grid.from_edges(r=[0, 0.5, np.nextafter(1, 2)])
     assert grid == same
@@ -26,41 +19,37 @@ def test_grids_are_equal_by_value_and_cannot_change():
         grid.r_edges[0] = 1
     with pytest.raises(AttributeError):
         grid.r_edges = same.r_edges
-
-
-def test_grid_keeps_its_own_copy_of_the_edges():
     edges = np.array([0.0, 1.0])
-    grid = Grid.from_edges(r=edges)
+    own = Grid.from_edges(r=edges)
     edges[1] = 2
-    assert grid.r_edges[1] == 1
+    assert own.r_edges[1] == 1, "it keeps its own copy"
 
 
 def test_grids_differ_by_what_they_resolve():
-    grids = [
-        Grid(0.5, 2),
-        Grid(0.5, 2, na=1),
-        Grid(0.5, 2, na=2),
-        Grid(0.5, 2, 0.5, 2),
-        Grid(0.5, 2, 0.5, 3),
-        Grid(0.5, 2, 0.4, 2),
-        Grid(0.5, 2, 0.5, 2, na=2),
-        Grid(0.5, 3),
+    grids = [Grid(0.5, 2), Grid(0.5, 3), *(Grid(0.5, 2, na=na) for na in (1, 2))]
+    grids += [
+        Grid(0.5, 2, dz, nz, na=na) for dz, nz, na in ((0.5, 2, None), (0.5, 3, None), (0.4, 2, None), (0.5, 2, 2))
     ]
     assert len({grid.digest for grid in grids}) == len(grids)
     assert len(set(grids)) == len(grids)
     assert grids[0] != "grid"
 
 
-def test_digests_are_those_that_stores_hold():
+def test_digests_are_those_that_stores_hold_and_a_grid_tells_of_itself():
     """A store of an earlier version is recognised: rings alone hash as they did before there were other bins."""
+    assert repr(Grid(0.5, 2)).startswith("Grid(2 annuli to r = 1, ")
+    assert repr(Grid(0.5, 2, 0.25, 3, na=4)).startswith("Grid(2 annuli to r = 1, 3 depths to z = 0.75, 4 angles, ")
     edges = np.array([0.0, 0.5, 1.0])
     assert Grid(0.5, 2).digest == hashlib.sha256(edges.astype("<f8").tobytes()).hexdigest()
     assert Grid(0.5, 2).digest == "9536689a4941c84ded438e9002674c39b2d5d1024a7b34232ee82e4cd4664931"
     assert Grid(0.5, 2, 0.25, 3, na=4).digest == "0e2cb61b5b804b55a01d345d56dc14d6237259ab9fd8e70d7f0790ef0f2228e9"
 
 
-def test_depths_are_even_or_as_given():
+def test_rings_and_depths_are_even_or_as_given():
     grid = Grid(0.5, 4, 0.25, 3, na=2)
+    np.testing.assert_array_equal(grid.r_edges, [0, 0.5, 1, 1.5, 2])
+    np.testing.assert_allclose(np.cumsum(grid.r_areas), np.pi * grid.r_edges[1:] ** 2, rtol=1e-15)
+    assert grid.rings == 4
     np.testing.assert_array_equal(grid.z_edges, [0, 0.25, 0.5, 0.75])
     np.testing.assert_array_equal(grid.z_widths, [0.25] * 3)
     uneven = Grid.from_edges(r=[0, 1, 4], z=[0, 2, 3], na=2)
@@ -91,11 +80,9 @@ def test_what_is_not_resolved_is_none_and_said():
         _ = grid.z_widths
     with pytest.raises(InputError, match="this grid resolves no angles, give it na"):
         _ = grid.solid_angles
-
-
-def test_a_grid_tells_of_itself():
-    assert repr(Grid(0.5, 2)).startswith("Grid(2 annuli to r = 1, ")
-    assert repr(Grid(0.5, 2, 0.25, 3, na=4)).startswith("Grid(2 annuli to r = 1, 3 depths to z = 0.75, 4 angles, ")
+    for more in ({"dz": 0.1}, {"nz": 3}):
+        with pytest.raises(InputError, match="dz and nz must be given together, got dz = "):
+            Grid(0.1, 3, **more)
 
 
 @pytest.mark.parametrize("width", [0, -1, np.nan, np.inf, "1", None, True])
@@ -119,12 +106,6 @@ def test_numbers_of_bins_must_be_whole(number):
             Grid(0.1, 3, na=number)
         with pytest.raises(InputError, match=f"na {said}"):
             Grid.from_edges(r=[0, 1], na=number)
-
-
-def test_depths_need_width_and_number():
-    for more in ({"dz": 0.1}, {"nz": 3}):
-        with pytest.raises(InputError, match="dz and nz must be given together, got dz = "):
-            Grid(0.1, 3, **more)
 
 
 @pytest.mark.parametrize(

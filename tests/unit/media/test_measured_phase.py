@@ -1,5 +1,7 @@
 """Phase functions that measurements need: tables, sums of terms, and Fournier and Forand's."""
 
+from functools import reduce
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +16,8 @@ from profilefit.recipes.phases import read_phase
 PETZOLD = read_phase(shipped("fits") / "phases" / "petzold.csv").table
 FORAND = FournierForand(1.1054, 3.582)
 SEA = Mixture((0.317, 0.6813, 0.0017), (HenyeyGreenstein(0.9933), HenyeyGreenstein(0.8957), HenyeyGreenstein(-0.635)))
+ANY = Mixture((0.3, 0.3, 0.4), (PETZOLD, FORAND, HenyeyGreenstein(-0.2)))
+NESTED = reduce(lambda inside, g: Mixture((0.5, 0.5), (inside, HenyeyGreenstein(g))), [0.5] * 6, Isotropic())
 ALL = pytest.mark.parametrize("phase", [PETZOLD, FORAND, SEA], ids=["table", "Fournier-Forand", "mixture"])
 STRATA = 2 * 10**6
 
@@ -38,10 +42,15 @@ def drawn(phase, v):
     return jax.jit(lambda phase, v: phase.deflection(v)[0])(phase.for_kernel(), v)
 
 
-@ALL
-def test_stratified_draws_of_a_kernel(phase):
+@pytest.mark.parametrize(
+    ("phase", "most"),
+    # Each of three terms may gain or lose a stratum at its end.
+    [(PETZOLD, 1e-6), (FORAND, 1e-6), (SEA, 1e-6), (ANY, 3 / STRATA + 1e-6)],
+    ids=["table", "Fournier-Forand", "mixture", "mixture of any"],
+)
+def test_stratified_draws_of_a_kernel(phase, most):
     v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
-    assert apart(drawn(phase, v), phase) < 1e-6
+    assert apart(drawn(phase, v), phase) < most
     assert apart(drawn(HenyeyGreenstein(0.924), v), phase) > 1e-3
 
 
@@ -122,22 +131,13 @@ def test_tables_of_files(phase):
     assert Setting().as_table() == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
 
 
-def test_a_kernel_takes_a_mixture_of_any():
-    """Each of three terms may gain or lose a stratum at its end."""
-    mixture = Mixture((0.3, 0.3, 0.4), (PETZOLD, FORAND, HenyeyGreenstein(-0.2)))
-    v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
-    assert apart(drawn(mixture, v), mixture) < 3 / STRATA + 1e-6
-
-
 def test_a_layer_has_one_phase_function():
     layer = Layer(1.3, 0.1, 1.0, 0.5, phase=SEA)
     assert layer.g == pytest.approx(SEA.mean_cosine)
     assert layer.similar == Layer(1.3, 0.1, 1 - SEA.mean_cosine, 0.0)
     assert Layer(1.3, 0.1, 1.0, 0.0, phase=HenyeyGreenstein(0.8)) == Layer(1.3, 0.1, 1.0, 0.8)
     assert Layer(1.3, 0.1, 1.0, 0.3, phase=Isotropic()) == Layer(1.3, 0.1, 1.0, 0.0)
-
-
-def test_no_preferred_mean_is_not_isotropic():
+    # One without a preferred mean is not isotropic.
     both = Mixture((0.5, 0.5), (HenyeyGreenstein(0.5), HenyeyGreenstein(-0.5)))
     assert Setting(phase=both).g == 0
     assert not Setting(phase=both).is_matched_isotropic
@@ -176,17 +176,10 @@ def rows(**changed):
         (lambda: from_table({"kind": "rayleigh"}), "kind of a phase function must be one of isotropic, "),
         (lambda: from_table({"kind": "mixture", "weights": [1]}), "must have weights, phases, got weights"),
         (lambda: from_table([]), r"a phase function must be a table, got \[\]"),
+        (lambda: from_table(as_table(NESTED)), "at most 4 levels"),
     ],
 )
 def test_bad_input_in_one_line(make, message):
     with pytest.raises(InputError, match=message) as error:
         make()
     assert "\n" not in str(error.value)
-
-
-def test_mixtures_within_mixtures_end():
-    inside = Isotropic()
-    for _ in range(6):
-        inside = Mixture((0.5, 0.5), (inside, HenyeyGreenstein(0.5)))
-    with pytest.raises(InputError, match="at most 4 levels"):
-        from_table(as_table(inside))

@@ -1,16 +1,19 @@
-"""Layers, media and settings: what physics allows, and a name for what it does not."""
+"""Layers, media, settings and interfaces: what physics allows, and a name for what it does not."""
 
 import dataclasses
 import math
 import pickle
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from mcml_sim import InputError, Layer, Medium, Setting, half_space
+from mcml_sim.media import fresnel
 from mcml_sim.media.medium import MAX_LAYERS
 
 TISSUE = Layer(n=1.4, mu_a=1, mu_s=99, g=0.9, thickness=0.1)
+NO_NUMBERS = (np.nan, None, True, False, np.complex128(0.5), np.complex128(1.4))
 
 
 def test_derived_numbers_of_a_layer():
@@ -20,21 +23,15 @@ def test_derived_numbers_of_a_layer():
     similar = TISSUE.similar
     assert (similar.g, similar.mu_a, similar.thickness) == (0, 1, 0.1)
     assert similar.mu_s == pytest.approx(9.9)
-
-
-def test_clear_glass_is_a_layer():
     glass = Layer(n=1.5, mu_a=0, mu_s=0, g=1, thickness=0.1)
     assert (glass.mu_t, glass.alpha, glass.mfp) == (0, 0, math.inf)
 
 
-def test_depths_of_the_interfaces():
+def test_media_are_values_and_have_interfaces():
     medium = Medium([TISSUE, TISSUE, Layer(1.4, 1, 9, 0)])
     np.testing.assert_allclose(medium.z_edges, [0, 0.1, 0.2, math.inf])
     assert medium.is_half_space
     assert not Medium((TISSUE,)).is_half_space
-
-
-def test_media_are_values():
     medium = Medium([TISSUE, TISSUE], n_above=1.1)
     assert medium == Medium((TISSUE, TISSUE), 1.1, 1)
     assert medium != Medium((TISSUE, TISSUE))
@@ -98,12 +95,9 @@ def test_a_layer_names_what_physics_forbids(name, value):
         Layer(**{"n": 1.4, "mu_a": 1, "mu_s": 9, "g": 0, "thickness": 1, name: value})
 
 
-def test_extinction_must_be_finite_too():
+def test_a_medium_names_what_is_wrong():
     with pytest.raises(InputError, match=r"mu_a \+ mu_s must be finite, got 1.7e\+308 and 1.7e\+308"):
         Layer(1, 1.7e308, 1.7e308, 0, 1)
-
-
-def test_a_medium_names_what_is_wrong():
     with pytest.raises(InputError, match="layers must be Layer objects, got 3"):
         Medium((TISSUE, 3))
     with pytest.raises(InputError, match="layers must be Layer objects, got 'tissue'"):
@@ -122,64 +116,107 @@ def test_a_medium_names_what_is_wrong():
         Medium((TISSUE, Layer(1.5, 0, 0, 0)))
 
 
-@pytest.mark.parametrize("alpha", [-0.1, 1.1, math.nan, None, True])
-def test_half_space_names_a_wrong_albedo(alpha):
-    with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got"):
-        half_space(alpha)
-
-
-@pytest.mark.parametrize("mfp", [0, -1, math.inf, math.nan, "1"])
-def test_half_space_names_a_wrong_mean_free_path(mfp):
-    with pytest.raises(InputError, match="mfp must be a mean free path > 0, got"):
-        half_space(0.5, mfp=mfp)
-
-
-def test_default_is_the_matched_searchlight():
+def test_settings_are_values():
+    """By default the matched searchlight; numbers of numpy are numbers."""
     assert Setting() == Setting("searchlight", 1.0, 0.0)
     assert str(Setting()) == "searchlight, n = 1, g = 0"
-    assert Setting().is_matched_isotropic
-
-
-@pytest.mark.parametrize("other", [Setting("diffuse"), Setting(n=1.4), Setting(g=-0.5)])
-def test_any_difference_makes_another_setting(other):
-    assert other != Setting()
-    assert hash(Setting()) == hash(Setting("searchlight"))
-
-
-@pytest.mark.parametrize(
-    ("setting", "matched"), [(Setting("diffuse"), True), (Setting(n=1.4), False), (Setting(g=0.1), False)]
-)
-def test_matched_isotropic_does_not_ask_for_the_light(setting, matched):
-    assert setting.is_matched_isotropic is matched
-
-
-def test_a_setting_reads_as_it_is():
     assert str(Setting("diffuse", 1.4, 0.75)) == "diffuse, n = 1.4, g = 0.75"
-
-
-def test_a_setting_is_frozen():
+    assert hash(Setting()) == hash(Setting("searchlight"))
+    assert Setting(n=np.float32(1.5), g=np.float64(0.5)) == Setting(n=1.5, g=0.5)
+    assert Setting(n=np.int64(2)) == Setting(n=2.0)
     with pytest.raises(dataclasses.FrozenInstanceError, match="cannot assign"):
         Setting().n = 1.4
 
 
-@pytest.mark.parametrize("illumination", ["laser", "", None, 3, ["diffuse"]])
-def test_illumination_must_be_known(illumination):
-    with pytest.raises(InputError, match="illumination must be one of searchlight, diffuse, got"):
-        Setting(illumination)
+@pytest.mark.parametrize(
+    ("setting", "matched"),
+    [(Setting("diffuse"), True), (Setting(n=1.4), False), (Setting(g=-0.5), False), (Setting(g=0.1), False)],
+    ids=str,
+)
+def test_any_difference_makes_another_setting_and_light_does_not_unmatch_it(setting, matched):
+    assert setting != Setting()
+    assert Setting().is_matched_isotropic
+    assert setting.is_matched_isotropic is matched
 
 
-@pytest.mark.parametrize("n", [0.0, -1.4, np.inf, np.nan, "glass", None, True, np.complex128(1.4)])
-def test_n_must_be_a_refractive_index(n):
-    with pytest.raises(InputError, match="n must be a refractive index > 0, got"):
-        Setting(n=n)
+@pytest.mark.parametrize(
+    ("make", "values", "message"),
+    [
+        (half_space, [-0.1, 1.1, math.nan, None, True], r"alpha must be a single-scattering albedo in \[0, 1\]"),
+        (lambda mfp: half_space(0.5, mfp=mfp), [0, -1, math.inf, math.nan, "1"], "mfp must be a mean free path > 0"),
+        (Setting, ["laser", "", None, 3, ["diffuse"]], "illumination must be one of searchlight, diffuse"),
+        (lambda n: Setting(n=n), [0.0, -1.4, np.inf, "glass", *NO_NUMBERS], "n must be a refractive index > 0"),
+        (lambda g: Setting(g=g), [-1.0, 1.0, 2.0, "forward", *NO_NUMBERS], r"g must be a mean cosine in \(-1, 1\)"),
+    ],
+    ids=["albedo", "mean free path", "illumination", "index", "mean cosine"],
+)
+def test_bad_arguments_are_named(make, values, message):
+    for value in values:
+        with pytest.raises(InputError, match=f"{message}, got"):
+            make(value)
 
 
-def test_numbers_of_numpy_are_numbers():
-    assert Setting(n=np.float32(1.5), g=np.float64(0.5)) == Setting(n=1.5, g=0.5)
-    assert Setting(n=np.int64(2)) == Setting(n=2.0)
+# Reflection and refraction at interfaces
 
 
-@pytest.mark.parametrize("g", [-1.0, 1.0, 2.0, np.nan, "forward", None, False, np.complex128(0.5)])
-def test_g_must_be_a_mean_cosine(g):
-    with pytest.raises(InputError, match=r"g must be a mean cosine in \(-1, 1\), got"):
-        Setting(g=g)
+def polarised(n1, n2, angle):
+    """Textbook reflectances across and along the plane of incidence, by the angles themselves (Snell, Fresnel)."""
+    refracted = np.arcsin(n1 / n2 * np.sin(angle))
+    across = (np.sin(angle - refracted) / np.sin(angle + refracted)) ** 2
+    along = (np.tan(angle - refracted) / np.tan(angle + refracted)) ** 2
+    return across, along
+
+
+@pytest.mark.parametrize(("n1", "n2"), [(1.0, 1.5), (1.5, 1.0), (1.37, 1.4)])
+def test_fresnel_is_the_mean_of_the_textbooks_polarisations(n1, n2):
+    angle = np.linspace(0.01, 0.99, 50) * (np.arcsin(min(n2 / n1, 1.0)))
+    reflectance, cosine = fresnel.fresnel(n1, n2, np.cos(angle))
+    np.testing.assert_allclose(reflectance, np.mean(polarised(n1, n2, angle), axis=0), rtol=1e-9)
+    np.testing.assert_allclose(np.sqrt(1 - cosine**2) * n2, n1 * np.sin(angle), rtol=1e-9)
+
+
+def test_fresnel_at_angles_that_stand_out():
+    """Normal, Brewster's, beyond the critical angle, and grazing."""
+    reflectance, cosine = fresnel.fresnel(1.0, 1.5, 1.0)
+    assert reflectance == pytest.approx(0.04)
+    assert cosine == 1.0
+    angle = np.arctan(1.5)
+    across, along = polarised(1.0, 1.5, angle)
+    assert along == pytest.approx(0, abs=1e-30)
+    assert fresnel.fresnel(1.0, 1.5, np.cos(angle))[0] == pytest.approx(across / 2)
+    critical = np.sqrt(1 - (1 / 1.5) ** 2)
+    reflectance, cosine = fresnel.fresnel(1.5, 1.0, np.array([0.0, 0.3, critical - 1e-9, critical + 1e-6]))
+    np.testing.assert_array_equal(reflectance[:3], 1)
+    np.testing.assert_array_equal(cosine[:3], 0)
+    assert reflectance[3] < 1
+    assert 0 < cosine[3] < 0.01
+    assert fresnel.fresnel(1.0, 1.5, 0.0)[0] == 1
+    # Equal indices neither reflect nor bend.
+    assert fresnel.fresnel(1.4, 1.4, 0.0) == (0, 0)
+    cosine = np.random.default_rng(0).random(1000).astype(np.float32)
+    reflectance, refracted = fresnel.fresnel(np.float32(1.37), np.float32(1.37), cosine)
+    assert np.all(reflectance == 0)
+    np.testing.assert_array_equal(refracted, cosine)
+
+
+def test_fresnel_of_jax_arrays_is_that_of_numpy_in_single_precision():
+    cosine = np.linspace(0, 1, 1001)
+    for n1, n2 in ((1.0, 1.5), (1.5, 1.0)):
+        single = fresnel.fresnel(jnp.float32(n1), jnp.float32(n2), jnp.asarray(cosine, jnp.float32))
+        for fast, exact in zip(single, fresnel.fresnel(n1, n2, cosine), strict=True):
+            assert fast.dtype == jnp.float32
+            # Near the critical angle both rise as a square root, and 1e-7 in the cosine becomes 3e-4.
+            assert np.all(np.isfinite(fast))
+            assert np.abs(np.asarray(fast, float) - exact).max() < 2e-3
+            assert np.median(np.abs(np.asarray(fast, float) - exact)) < 1e-6
+
+
+def test_tissue_reflects_as_its_surface_and_glass_with_all_orders_between_its_faces():
+    medium = Medium((Layer(1.37, 1, 100, 0.9, 0.1), Layer(1.5, 1, 10, 0, 0.1)))
+    assert fresnel.specular_reflectance(medium) == pytest.approx((0.37 / 2.37) ** 2)
+    assert fresnel.specular_reflectance(Medium((Layer(1.0, 1, 1, 0),))) == 0, "a matched one reflects nothing"
+    glass, tissue = Layer(1.5, 0, 0, 0, 0.1), Layer(1.37, 1, 10, 0, 0.1)
+    top, bottom = (0.4 / 2.6) ** 2, (0.13 / 2.87) ** 2
+    series = top + sum((1 - top) ** 2 * bottom * (top * bottom) ** k for k in range(20))
+    for medium in (Medium((glass, tissue), 1.1), Medium((glass,), 1.1, 1.37)):
+        assert fresnel.specular_reflectance(medium) == pytest.approx(series, rel=1e-12)

@@ -41,7 +41,7 @@ def with_line(number: int, line: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_reads_the_two_runs_of_the_template():
+def test_reads_the_runs_of_the_template_and_the_example(tmp_path):
     first, second = read_mci(DATA / "template.mci")
     assert (first.output, first.format, first.photons) == ("temp1.mco", "A", 10)
     assert (first.dz, first.dr, first.nz, first.nr, first.na) == (20e-4, 20e-4, 10, 20, 30)
@@ -49,17 +49,13 @@ def test_reads_the_two_runs_of_the_template():
     assert not first.medium.is_half_space, "1E8 cm stays a length, as in V1"
     assert (second.output, second.photons, second.medium.layers) == ("temp2.mco", 20, (Layer(1.4, 10, 200, 0.7, 1e8),))
     assert second.grid == Grid(20e-4, 80, 20e-4, 80, na=30)
-
-
-def test_reads_the_three_layers_of_the_example():
+    # And the three layers of the example.
     (run,) = read_mci(str(DATA / "example.mci"))
     rows = [(1.37, 1, 100, 0.9, 0.1), (1.37, 1, 10, 0, 0.1), (1.37, 2, 10, 0.7, 0.2)]
     assert run.medium.layers == tuple(Layer(*row) for row in rows)
     assert (run.medium.n_above, run.medium.n_below) == (1, 1)
     assert (run.photons, run.grid) == (1_000_000, Grid(0.01, 50, 0.01, 40, na=1))
-
-
-def test_depths_and_rings_are_not_mixed_up(tmp_path):
+    # Depths and rings are not mixed up.
     (run,) = read_mci(written(tmp_path, SMALL))
     assert (run.medium.n_above, run.medium.n_below) == (1.1, 1.2)
     np.testing.assert_allclose(run.grid.z_edges, [0, 0.01, 0.02, 0.03])
@@ -81,6 +77,8 @@ def test_depths_and_rings_are_not_mixed_up(tmp_path):
         SMALL.removesuffix("\n"),
         SMALL + "\x1a",
         SMALL.replace("0.01 0.02", "+1e-2 .2E-1").replace("1.1\n", "1.1e+0\n").replace("1000", "+1000"),
+        # Comments may have any bytes.
+        SMALL.encode().replace(b"1000\n", b"1000 \xb5 photons # \xe9t\xe9\n").replace(b"1.2\n", b"1.2\n# \xff\n"),
     ],
 )
 def test_form_does_not_matter(tmp_path, text):
@@ -95,16 +93,14 @@ def test_format_is_the_first_letter_as_in_v1(tmp_path, line, form):
     assert (run.output, run.format) == ("out.mco", form)
 
 
-def test_last_layer_may_be_endless(tmp_path):
+def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
     for word in ("inf", "Inf", "INFINITY", "+inf"):
         (run,) = read_mci(written(tmp_path, with_line(10, f"1.5 2 80 0.8 {word}")))
         assert run.medium.layers[-1].thickness == math.inf
         assert run.medium.is_half_space
     with pytest.raises(InputError, match=r"small.mci:9: expected thickness of layer 1 of 2 in cm, .*, got 'inf'"):
         read_mci(written(tmp_path, with_line(9, "1.4 1 90 0.9 inf")))
-
-
-def test_clear_glass_may_have_any_mean_cosine_up_to_one(tmp_path):
+    # Clear glass may have any mean cosine up to one.
     (run,) = read_mci(written(tmp_path, with_line(9, "1.5 0 0 1 0.1")))
     assert run.medium.layers[0] == Layer(1.5, 0, 0, 1, 0.1)
 
@@ -168,9 +164,8 @@ def test_a_broken_line_is_named(tmp_path, number, line, expected, got):
     found = re.fullmatch(rf"(.*)small\.mci:([0-9]+): expected {expected}, got (.*)", text)
     assert found, text
     assert found[3] == got
-    at = {"the end of the file": 12}.get(
-        got, 11 if line == "3" else 10 if line == "1" else number
-    )  # line 12: after the last line's end
+    # Line 12 is after the last line's end.
+    at = {"the end of the file": 12}.get(got, {"3": 11, "1": 10}.get(line, number))
     assert int(found[2]) == at
 
 
@@ -197,11 +192,6 @@ def test_two_runs_cannot_have_one_output(tmp_path):
 def test_what_is_no_text_is_said(tmp_path, content, message):
     with pytest.raises(InputError, match=message):
         read_mci(written(tmp_path, content))
-
-
-def test_comments_may_have_any_bytes(tmp_path):
-    text = SMALL.encode().replace(b"1000\n", b"1000 \xb5 photons # \xe9t\xe9\n").replace(b"1.2\n", b"1.2\n# \xff\n")
-    assert read_mci(written(tmp_path, text)) == read_mci(written(tmp_path, SMALL))
 
 
 def test_what_cannot_be_opened_is_said(tmp_path):
@@ -282,6 +272,9 @@ what follows is not read
 """
 
 
+SKIN, LONG = "  skin\t1.4\t1\t100\t0.9", "9" * 5000
+
+
 def parsed_2(text: str):
     return parse_mci(text.encode(), "two.mci")
 
@@ -303,24 +296,9 @@ def test_both_runs_of_mcml_2_are_read():
 @pytest.mark.parametrize(
     ("old", "new", "line", "told"),
     [
-        (
-            "  skin	1.4	1	100	0.9",
-            "  skin	1.4	1	100	1",
-            9,
-            "g of 'skin' between -1 and 1, or 1 where nothing",
-        ),
-        (
-            "  skin	1.4	1	100	0.9",
-            "  skin	1.4	1	100",
-            9,
-            "a medium's name, n, mu_a, mu_s and g, 1000 media",
-        ),
-        (
-            "  skin	1.4	1",
-            "  skin	1.4	" + "9" * 5000,
-            9,
-            f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'",
-        ),
+        (SKIN, SKIN.replace("0.9", "1"), 9, "g of 'skin' between -1 and 1, or 1 where nothing"),
+        (SKIN, SKIN.removesuffix("\t0.9"), 9, "a medium's name, n, mu_a, mu_s and g, 1000 media"),
+        (SKIN, SKIN.replace("\t1\t", f"\t{LONG}\t"), 9, f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'"),
         ("  glass	1.5", "  air	1.5", 8, "each medium once, got 'air' again"),
         ("  skin	0.2", "  bone	0.2", 15, "one of the media air, glass, skin, got 'bone'"),
         ("  skin	0.2", "  skin", 17, "a medium above, layers with their thickness, and a medium below, got 4 lines"),
@@ -335,7 +313,7 @@ def test_both_runs_of_mcml_2_are_read():
         ("a_z\n", "rd_t\n", 37, "quantities of .*none resolved in time, got 'rd_t'"),
         ("1E3	10:00", "10:00	", 23, "the number of photons, a whole number from 1 to 10+, got '10:00'"),
         ("1E3	10:00", "1.5", 23, "the number of photons, a whole number"),
-        ("1E3	10:00", "9" * 5000, 23, f"the number of photons, .*, got '{'9' * 37}\\.\\.\\.'"),
+        ("1E3	10:00", LONG, 23, f"the number of photons, .*, got '{'9' * 37}\\.\\.\\.'"),
         ("1E-4	", "2	", 24, "the threshold weight, a number from 0 to 1, got '2'"),
         ("7					#", "-7 #", 25, "the seed, a whole number from 0 to 2147483647, got '-7'"),
         ("two.mco	B", "./one.mco	B", 27, "an output file that no other run has"),

@@ -1,4 +1,4 @@
-"""Results on disk: every estimate comes back as it was."""
+"""Results: estimates from counts of photons, and on disk, where every one comes back as it was."""
 
 import json
 
@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium, simulate_orders
-from mcml_sim.results.tally import Tally, read_results, write_results
+from mcml_sim.results.estimate import Estimate, covariance_factor, estimate
+from mcml_sim.results.tally import read_results, write_results
 from mcml_sim.runs.simulation import simulate
-from mcml_sim.tracing.deposits import Deposits, shapes
+from mcml_sim.tracing.order_bins import Counts
+from tests.unit.results.test_mco import made_up
 
 LAYERS = Medium((Layer(1.3, 1, 9, 0.7, 0.1), Layer(1.4, 2, 8, 0.5)), n_above=1.1, n_below=1.2)
-
-
-def made_up(medium: Medium, grid: Grid) -> Tally:
-    draw = np.random.default_rng(5)
-    sums = {name: 1 + draw.random(shape) for name, shape in shapes(grid, len(medium.layers)).items()}
-    return Tally(medium, grid, 1000, 3, Deposits(**{**sums, "started": 1000}))
 
 
 @pytest.mark.parametrize(
@@ -30,11 +26,11 @@ def test_everything_comes_back(tmp_path, grid):
     assert (found.medium, found.grid, found.photons, found.seed) == (LAYERS, grid, 1000, 3)
     assert found.cut == tally.cut > 0
     assert tuple(found.estimates) == tally.quantities
-    for name, estimate in found.estimates.items():
+    for name, kept in found.estimates.items():
         expected = tally.quantity(name)
-        assert type(estimate.value) is type(expected.value)
+        assert type(kept.value) is type(expected.value)
         for field in ("value", "standard_error", "effective_samples"):
-            np.testing.assert_array_equal(getattr(estimate, field), getattr(expected, field))
+            np.testing.assert_array_equal(getattr(kept, field), getattr(expected, field))
 
 
 def test_numpy_alone_opens_it(tmp_path):
@@ -59,54 +55,25 @@ def test_equal_runs_give_equal_bytes(tmp_path):
     assert a != c
 
 
-def damage(path, how):
-    data = path.read_bytes()
-    with np.load(path) as fields:
-        arrays = dict(fields)
-    if how == "cut":
-        path.write_bytes(data[: len(data) // 2])
-    elif how == "text":
-        path.write_bytes(b"not a zip file")
-    elif how == "empty":
-        path.write_bytes(b"")
-    elif how == "missing":
-        path.unlink()
-    elif how == "format":
-        header = {**json.loads(str(arrays["header"])), "format": 2}
-        np.savez(path, **{**arrays, "header": np.array(json.dumps(header))})
-    elif how == "layer":
-        header = json.loads(str(arrays["header"]))
-        header["medium"]["layers"][0]["mu_a"] = -1
-        np.savez(path, **{**arrays, "header": np.array(json.dumps(header))})
-    else:
-        del arrays[how]
-        np.savez(path, **arrays)
-
-
-@pytest.mark.parametrize(
-    ("how", "reason"),
-    [
-        ("cut", "not a whole .npz file"),
-        ("text", "not a whole .npz file"),
-        ("empty", "not a whole .npz file"),
-        ("missing", "No such file or directory"),
-        ("format", "format 2, not 1"),
-        ("layer", "mu_a must be a coefficient >= 0, got -1"),
-        ("header", "header"),
-        ("absorbed_rz", "absorbed_rz"),
-        ("r_edges", "r_edges"),
-    ],
-)
-def test_a_damaged_file_is_named(tmp_path, how, reason):
+def test_a_damaged_file_is_named(tmp_path):
     path = tmp_path / "out.npz"
     write_results(made_up(LAYERS, Grid(0.1, 4, 0.2, 5)), path)
-    damage(path, how)
-    with pytest.raises(InputError, match=rf"out.npz: expected results of mcml_sim, got: .*{reason}"):
+    whole = path.read_bytes()
+    for content in (whole[: len(whole) // 2], b"not a zip file", b""):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"out.npz: expected results of mcml_sim, got: not a whole .npz file"):
+            read_results(path)
+    path.unlink()
+    with pytest.raises(InputError, match=r"out.npz: expected results of mcml_sim, got: No such file or directory"):
         read_results(path)
 
 
 def layer(**changes):
     return {"n": 1.3, "mu_a": 1, "mu_s": 9, "g": 0.7, "thickness": 0.1} | changes
+
+
+def medium(*layers, **changes):
+    return {"medium": {"layers": list(layers), "n_above": 1, "n_below": 1} | changes}
 
 
 HEADERS = {
@@ -119,28 +86,22 @@ HEADERS = {
     "cut": ({"cut": "0"}, "cut must be a share of the light, got '0'"),
     "cut nan": ({"cut": float("nan")}, "NaN, which is no number"),
     "version": ({"mcml_sim": "1\x1b[2J"}, r"mcml_sim must be a version, got '1\\x1b\[2J'"),
+    "format": ({"format": 2}, "format 2, not 1"),
     "format true": ({"format": True}, "format True, not 1"),
     "unknown": ({"colour": 1}, "header has the unknown key 'colour'"),
     "medium": ({"medium": [1]}, r"medium must be an object, got \[1\]"),
-    "n_above": ({"medium": {"layers": [layer()], "n_above": "1", "n_below": 1}}, "n_above must be .*, got '1'"),
+    "n_above": (medium(layer(), n_above="1"), "n_above must be .*, got '1'"),
     "n_below": ({"medium": {"layers": [layer()], "n_above": 1}}, "medium has no key 'n_below'"),
-    "layers": ({"medium": {"layers": {}, "n_above": 1, "n_below": 1}}, "layers must be a list of at most 1000, got {}"),
-    "layer": ({"medium": {"layers": [3], "n_above": 1, "n_below": 1}}, "layer 1 must be an object, got 3"),
-    "no layer": ({"medium": {"layers": [], "n_above": 1, "n_below": 1}}, "a medium must have 1 to 1000 layers, got 0"),
-    "depth": (
-        {"medium": {"layers": [layer(depth=1)], "n_above": 1, "n_below": 1}},
-        "layer 1 has the unknown key 'depth'",
-    ),
-    "mu_a": (
-        {"medium": {"layers": [layer(mu_a=True)], "n_above": 1, "n_below": 1}},
-        "mu_a must be a coefficient >= 0, got True",
-    ),
-    "other layers": (
-        {"medium": {"layers": [layer()], "n_above": 1, "n_below": 1}},
-        r"'absorbed_per_layer' must have the shape \(1,\), got \(2,\)",
-    ),
+    "layers": (medium(layers={}), "layers must be a list of at most 1000, got {}"),
+    "layer": (medium(3), "layer 1 must be an object, got 3"),
+    "no layer": (medium(), "a medium must have 1 to 1000 layers, got 0"),
+    "depth": (medium(layer(depth=1)), "layer 1 has the unknown key 'depth'"),
+    "mu_a": (medium(layer(mu_a=-1)), "mu_a must be a coefficient >= 0, got -1"),
+    "mu_a true": (medium(layer(mu_a=True)), "mu_a must be a coefficient >= 0, got True"),
+    "other layers": (medium(layer()), r"'absorbed_per_layer' must have the shape \(1,\), got \(2,\)"),
 }
 FIELDS = {
+    **{f"no {name}": ({name: None}, f"no {name}") for name in ("header", "absorbed_rz", "r_edges")},
     "deep header": ({"header": np.array("[" * 100_000)}, "tables or lists nested more than 32 deep"),
     "twice": ({"header": np.array('{"format": 1, "format": 1}')}, "the key 'format' twice in one object"),
     "header": ({"header": np.array(3)}, "'header' must be one text"),
@@ -168,7 +129,7 @@ def test_what_no_run_wrote_is_one_line(tmp_path, changes, reason):
         arrays = dict(whole)
     if not set(changes) <= set(arrays):
         changes = {"header": np.array(json.dumps(json.loads(str(arrays["header"])) | changes))}
-    np.savez(path, **{**arrays, **changes})
+    np.savez(path, **{name: values for name, values in {**arrays, **changes}.items() if values is not None})
     with pytest.raises(InputError, match=rf"^\S*out.npz: expected results of mcml_sim, got: {reason}") as error:
         read_results(path)
     assert "\n" not in str(error.value)
@@ -196,3 +157,76 @@ def test_misuse_is_named(tmp_path):
     for wrong in (None, 3, tally):
         with pytest.raises(InputError, match=r"^path must be the name of a file, got [^\n]{1,40}$"):
             write_results(tally, wrong)
+
+
+# Counts, and estimates from them
+
+
+def photon_by_photon(counts, weights, photons):
+    """Weights of every photon of one row: the tally undone."""
+    return np.concatenate([np.repeat(weights, counts), np.zeros(photons - counts.sum())])
+
+
+def test_estimate_is_mean_and_error_of_the_photons_one_by_one():
+    counts, weights, photons = np.array([[5, 0, 30], [1, 2, 3]]), np.array([0.9, 0.5, 0.25]), 100
+    found = estimate(counts, weights, photons)
+    for row in range(2):
+        each = photon_by_photon(counts[row], weights, photons)
+        assert found.value[row] == pytest.approx(each.mean())
+        assert found.standard_error[row] == pytest.approx(each.std(ddof=1) / np.sqrt(photons))
+        assert found.effective_samples[row] == pytest.approx(each.sum() ** 2 / np.sum(each**2))
+
+
+def test_empty_bins_have_no_samples_and_equal_weights_count_as_themselves():
+    found = estimate(np.zeros((1, 3), np.int64), np.ones(3), 10)
+    assert (found.value[0], found.standard_error[0], found.effective_samples[0]) == (0, 0, 0)
+    assert not found.is_sampled()[0]
+    found = estimate(np.array([[99], [101]]), np.array([0.1]), 1000)
+    np.testing.assert_allclose(found.effective_samples, [99, 101])
+    np.testing.assert_array_equal(found.is_sampled(), [False, True])
+    np.testing.assert_array_equal(found.is_sampled(at_least=50), [True, True])
+    # Only scalar estimates are floats.
+    assert float(Estimate(0.25, 0.1, 7.0)) == 0.25
+    with pytest.raises(TypeError, match=r"this one has shape \(2,\)"):
+        float(Estimate(np.zeros(2), np.zeros(2), np.zeros(2)))
+
+
+def test_counts_beyond_float32_stay_exact_and_a_lost_photon_is_found():
+    one = Counts(np.full((1, 1), 2**60 + 1), 0, 0, 2**60 + 1)
+    assert (one + one).exits[0, 0] == 2**61 + 2
+    good = Counts(np.array([[2, 3]]), 4, 1, 10)
+    good.require_closed()
+    assert not Counts(good.exits, 4, 1, 11).is_closed
+    with pytest.raises(RuntimeError, match="lost"):
+        Counts(good.exits, 4, 1, 11).require_closed()
+
+
+def test_full_rank_factor_is_the_covariance_of_the_photons_one_by_one():
+    counts = np.array([[5, 0, 30], [1, 2, 3], [0, 0, 0]])
+    weights, photons = np.array([[0.9, 0.5, 0.25], [0.3, 0.2, 0.1], [1.0, 1.0, 1.0]]), 100
+    factors, dropped = covariance_factor(counts, weights, photons, rank=3)
+    assert dropped == 0
+    for row in range(3):
+        each = np.array([photon_by_photon(counts[row], w, photons) for w in weights])
+        np.testing.assert_allclose(factors[row] @ factors[row].T, np.cov(each) / photons, atol=1e-15)
+
+
+def test_truncation_says_what_it_drops():
+    counts, weights = np.array([[5, 7, 30]]), np.array([[0.9, 0.5, 0.25], [0.3, 0.2, 0.1], [1.0, 0.1, 0.0]])
+    full, _ = covariance_factor(counts, weights, 100, rank=3)
+    short, dropped = covariance_factor(counts, weights, 100, rank=1)
+    assert short.shape == (1, 3, 1)
+    assert dropped == pytest.approx(np.max(1 - np.sum(short**2, axis=2) / np.sum(full**2, axis=2)))
+    assert dropped > 0
+
+
+def test_a_weak_weighting_keeps_its_variance_beside_a_strong_one():
+    """Small albedos far out carry a millionth of the energy, and their errors are asked for all the same."""
+    rng = np.random.default_rng(2)
+    counts = rng.integers(0, 50, (6, 40))
+    weights = np.array([[0.05], [0.3], [0.9], [0.99]]) ** np.arange(1, 41)
+    full, _ = covariance_factor(counts, weights, 10_000, rank=4)
+    short, dropped = covariance_factor(counts, weights, 10_000, rank=3)
+    lost = 1 - np.sum(short**2, axis=2) / np.sum(full**2, axis=2)
+    assert np.max(lost) == pytest.approx(dropped)
+    assert dropped < 0.05

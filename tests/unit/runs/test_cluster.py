@@ -50,12 +50,9 @@ def pids(workers):
 
 
 @pytest.mark.slow
-def test_two_processes_give_the_bits_of_one(workers, alone):
+def test_two_processes_give_the_bits_of_one(workers, alone, monkeypatch):
+    """Also of a batch that ends as the wait for it does."""
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
-
-
-@pytest.mark.slow
-def test_a_batch_that_ends_as_the_wait_for_it_does_is_taken(workers, alone, monkeypatch):
     real, waited = distributed.Future.result, set()
 
     def late(task, timeout=None):
@@ -98,20 +95,27 @@ def test_a_worker_that_would_give_other_bits_is_refused_by_name(workers, monkeyp
         run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
-def test_an_error_on_a_worker_rises_here(workers):
-    with pytest.raises(TypeError, match="trace_batch"):
-        run_batches(partial(orders_batch.trace_batch, nonsense=1), BATCH, BATCH, scheduler=workers.scheduler_address)
+LACKING = r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"
+
+
+@pytest.mark.parametrize(
+    ("trace", "error", "message"),
+    [
+        (partial(orders_batch.trace_batch, nonsense=1), TypeError, "trace_batch"),
+        (lambda *_: __import__("mcml_sim_"), ClusterError, LACKING),
+        (lambda *_: (_ for _ in ()).throw(TimeoutError("mine")), TimeoutError, "mine"),
+    ],
+    ids=["any error", "without the package", "a time-out, which is no silence"],
+)
+def test_an_error_on_a_worker_rises_here(workers, trace, error, message):
+    with pytest.raises(error, match=message):
+        run_batches(trace, BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
 def test_a_batch_that_kills_its_workers_is_given_up_by_name(workers, monkeypatch):
     monkeypatch.setattr(workers.scheduler, "allowed_failures", 0)
     with pytest.raises(ClusterError, match=r"^batch 0 was on 1 workers of tcp://.* when they died, .*; look at their"):
         run_batches(lambda batch, photons: os._exit(1), BATCH, BATCH, scheduler=workers.scheduler_address)
-
-
-def test_a_worker_without_the_package_is_told_from_other_errors(workers):
-    with pytest.raises(ClusterError, match=r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"):
-        run_batches(lambda *_: __import__("mcml_sim_"), BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
 def test_a_scheduler_without_the_package_is_refused(workers, monkeypatch):
@@ -143,13 +147,6 @@ def test_a_cluster_without_workers_is_said_once(lonely, alone, monkeypatch):
     assert len(said) == 1
 
 
-def test_a_batch_that_times_out_is_no_silence(workers):
-    with pytest.raises(TimeoutError, match="mine"):
-        run_batches(
-            lambda *_: (_ for _ in ()).throw(TimeoutError("mine")), BATCH, BATCH, scheduler=workers.scheduler_address
-        )
-
-
 @pytest.mark.usefixtures("python_handles_sigint")
 def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
     threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
@@ -159,9 +156,8 @@ def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
 
 def test_a_scheduler_that_leaves_is_one_line(lonely):
     threading.Timer(0.5, lonely.close).start()
-    with pytest.raises(
-        ClusterError, match=r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
-    ):
+    gone = r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
+    with pytest.raises(ClusterError, match=gone):
         run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
 
 
@@ -210,12 +206,9 @@ def test_no_address_is_refused(address):
         run_batches(TRACE, BATCH, BATCH, scheduler=address)
 
 
-def test_the_optional_package_is_named(monkeypatch):
+def test_the_optional_package_is_named_and_workers_here_and_there_are_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"the package distributed is missing; pip install distributed$"):
         run_batches(TRACE, BATCH, BATCH, scheduler="tcp://127.0.0.1:8786")
-
-
-def test_workers_here_and_there_are_refused():
     with pytest.raises(InputError, match="workers must be None where a scheduler is given"):
         run_batches(TRACE, BATCH, BATCH, workers=2, scheduler="tcp://127.0.0.1:8786")

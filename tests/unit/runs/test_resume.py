@@ -51,9 +51,8 @@ def start(tmp_path):
     with contextlib.ExitStack() as children:
 
         def start(*store):
-            child = subprocess.Popen(
-                [sys.executable, "-c", CHILD, *store], env=os.environ | cache, stdout=subprocess.PIPE, text=True
-            )
+            words = [sys.executable, "-c", CHILD, *store]
+            child = subprocess.Popen(words, env=os.environ | cache, stdout=subprocess.PIPE, text=True)
             children.enter_context(child)
             children.callback(child.kill)
             return child
@@ -163,14 +162,12 @@ def test_a_full_disk_is_named_and_the_run_goes_on_when_there_is_room(tmp_path, h
         if not may_mount():
             pytest.skip("this machine lets no user mount a file system; 'small files' meets the same error")
         inside = ["unshare", "-Urm"]
-    child = subprocess.run(
-        [*inside, sys.executable, "-c", FULL, str(tmp_path), how], capture_output=True, text=True, timeout=60
-    )
+    words = [*inside, sys.executable, "-c", FULL, str(tmp_path), how]
+    child = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert child.returncode == 0, child.stderr
     error, before, after = child.stdout.splitlines()
-    assert re.fullmatch(
-        rf"cannot write {tmp_path}/batch-0+[0-9]+.npz: {reason}; what the store holds is whole, .*", error
-    )
+    named = rf"cannot write {tmp_path}/batch-0+[0-9]+.npz: {reason}; what the store holds is whole, .*"
+    assert re.fullmatch(named, error)
     failed = int(before.split("]")[0].split(",")[-1])
     assert 3 < failed < 19
     assert before == f"{list(range(failed + 1))} {failed + 1}", "the manifest and the batches before, nothing half-done"

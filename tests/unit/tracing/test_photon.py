@@ -16,6 +16,7 @@ GO = jnp.bool_(True)
 NUMBER = 2**14
 # Layers 1 and 2 are matched; 3 is denser; above and below is air.
 STACK = layered_event.stack(Medium((Layer(1.4, 1, 9, 0.8, 5), Layer(1.4, 0, 2, -0.5, 1), Layer(1.6, 1, 1, 0, 2))), 1.0)
+ENDLESS = STACK._replace(thickness=np.full(3, np.inf, np.float32))  # from deep inside its layers nobody waits
 
 
 def lanes(direction=(0.0, 0.0, 1.0), z=0.5, layer=1, weight=1.0, event=0):
@@ -65,10 +66,8 @@ def test_azimuth_is_cosine_and_sine_to_5e_7():
 @some_directions
 @pytest.mark.parametrize(("layer", "g"), [(1, 0.8), (2, -0.5), (3, 0.0)])
 def test_scattering_turns_by_g_and_evenly_around(direction, layer, g):
-    # From deep inside an endless layer nobody waits.
-    endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e6, layer=layer)
-    after, _ = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(endless, pool.layer))
+    after, _ = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(ENDLESS, pool.layer))
     turned = direction_of(after)
     np.testing.assert_allclose(np.linalg.norm(turned, axis=0), 1, atol=2e-6)
     along = turned.T @ np.asarray(direction, float)
@@ -83,9 +82,8 @@ def test_scattering_turns_by_g_and_evenly_around(direction, layer, g):
 
 def test_free_paths_are_exponential_and_end_where_the_photon_is():
     direction = unit(1, 2, -2)
-    endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e3, layer=2)
-    after, left = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(endless, pool.layer))
+    after, left = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(ENDLESS, pool.layer))
     assert not np.any(left)
     paths = np.abs(np.asarray(after.place, complex)) / np.hypot(*direction[:2])
     assert kstest(paths, "expon", (0, 0.5)).pvalue > 1e-3
@@ -104,9 +102,7 @@ def test_each_interaction_takes_its_share_and_waiting_takes_none():
     assert abs(flew.mean() - (1 - np.exp(-1))) < 4 * 0.5 / np.sqrt(NUMBER)
     np.testing.assert_array_equal(np.asarray(after.weight)[~flew], -1)
     np.testing.assert_array_equal(np.asarray(after.down)[~flew], np.complex64(0.1 - 1j))
-
-
-def test_those_who_wait_or_have_ended_stay_as_they_are():
+    # Those who wait or have ended stay as they are.
     before = lanes(unit(1, 0, 1), weight=-0.3)
     after, left = scatter(before)
     assert not np.any(left)
@@ -139,10 +135,9 @@ def test_an_interface_reflects_by_fresnel_and_bends_by_snell():
 
 def test_total_reflection_lets_nobody_out_and_the_normal_lets_most():
     assert np.all(settle(lanes(unit(2, 0, -1), layer=1, weight=-1)).layer == 1)
-    out = np.mean(np.asarray(settle(lanes((0, 0, -1), layer=1, weight=-1)).layer) == REFLECTED)
-    assert abs(1 - out - (0.4 / 2.4) ** 2) < 4 * np.sqrt(0.03 / NUMBER)
-    out = np.mean(np.asarray(settle(lanes((0, 0, 1), layer=3, weight=-1)).layer) == 4)
-    assert abs(1 - out - (0.6 / 2.6) ** 2) < 4 * np.sqrt(0.06 / NUMBER)
+    for uz, layer, beyond, share, most in ((-1, 1, REFLECTED, 0.4 / 2.4, 0.03), (1, 3, 4, 0.6 / 2.6, 0.06)):
+        out = np.mean(np.asarray(settle(lanes((0, 0, uz), layer=layer, weight=-1)).layer) == beyond)
+        assert abs(1 - out - share**2) < 4 * np.sqrt(most / NUMBER)
 
 
 def test_what_has_left_is_marked_and_stays_as_it_is():
@@ -155,60 +150,47 @@ def test_what_has_left_is_marked_and_stays_as_it_is():
         np.testing.assert_array_equal(np.asarray(old)[out], np.asarray(new)[out])
 
 
-def roulette(weight, event=0):
-    return settle(lanes(weight=weight, event=event))
-
-
-def test_weights_above_the_threshold_are_left_alone():
-    after = roulette(1.01 * THRESHOLD)
-    assert not np.any(after.ended)
-    np.testing.assert_array_equal(after.weight, np.float32(1.01 * THRESHOLD))
-
-
 @pytest.mark.parametrize(
     ("weight", "event", "chance"), [(0.1, 0, 0.5), (1.0, FIRST_TOSS - 2, 0.5), (0.1, 4 * FIRST_TOSS - 1, 0.25)]
 )
 def test_roulette_keeps_the_weight_of_all(weight, event, chance):
-    after = roulette(weight, event)
+    after = settle(lanes(weight=weight, event=event))
     goes_on = ~np.asarray(after.ended)
     assert abs(goes_on.mean() - chance) < 4 * np.sqrt(chance * (1 - chance) / NUMBER)
     np.testing.assert_allclose(np.asarray(after.weight)[goes_on], weight / chance, rtol=1e-6)
     assert np.all(np.asarray(after.layer)[~goes_on] == ROULETTED)
 
 
-def test_long_paths_toss_once_an_octave_and_not_where_they_are_cut():
+def test_nothing_ends_for_good_but_by_weight_zero_and_the_cap():
+    # Long paths toss once an octave, and not where they are cut.
     events = np.arange(0, MAX_EVENTS + EVENTS_PER_TURN, EVENTS_PER_TURN, dtype=np.uint32) + EVENTS_PER_TURN - 1
     late = np.asarray(layered_event.is_late(jnp.asarray(events)))
     assert np.sum(late) == np.log2(MAX_EVENTS // FIRST_TOSS)
-
-
-def test_nothing_ends_for_good_but_by_weight_zero_and_the_cap():
-    assert np.all(roulette(0.0).layer == ROULETTED)
+    above = settle(lanes(weight=1.01 * THRESHOLD))  # which is left alone
+    assert not np.any(above.ended)
+    np.testing.assert_array_equal(above.weight, np.float32(1.01 * THRESHOLD))
+    assert np.all(settle(lanes(weight=0.0)).layer == ROULETTED)
     for turn in range(EVENTS_PER_TURN):  # wherever in a turn the last event falls
-        stopped = roulette(1.0, MAX_EVENTS - turn + EVENTS_PER_TURN)
+        stopped = settle(lanes(weight=1.0, event=MAX_EVENTS - turn + EVENTS_PER_TURN))
         assert np.all(stopped.layer == CUT)
         np.testing.assert_array_equal(stopped.weight, -1)
 
 
 def test_many_layers_are_gathered_as_few_are_selected():
     layer = jnp.asarray(np.r_[1:9, 3], jnp.int32)
-    few = jnp.arange(8.0)
-    many = jnp.arange(20.0)
-    np.testing.assert_array_equal(layered_event.pick(few, layer), layer - 1)
-    np.testing.assert_array_equal(layered_event.pick(many, layer), layer - 1)
+    for values in (jnp.arange(8.0), jnp.arange(20.0)):
+        np.testing.assert_array_equal(layered_event.pick(values, layer), layer - 1)
 
 
 @pytest.mark.slow
 def test_directions_keep_their_length_over_a_thousand_turns():
-    endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
-
     @partial(jax.jit, static_argnames="turns")
     def walk(pool, turns):
         def turn(_, pool):
-            here = layered_event.optics(endless, pool.layer)
+            here = layered_event.optics(ENDLESS, pool.layer)
             for number in range(EVENTS_PER_TURN - 1):
                 pool, _ = layered_event.scatter(GO, KEY, pool, pool.event + number, here)
-            pool = layered_event.settle(GO, KEY, endless, pool, pool.event + EVENTS_PER_TURN - 1)
+            pool = layered_event.settle(GO, KEY, ENDLESS, pool, pool.event + EVENTS_PER_TURN - 1)
             return pool._replace(event=pool.event + EVENTS_PER_TURN, weight=jnp.ones_like(pool.weight))
 
         return jax.lax.fori_loop(0, turns, turn, pool)

@@ -54,16 +54,13 @@ def test_every_photon_lives_once_to_its_end_and_no_other_is_started(photons, lan
     assert np.all(seen[photons:] == 0)
 
 
-def test_no_photons_are_no_work():
-    assert np.all(followed(0, 64) == 0)
-
-
-def test_an_end_is_seen_once():
+def test_an_end_is_seen_once_and_no_photons_are_no_work():
     def counting(flying, seen):
         after, _ = turn(flying, seen)
         return after, seen.at[flying.photon].add(jnp.where(after.ended, 1, 0), mode="drop")
 
     assert np.all(followed(5000, 512, counting)[:5000] == 1)
+    assert np.all(followed(0, 64) == 0)
 
 
 def test_rank_is_the_cumulative_sum():

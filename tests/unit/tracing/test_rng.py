@@ -77,9 +77,7 @@ def test_words_do_not_correlate_with_any_neighbour(draw, sidak):
         assert np.abs(z).max() < sidak(16 * len(neighbours)), name
     z = [correlation(here[..., i], here[..., j]) for i in drawn for j in range(i)]
     assert np.abs(z).max() < sidak(6)
-
-
-def test_correlation_test_sees_a_weak_generator(sidak):
+    # A weak generator is seen.
     photon, event = np.indices((PHOTONS, EVENTS), dtype=np.uint32)
     weak = (photon * np.uint32(rng.MULTIPLIER) + event) * np.uint32(rng.MULTIPLIER) + np.uint32(rng.INCREMENT)
     assert abs(correlation(weak[:, :-1], weak[:, 1:])) > sidak(96)
