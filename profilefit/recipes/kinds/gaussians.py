@@ -23,7 +23,7 @@ from profilefit.recipes.folder import SUMS
 from profilefit.recipes.kinds import stack as stack_kind
 from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields
+from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
@@ -54,19 +54,11 @@ USED: Fields = {
     "data_digest": DIGEST,
 }
 OF_LIGHT: Fields = {
-    **dict.fromkeys(("reflectance", "share"), NUMBERS),
+    "reflectance share": NUMBERS,
     "by_count": LIST,
-    "by_count.*": TABLE,
-    "by_count.*.result": TEXT,
-    "by_count.*.steps": COUNT,
-    "by_count.*.condition_number": MEASURE,
-    **{f"by_count.*.{name}": NUMBERS for name in MEASURED},
+    **under("by_count.*", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE, " ".join(MEASURED): NUMBERS}),
 }
-SHOWN: Fields = {
-    **USED,
-    **{f"sums.{light}": TABLE for light in ILLUMINATIONS},
-    **{f"sums.{light}.{key}": kind for light in ILLUMINATIONS for key, kind in OF_LIGHT.items()},
-}
+SHOWN: Fields = USED | {key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()}
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 

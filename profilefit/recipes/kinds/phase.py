@@ -19,7 +19,7 @@ from profilefit.recipes import record, schema
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
 from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
 from profilefit.recipes.run import LAWS, RecipeRun, Work
-from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS, Fields
+from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TEXT, TEXTS, Fields, under
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -35,25 +35,19 @@ NEAR_ONE = 0.1
 SMALLEST = 1e-4  # share that is printed
 USUAL = RecipeRun("quick", SEED, Path(), None, None)  # of a table that is fitted without a record
 OF_FIT: Fields = {
-    "": TABLE,
-    ".held": TEXTS,
-    ".result": TEXT,
-    ".steps": COUNT,
-    ".condition_number": MEASURE,
-    **dict.fromkeys((".rms", ".mean_cosine", ".backscattered", ".second"), NUMBER),
-    ".bands": MEASURES,
+    **{"held": TEXTS, "result": TEXT, "steps": COUNT, "condition_number": MEASURE},
+    **{"rms mean_cosine backscattered second": NUMBER, "bands": MEASURES},
 }
+OF_DATA: Fields = {
+    **{"source": TEXT, "rows": COUNT, "integral mean_cosine backscattered second": NUMBER, "angles": MEASURES},
+    **{"unit?": TEXT, "spans?": LIST},  # of no older records
+}
+OF_FORM: Fields = {key: one for how in (FREE, HELD) for key, one in under(how, OF_FIT).items()}
 SHOWN: Fields = {
     **dict.fromkeys(("title", "equations", "note", "data_digest"), TEXT),
-    **{"data": TABLE, "data.source": TEXT, "data.rows": COUNT, "phases": TABLE},
-    **dict.fromkeys(("data.integral", "data.mean_cosine", "data.backscattered", "data.second"), NUMBER),
-    "data.angles": MEASURES,
-    # Of no older records.
-    **{"data.unit?": TEXT, "data.spans?": LIST, "data.spans?.*": TABLE},
-    **dict.fromkeys((f"data.spans?.*.{name}" for name in ("low", "high", "share", "other")), NUMBER),
-    **dict.fromkeys(("data.spans?.*.rule", "data.spans?.*.other_rule"), TEXT),
-    **{f"phases.{form}": TABLE for form in FORMS},
-    **{f"phases.{form}.{how}{key}": kind for form in FORMS for how in (FREE, HELD) for key, kind in OF_FIT.items()},
+    **under("data", OF_DATA),
+    **under("data.spans?.*", {"low high share other": NUMBER, "rule other_rule": TEXT}),
+    **under("phases", {key: one for form in FORMS for key, one in under(form, OF_FORM).items()}),
 }
 
 

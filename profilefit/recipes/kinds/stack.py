@@ -29,7 +29,19 @@ from profilefit.recipes import record, schema
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Table, Text, words
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
+from profilefit.recipes.schema import (
+    COUNT,
+    DIGEST,
+    LIST,
+    MEASURE,
+    NUMBER,
+    NUMBERS,
+    TABLE,
+    TEXT,
+    Fields,
+    mistyped,
+    under,
+)
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
 from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
@@ -61,27 +73,20 @@ USED: Fields = {
 # Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
 BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")
 OF_INTERFACES: Fields = {
-    **dict.fromkeys(("quality", "fit", "starts"), LIST),
-    **dict.fromkeys(("quality.*", "fit.*", "starts.*"), TABLE),
-    **{f"quality.*.{name}": NUMBERS for name in BY_THICKNESS},
-    "fit.*.result": TEXT,
-    "fit.*.condition_number": MEASURE,
-    **dict.fromkeys(("fit.*.steps", "starts.*.as_good", "starts.*.count"), COUNT),
+    "quality fit starts": LIST,
+    **under("quality.*", {" ".join(BY_THICKNESS): NUMBERS}),
+    **under("fit.*", {"result": TEXT, "condition_number": MEASURE, "steps": COUNT}),
+    **under("starts.*", {"as_good count": COUNT}),
 }
 # What `profilefit report` shows of a stack.
 SHOWN: Fields = {
     **schema.TOLD,
     "unit": TEXT,
     "layers": LIST,
-    "layers.*": TABLE,
-    "layers.*.name": TEXT,
-    "layers.*.thickness": MEASURE,
-    **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
-    **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
-    **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
+    **under("layers.*", {"name": TEXT, "thickness": MEASURE, "n g": NUMBER, "mu_a mu_s": NUMBERS}),
+    **dict.fromkeys(("quality", "quality.regenerated"), TABLE),
     **QUALITY,
-    **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
-    **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
+    **under("interfaces", {key: one for name in CHANNELS for key, one in under(name, OF_INTERFACES).items()}),
 }
 EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
