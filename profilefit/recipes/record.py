@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -99,14 +99,28 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read_of(path: Path, pipeline: str, words: str, shown: schema.Fields) -> dict[str, Any]:
-    """Read a record of one pipeline, `words` what it is of, which holds what is `shown`; RecordError on any other."""
+def read_of(
+    path: Path,
+    pipeline: str,
+    words: str,
+    shown: schema.Fields | None = None,
+    problem: Callable[[dict[str, Any]], str | None] = lambda content: None,
+) -> dict[str, Any]:
+    """Read a record of one pipeline, `words` what it is, which holds what is `shown`; RecordError on any other.
+
+    problem  what else is wrong with its content, in one line, or None
+    """
     content = read(path)
     if content["pipeline"] != pipeline:
-        raise RecordError(f"{path}: must be a record of {words}, got pipeline {content['pipeline']!r}")
-    if text := schema.mistyped(content, shown):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+        raise RecordError(f"{path}: must be {words}, got pipeline {content['pipeline']!r}")
+    if text := schema.mistyped(content, shown or {}) or problem(content):
+        raise damaged(path, text)
     return content
+
+
+def damaged(path: Path, text: str) -> RecordError:
+    """Return the error of a record that is damaged, `text` what is wrong inside."""
+    return RecordError(f"{path}: is damaged: {text}; regenerate it")
 
 
 def named(name: str, folder: Path, pipeline: str) -> Path | None:
@@ -120,7 +134,7 @@ def named(name: str, folder: Path, pipeline: str) -> Path | None:
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
     """Raise RecordError where a record lacks what `read` promises, or holds what is of another type."""
     if text := schema.problem(content, whole) or _outside(content):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+        raise damaged(path, text)
 
 
 def _outside(content: Mapping[str, Any]) -> str | None:

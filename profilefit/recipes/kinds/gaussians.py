@@ -20,8 +20,7 @@ from profilefit.laws.gaussians import DEFAULT, MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import SUMS
-from profilefit.recipes.kinds import stack as stack_kind
-from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack
+from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack, request
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
@@ -105,11 +104,6 @@ def find(name: str, folder: Path) -> SumRecord | None:
     return None if path is None else load(path)
 
 
-def request(name: str) -> StackRequest | None:
-    """Return the stack of a file of layers or of a shipped one by its name, None if it is of something else."""
-    return stack_kind.request(name)
-
-
 def fit(of: StackRequest, run: RecipeRun) -> Work:
     """Return the record to be made of a stack in both lights, in one part: a minute. InputError if no law fits."""
     for medium in of.media:
@@ -137,9 +131,7 @@ def beside(stack: Path) -> Path | None:
 
 def load(path: Path) -> SumRecord:
     """Return a record; RecordError in one line on one that is damaged."""
-    content = record.read_of(path, PIPELINE, "sums of Gaussians", SHOWN)
-    if text := _mismatched(content):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    content = record.read_of(path, PIPELINE, "a record of sums of Gaussians", SHOWN, _mismatched)
     record.record_setting(content)
     with damage(path):
         return SumRecord(recorded_stack(str(path), content, USED), content, path)

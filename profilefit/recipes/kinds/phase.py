@@ -13,7 +13,7 @@ import numpy as np
 from mcml_sim import Setting
 from mcml_sim.media.checks import shown
 from mcml_sim.media.phase import Phase
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
@@ -77,7 +77,7 @@ class PhaseRecord:
         try:
             return built(FORMS[form], np.array([own[name]["regenerated"] for name in FORMS[form].names]))
         except InputError as error:
-            raise RecordError(f"{self.path}: is damaged: {error}; regenerate it") from None
+            raise record.damaged(self.path, str(error)) from None
 
 
 def find(name: str, folder: Path) -> PhaseRecord | None:
@@ -124,11 +124,9 @@ def quality(fits: Sequence[PhaseFit]) -> dict[str, Any]:
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says; RecordError in one line on one that is damaged."""
-    content = record.read_of(path, PIPELINE, "phase functions", SHOWN)
     names = (f"{form}.{how}.{name}" for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
-    if text := schema.missing_constant(content, names):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return content
+    missing = partial(schema.missing_constant, names=names)
+    return record.read_of(path, PIPELINE, "a record of phase functions", SHOWN, missing)
 
 
 def load(path: Path) -> PhaseRecord:

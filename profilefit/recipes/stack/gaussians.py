@@ -276,7 +276,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
         found.append(solve(at, np.array(start), worth=SEARCH_WORTH))
-    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+    return fit.lowest(found)
 
 
 def shared_sum(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
