@@ -118,9 +118,8 @@ def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
     for one in sorted(found, key=lambda one: (not one.converged, _cost(one))):
         home = next((group for group in groups if _same(one, group[0])), None)
         if home is None:
-            groups.append([one])
-        else:
-            home.append(one)
+            groups.append(home := [])
+        home.append(one)
     return groups
 
 
@@ -170,8 +169,12 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
     """
     one, other = exact.solution.parameters, photons.solution.parameters
     covariance = np.asarray(photons.statistical)
-    if problem := _problem(exact, photons):
-        result, covariance = problem, np.full((one.size,) * 2, np.nan)
+    failed = [(name, each) for name, each in (("exact", exact), ("photon", photons)) if not each.solution.converged]
+    if failed or photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
+        result = "the photon fit has no finite errors: leave out radial bins that hold next to no light"
+        if failed:
+            result = f"the {failed[0][0]} fit failed: {failed[0][1].result}"
+        covariance = np.full((one.size,) * 2, np.nan)
         distance, rank, chance = np.nan, 0, np.nan
     else:
         distance, rank = mahalanobis(other - one, covariance)
@@ -185,15 +188,6 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
         **{"photons": traced, "chi2": distance, "rank": rank, "chance": chance, "result": result},
         **{"rings_left_out": rings_left_out, "albedos_left_out": albedos_left_out},
     }
-
-
-def _problem(exact: Fit, photons: Fit) -> str | None:
-    for name, one in (("exact", exact), ("photon", photons)):
-        if not one.solution.converged:
-            return f"the {name} fit failed: {one.result}"
-    if photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
-        return "the photon fit has no finite errors: leave out radial bins that hold next to no light"
-    return None
 
 
 def mahalanobis(difference: Floats, covariance: Floats) -> tuple[float, int]:
