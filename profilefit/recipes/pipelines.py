@@ -89,10 +89,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         **{key: getattr(recipe, key) for key in ("title", "law", "equations", "pipeline", "note", "setting")},
         **({"indices": recipe.span} if recipe.indices else {}),
         **({"cosines": (0.0, recipe.cosines[-1])} if recipe.cosines else {}),
-        "protocol": {
-            **recipe.model_dump(include={"albedos", "rings", "weighting", "mfp", "start", "held"}),
-            **spans,
-        },
+        "protocol": {**recipe.model_dump(include={"albedos", "rings", "weighting", "mfp", "start", "held"}), **spans},
         "truth": {"kind": recipe.truth},
         "preset": run.preset,
         "seed": run.seed,

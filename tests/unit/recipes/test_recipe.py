@@ -110,11 +110,7 @@ def test_lists_become_tuples(write):
             'lore = "liang"',
             "keys must be of title, law, equations, pipeline, truth, start, setting, indices,",
         ),
-        (
-            'spacing = "alpha"',
-            'spaces = "alpha"',
-            "[albedos] keys must be of low, high, count, spacing, got 'spaces'",
-        ),
+        ('spacing = "alpha"', 'spaces = "alpha"', "[albedos] keys must be of low, high, count, spacing, got 'spaces'"),
         ('title = "A fit"', "", "title must be a text of 1000 characters at most, got nothing"),
         ("low = 0.1", "", "[albedos] low must be a number > 0 and <= 1, got nothing"),
         ('objective = "energy"', "", "[weighting] objective must be a text of 1000 characters at most, got nothing"),
@@ -207,11 +203,7 @@ def test_types_must_be_right(refuse, old, new, words):
         ),
         ("energy_limit = 3.0", "energy_limit = nan", "energy_limit must be a number in 0 ... 1000000, got nan"),
         ("energy_limit = 3.0", "source_limit = inf", "source_limit must be a number in 0 ... 1000000, got inf"),
-        (
-            "energy_limit = 3.0",
-            "source_limit = 1e7",
-            "source_limit must be a number in 0 ... 1000000, got 10000000.0",
-        ),
+        ("energy_limit = 3.0", "source_limit = 1e7", "source_limit must be a number in 0 ... 1000000, got 10000000.0"),
         ("energy_limit = 3.0", f"energy_limit = {10**400}", "401 digits, of 300 at most, of 'energy_limit' (at line"),
         ("count = 9", f"count = {10**400}", "401 digits, of 300 at most, of 'count' (at line"),
         (

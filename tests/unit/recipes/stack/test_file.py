@@ -144,7 +144,7 @@ def test_shipped_stacks(path):
 
 def test_stacks_are_no_recipes():
     assert [path.stem for path in SHIPPED] == [
-        *("heart", "marble-on-potato", "skimmilk-on-marble", "skimmilk-on-potato", "skin"),
+        *("heart", "marble-on-potato", "skimmilk-on-marble", "skimmilk-on-potato", "skin")
     ]
     assert not set(available(fits_folder())) & {path.stem for path in SHIPPED}
 
