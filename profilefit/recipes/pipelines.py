@@ -72,9 +72,8 @@ def work(recipe: Recipe, run: RecipeRun, pipelines: Mapping[str, Pipeline]) -> W
     second = spans and recipe.setting.illumination == "diffuse"
     stage = {"albedo": MAPS, "evidence": COMPARISONS}.get(recipe.pipeline, LAWS)
     order = stage, 0 if spans else 2, second, not recipe.cosines, -recipe.random_starts
-    return Work(
-        recipe.name, (partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light),), finish, order=order
-    )
+    part = partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light)
+    return Work(recipe.name, (part,), finish, order=order)
 
 
 def _run(pipeline: Pipeline, recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple[RecordContent, list[str]]:

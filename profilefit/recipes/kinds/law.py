@@ -15,20 +15,7 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue, pipelines
 from profilefit.recipes.catalogue import find_law as find
-from profilefit.recipes.pipelines import (
-    QUALITY_ALBEDOS,
-    Pipeline,
-    by_index,
-    curves,
-    described_fit,
-    description,
-    errors_by_name,
-    fit_from,
-    inversion_error,
-    judged,
-    printed_laws,
-    read,
-)
+from profilefit.recipes.pipelines import QUALITY_ALBEDOS, Pipeline, curves, described_fit, judged, printed_laws, read
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.record import Records
 from profilefit.recipes.reproduction import printed_halves, readings, table1
@@ -45,7 +32,7 @@ def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
     for name, one in {**printed_laws(recipe, run), "regenerated": law}.items():
         measured = asdict(profile_quality(one, alpha))
         table[name] = {key: value for key, value in measured.items() if key != "alpha"}
-    return table | ({"by_index": by_index(law, judged(recipe))} if recipe.indices else {})
+    return table | ({"by_index": pipelines.by_index(law, judged(recipe))} if recipe.indices else {})
 
 
 def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
@@ -61,7 +48,7 @@ def _inverse(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordCont
     laws = {"regenerated": result.law}
     if printed := printed_laws(recipe, run).get("published"):  # corrections are of the profile, not of its inverse
         laws["published"] = printed
-    measured = {name: {"inversion_error": inversion_error(law, alpha)} for name, law in laws.items()}
+    measured = {name: {"inversion_error": pipelines.inversion_error(law, alpha)} for name, law in laws.items()}
     content["quality"] = {"alpha": alpha, **measured}
     return content, arrays | curves(profiles) | {"shares": np.asarray(result.rings.xi)}
 
@@ -81,13 +68,13 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
         for name, value in zip(law.names, law.solution.parameters, strict=True)
     }
     used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
-    result = fit_from(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
-    content, arrays = description(recipe, run, profiles, result)
+    result = pipelines.fit_from(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
+    content, arrays = pipelines.description(recipe, run, profiles, result)
     content["stages"] = {
         "coefficient_laws": {
             letter: {
                 "constants": dict(zip(law.names, law.solution.parameters, strict=True)),
-                "standard_error": errors_by_name(law.names, law.covariance),
+                "standard_error": pipelines.errors_by_name(law.names, law.covariance),
                 "result": law.solution.result,
                 "condition_number": law.solution.condition_number,
             }

@@ -163,6 +163,8 @@ def _half_space_of(setting: Setting, albedo: float, whole: float, parameters) ->
 
 
 RingData = tuple[Floats, ...] | TracedRings  # exact light at radii, or traced rings
+Lights = Sequence[RingData]  # of each thickness
+Below = LayerLaw | StackLaw  # what lies under an interface, or a whole stack
 
 
 class Interface(NamedTuple):
@@ -176,7 +178,7 @@ class Interface(NamedTuple):
     law: StackLaw
     medium: Medium
     thicknesses: Floats
-    lights: Sequence[RingData]
+    lights: Lights
     best: Solution
     solutions: tuple[Solution, ...]
 
@@ -186,7 +188,11 @@ class Interface(NamedTuple):
         return isinstance(self.lights[0], TracedRings)
 
 
-def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | LayerLaw:
+Interfaces = tuple[Interface, ...]
+Starts = Sequence[ArrayLike]
+
+
+def stack_law(medium: Medium, illumination: str = "searchlight") -> Below:
     """Fit the law of a stack of layers of one index to its light.
 
     medium        layers from the surface down, the last one infinite; one n in [1, 1.6] over that above, g in [0, 0.95]
@@ -201,8 +207,8 @@ def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | L
 
 
 def fitted(
-    medium: Medium, illumination: str, starts: Sequence[ArrayLike] = (), tracing: Tracing = USUAL
-) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    medium: Medium, illumination: str, starts: Starts = (), tracing: Tracing = USUAL
+) -> tuple[Below, Interfaces]:
     """Fit the law: it, and the fit at each interface from the surface down; none of a half space.
 
     starts  constants (9,) of each interface: the law is the optimum that a fit from there reaches, not the best one of
@@ -227,23 +233,19 @@ def isotropic_tops(medium: Medium, setting: Setting) -> list[LayerLaw]:
 
 
 def _fitted(
-    medium: Medium,
-    tops: list[LayerLaw],
-    tracing: Tracing,
-    initial_fits: tuple[Interface, ...] = (),
-    starts: Sequence[ArrayLike] = (),
-) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    medium: Medium, tops: list[LayerLaw], tracing: Tracing, initial_fits: Interfaces = (), starts: Starts = ()
+) -> tuple[Below, Interfaces]:
     """Fit interface after interface from the last layer up, over the half spaces of the layers.
 
     initial_fits  the interfaces of the similar stack, from whose constants those of traced light start
     """
-    law: StackLaw | LayerLaw = tops[-1]
+    law: Below = tops[-1]
     done: list[Interface] = []
     for place in reversed(range(len(tops) - 1)):
         layer, top, illumination = medium.layers[place], tops[place], tops[place].setting.illumination
         here = Medium(medium.layers[place:], medium.n_above)
         d = _thicknesses(layer.similar, is_below=place > 0)
-        lights: Sequence[RingData]
+        lights: Lights
         if initial_fits:
             lights = [rings_of(here, each, illumination, number, tracing) for number, each in enumerate(d)]
             best = _solved(initial_fits[place].best.parameters, top, law, d, lights)
@@ -273,7 +275,7 @@ def errors(interface: Interface) -> dict[str, dict[str, float | None]]:
     """
     top, below, thickness = interface.law.top, interface.law.below, interface.law.thickness
 
-    def refitted(lights: Sequence[RingData]) -> Floats:
+    def refitted(lights: Lights) -> Floats:
         best = _solved(interface.best.parameters, top, below, interface.thicknesses, lights)
         return _vector(_law_of(best.parameters, top, below, thickness))
 
@@ -391,12 +393,7 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 
 def _searched(
-    top: LayerLaw,
-    below: LayerLaw | StackLaw,
-    d: Floats,
-    lights: Sequence[RingData],
-    seed: int,
-    given: ArrayLike | None = None,
+    top: LayerLaw, below: Below, d: Floats, lights: Lights, seed: int, given: ArrayLike | None = None
 ) -> tuple[Solution, tuple[Solution, ...]]:
     """Return the best optimum of several starts, or that of constants which are given; and all."""
     random = np.random.default_rng(seed)
@@ -413,7 +410,7 @@ def _searched(
     return lowest(found), found
 
 
-def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
+def _as_slabs_add(top: LayerLaw, below: Below) -> Floats:
     """Return a start whose A(d) is that of added slabs of isotropic light.
 
     A(d) is A_1 + T^2 A_2 / (1 - A_1 A_2), with u = 0 and w = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over a dark layer the A
@@ -424,7 +421,7 @@ def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
 
-def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Sequence[RingData]) -> Solution:
+def _solved(start, top: LayerLaw, below: Below, d: Floats, lights: Lights) -> Solution:
     """Return the optimum from a start; fits to traced light stay near it where nothing speaks against that."""
     if isinstance(lights[0], TracedRings):
         rings = [light for light in lights if isinstance(light, TracedRings)]
@@ -434,7 +431,7 @@ def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights:
     return least_squares(_residual, start, (*exactly, d, top, below))
 
 
-def _law_of(parameters: Floats, top: LayerLaw, below: LayerLaw | StackLaw, thickness: float) -> StackLaw:
+def _law_of(parameters: Floats, top: LayerLaw, below: Below, thickness: float) -> StackLaw:
     with jax.enable_x64(True):
         return jax.tree.map(float, _made(jnp.asarray(parameters), top, below, thickness))
 
@@ -461,7 +458,7 @@ def _counts(weight):
     return jnp.any(weight > 0, axis=1).astype(float)
 
 
-def _fading(top: LayerLaw, below: LayerLaw | StackLaw) -> float:
+def _fading(top: LayerLaw, below: Below) -> float:
     return 2.0 * float(_made(jnp.array(START), top, below, 0.0).fading()) * top.mfp
 
 

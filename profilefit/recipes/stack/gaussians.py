@@ -396,12 +396,8 @@ def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], gain: Floats) -> Floats:
     """Covariance (p, p) of the parameters by the process that the residuals are a draw of; NaN where none fits."""
-    weight, noise, middle = (
-        np.concatenate(column)
-        for column in zip(
-            *((one.weight, one.noise, 0.5 * np.log(one.edges[1:] * one.edges[:-1])) for one in lights), strict=True
-        )
-    )
+    weight, noise = (np.concatenate([getattr(one, name) for one in lights]) for name in ("weight", "noise"))
+    middle = np.concatenate([0.5 * np.log(one.edges[1:] * one.edges[:-1]) for one in lights])
     counts = weight > 0
     of = np.repeat(np.arange(len(lights)), [len(light.energy) for light in lights])[counts]
     live = of == np.arange(len(lights))[:, None]  # (m, k): no ring of one light is one of another
