@@ -238,11 +238,6 @@ def curves(profiles: Profiles) -> Arrays:
     }
 
 
-def errors_by_name(names: tuple[str, ...], covariance: Floats | None) -> dict[str, float]:
-    """Return standard errors from a covariance; none where there is none."""
-    return {} if covariance is None else dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
 def _constants(
     result: Fit, printed: dict[str, float], chains: list[Posterior], errors: dict[str, Floats]
 ) -> dict[str, dict[str, Any]]:

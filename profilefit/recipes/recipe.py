@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -14,6 +14,7 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, printable, words
+from profilefit.recipes.folder import available as available_files
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
 
@@ -261,9 +262,8 @@ def read(path: Path) -> Recipe:
     return Recipe.of(str(path), table, RecipeError)
 
 
-def available(folder: Path) -> dict[str, Path]:
-    """Return the recipes of a folder by name, in order."""
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+available = partial(available_files, ending="toml")
+"""Recipes of a folder by name, in order."""
 
 
 def is_recipe(name: str) -> bool:

@@ -277,13 +277,8 @@ class Records:
 
     def settings(self, base: str) -> tuple[Setting, ...]:
         """Return the settings that a record is there for, by its name for Setting()."""
-        near = {name: self.read(path) for name, path in self.paths.items() if name.startswith(base)}
-        found = {name: record_setting(content) for name, content in near.items()}
-        return tuple(
-            setting
-            for name, setting in found.items()
-            if name in (record_name(base, setting), spanning_name(base, setting))
-        )
+        near = {name: record_setting(self.read(path)) for name, path in self.paths.items() if name.startswith(base)}
+        return tuple(of for name, of in near.items() if name in (record_name(base, of), spanning_name(base, of)))
 
     def name(self, base: str, setting: Setting) -> str:
         """Return the name of a setting's record.
@@ -306,9 +301,8 @@ class Records:
         if known := self.settings(base):
             there = "; ".join(self._described(base, one) for one in known)
             raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
-        raise RecordError(
-            f"{path}: there is no such record; `profilefit regenerate {base} --out {self.folder}` makes it"
-        )
+        makes = f"`profilefit regenerate {base} --out {self.folder}` makes it"
+        raise RecordError(f"{path}: there is no such record; {makes}")
 
     def path_or_shipped(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
         """Return the record of a setting, or the one that is shipped, where this folder has none of that setting."""

@@ -68,13 +68,6 @@ class Coefficients:
         return Coefficients(self.alpha[where], self.values[where], self.cut[where])
 
 
-def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
-    """Return the same rings for some of the albedos only; `alpha` must be among them."""
-    rows = np.searchsorted(profiles.alpha, alpha)
-    names = ("alpha", "energy", "standard_error", "effective_samples", "beyond")
-    return replace(profiles, **{name: getattr(profiles, name)[rows] for name in names})
-
-
 def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
     """(7) at each albedo by unweighted least squares over the rings that (6) keeps; `mfp` in units of (6)'s strides."""
     rings, whole = protocol.rings, profiles.energy.shape[1] // protocol.rings  # what is left over at the end is dropped
@@ -282,7 +275,9 @@ def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[
     found = []
     for name, here in grids.items():
         found += _law_readings(plain.at(here), f"{choices}; {name}", exponent_free=True)
-    only = profiles_at(profiles, alpha)
+    rows = np.searchsorted(profiles.alpha, alpha)  # the same rings for some of the albedos only
+    names = ("alpha", "energy", "standard_error", "effective_samples", "beyond")
+    only = replace(profiles, **{name: getattr(profiles, name)[rows] for name in names})
     for protocol in PROTOCOLS:
         found += _law_readings(fit_coefficients(only, protocol), f"{protocol.describe(width)}; {last}")
     return found + _misprint_readings(plain.at(alpha), f"{choices}; {last}", only)
@@ -461,15 +456,11 @@ def printed_halves() -> list[Content]:
 
     off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
     """
-    return [
-        {
-            "material": material,
-            "model": model,
-            "off": (mse[0] + mse[1]) / 2 / mse[2] - 1,
-            "second_half_needed": 2 * mse[2] - mse[0],
-        }
-        for (material, model), (mse, _) in PRINTED.items()
-    ]
+    found = []
+    for (material, model), ((first, second, whole), _) in PRINTED.items():
+        off, needed = (first + second) / 2 / whole - 1, 2 * whole - first
+        found.append({"material": material, "model": model, "off": off, "second_half_needed": needed})
+    return found
 
 
 def mean_squared_errors(law: Floats, data: Floats) -> Triple:
