@@ -24,16 +24,8 @@ from scipy.stats import chi2
 
 from mcml_sim import Orders
 from mcml_sim.media.arrays import Floats
-from profilefit.fitting.estimate import (
-    JACKKNIFE_GROUPS,
-    Fit,
-    ResidualFunction,
-    Rings,
-    fit,
-    judged,
-    misfit_covariance,
-    rings_of,
-)
+from profilefit.fitting import estimate
+from profilefit.fitting.estimate import Fit, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws.base import Constants
@@ -57,7 +49,7 @@ LEAST_CHANCE = 0.0027  # of a difference by noise alone that is none: three stan
 AGREE, DIFFER = "the fits agree", "the fits differ by more than the photons' noise"
 # Widths of rings [of those fitted], as many at once as the jackknife has groups: that solver is compiled already. Of
 # the trusted ones the error is made; wider rings show the order.
-FACTORS, TRUSTED, ORDER = tuple(range(1, JACKKNIFE_GROUPS + 1)), (2, 3), 2
+FACTORS, TRUSTED, ORDER = tuple(range(1, estimate.JACKKNIFE_GROUPS + 1)), (2, 3), 2
 NONE = 1e-9  # width of a ring that holds nothing [of the next edge]: narrower than any other, wide enough to divide by
 
 
@@ -127,7 +119,7 @@ def _same(one: Solution, other: Solution) -> bool:
     """Return whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
-    error = np.sqrt(np.diag(misfit_covariance(other)))
+    error = np.sqrt(np.diag(estimate.misfit_covariance(other)))
     near = np.maximum(SAME_CONSTANT * np.abs(other.parameters), SAME_IN_ERROR * error)
     return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
 
@@ -149,10 +141,10 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> dict[str, Any]:
     # Albedos that rest on enough photons, none of which were cut to an extent that matters.
     error = np.asarray(run.reflectance(photons.alpha).standard_error)
     uncut = np.asarray(run.cut(photons.alpha)) <= LARGEST_CUT * error
-    counted = uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
+    counted = uncut & (np.asarray(estimate.rings_of(photons, xi=xi).weight) > 0)
     limits = tuple(np.asarray(own.rings.limits))
     one, other = (
-        fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
+        estimate.fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
         for profiles in (exact, photons)
     )
     return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))

@@ -53,12 +53,7 @@ SHOWN: Fields = {
 
 @dataclass(frozen=True)
 class PhaseRecord:
-    """Record of the fits to a table.
-
-    Attributes:
-        content: everything that the record says.
-        path: path of the record's file.
-    """
+    """Record of the fits to a table: all that it says, and its file."""
 
     content: Mapping[str, Any]
     path: Path
