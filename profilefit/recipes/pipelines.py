@@ -95,12 +95,9 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         "versions": record.versions(),
     }
     if recipe.truth == "orders" and light is not None:
-        header["truth"] |= {
-            "photons": light.photons,
-            "grid_digest": light.grid.digest,
-            "cut": {f"{a:g}": light.cut(a) for a in (0.9, 0.99, 0.995, 0.999, 1.0)},
-            "ledger": light.ledger,
-        }
+        cut = {f"{a:g}": light.cut(a) for a in (0.9, 0.99, 0.995, 0.999, 1.0)}
+        own = {"photons": light.photons, "grid_digest": light.grid.digest, "ledger": light.ledger}
+        header["truth"] |= {**own, "cut": cut}
     return header
 
 

@@ -18,13 +18,9 @@ from profilefit.recipes.folder import available as available_files
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
 
-TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
 PAPERS = ("as-published", "evidence")
-CHECKS = ("", "orders")
-SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
-TRIMMED = ("r R_d", "R_d", "none")
 NEAR_MATCHED = 1.02  # laws in n are continued to 1 from here
 FEWEST_INDICES, LARGEST_INDEX = 4, 3.0  # coefficients are cubics in n; exact light is promised up to 3
 FEWEST_OF_G = 3  # indices, and mean cosines, of a law in g, whose coefficients are straight lines in n
@@ -49,7 +45,7 @@ class Albedos(Declared):
     low: Share
     high: Share
     count: Annotated[int, Field(ge=3, le=1000)]
-    spacing: Annotated[str, OneOf(*SPACINGS)] = "sqrt(1-alpha)"
+    spacing: Annotated[str, OneOf("alpha", "reflectance", "sqrt(1-alpha)")] = "sqrt(1-alpha)"
 
     @model_validator(mode="after")
     def _rising(self) -> Self:
@@ -65,7 +61,7 @@ class RingLayout(Declared):
     dr: Annotated[float, Field(ge=0.0)] = 0.0
     first: Annotated[float, Field(ge=0.0)] = 0.0
     count: Annotated[int, Field(ge=0, le=1000)] = 0
-    trim: Annotated[str, OneOf(*TRIMMED)] = "none"
+    trim: Annotated[str, OneOf("r R_d", "R_d", "none")] = "none"
     epsilon: Annotated[float, Field(gt=0.0, lt=1.0), words("a number in (0, 1)")] = 0.005
 
     @model_validator(mode="after")
@@ -130,12 +126,12 @@ class Recipe(Declared):
     law: Words
     equations: Words
     pipeline: Annotated[str, OneOf(*PIPELINES)]
-    truth: Annotated[str, OneOf(*TRUTHS)]
+    truth: Annotated[str, OneOf("orders", "exact")]
     start: Words = "published"
     setting_table: SettingTable = Field(SettingTable(), alias="setting")
     indices: Numbers = ()
     cosines: Numbers = ()
-    check: Annotated[str, OneOf(*CHECKS), words("'orders' or absent")] = ""
+    check: Annotated[str, OneOf("", "orders"), words("'orders' or absent")] = ""
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
     albedos: Albedos = Albedos(low=0.05, high=0.995, count=24)
     weighting: Weighting = Weighting(objective="")

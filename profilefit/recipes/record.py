@@ -174,14 +174,10 @@ def covers(content: Mapping[str, Any], setting: Setting) -> bool:
 
 def record_name(base: str, setting: Setting) -> str:
     """Return the name of the record of a setting: albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
-    usual, parts = Setting(), [base]
-    if setting.illumination != usual.illumination:
-        parts.append(setting.illumination)
-    if setting.n != usual.n:
-        parts.append(f"n{_shortest(setting.n)}")
-    if setting.g != usual.g:
-        parts.append(f"g{_shortest(setting.g)}")
-    return "-".join(parts)
+    parts = [base] if setting.illumination == SEARCHLIGHT.illumination else [base, setting.illumination]
+    numbers = {name: getattr(setting, name) for name in SPANS}
+    other = {name: value for name, value in numbers.items() if value != getattr(SEARCHLIGHT, name)}
+    return "-".join([*parts, *(f"{name}{np.format_float_positional(one, trim='-')}" for name, one in other.items())])
 
 
 def spanning_name(base: str, setting: Setting) -> str:
@@ -191,10 +187,6 @@ def spanning_name(base: str, setting: Setting) -> str:
     """
     spanning = REFRACTING if setting.g == 0.0 else FORWARD
     return f"{record_name(base, replace(setting, n=1.0, g=0.0))}-{spanning}"
-
-
-def _shortest(value: float) -> str:
-    return np.format_float_positional(value, trim="-")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

@@ -103,7 +103,8 @@ def reproduction(path: Path, name: str) -> Reproduction | None:
     if not shipped.exists() or shipped.resolve() == path.resolve():
         return None
     one, other = record.read(shipped), record.read(path)
-    if any(one.get(key) != other.get(key) for key in SAME) or _photons(one) != _photons(other):
+    before, after = ((each.get("truth") or {}).get("photons") for each in (one, other))
+    if any(one.get(key) != other.get(key) for key in SAME) or before != after:
         return None
     return compared(name, one, other, _chains(shipped, one), _chains(path, other))
 
@@ -163,10 +164,6 @@ def _of_readings(name: str, shipped: Content, made: Content) -> Reproduction:
     if relative > READING:
         problems.append(f"a constant moved by {relative:.2g} of its size, and has no stated error")
     return Reproduction(name, len(moves), 0.0, relative, 0.0, "; ".join(problems))
-
-
-def _photons(content: Content) -> Any:
-    return (content.get("truth") or {}).get("photons")
 
 
 def _chains(path: Path, content: Content) -> dict[str, np.ndarray]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -508,22 +509,17 @@ def _channel_rows(
         "one stride before (6)": cut_radius(r, data, "stride before"),
         "diffusion's MSE nearest to print": float(ends[np.argmin(misfits)]),
     }
-    return [
-        _row(printed, material.name, CHANNELS[channel], model, choice, end, law[r <= end], data[r <= end])
-        for choice, end in ranges.items()
-        for model, law in laws.items()
-    ]
-
-
-def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Content:
-    mse, r2 = mean_squared_errors(law, data), r_squared(law, data)
-    printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
-    (first, second, whole), (a, b, c) = mse, printed_mse
-    gaps = {name: (x - u, y - v, z - w) for name, (x, y, z) in r2.items() for u, v, w in [printed_r2]}
-    return {
-        **{"material": material, "channel": channel, "model": model, "range_choice": choice, "range_mm": end},
-        **{"mse": mse, "r2": r2, "mse_over_printed": (first / a, second / b, whole / c), "r2_minus_printed": gaps},
-    }
+    found = []
+    for (choice, end), (model, law) in product(ranges.items(), laws.items()):
+        values = law[r <= end], data[r <= end]
+        mse, r2 = mean_squared_errors(*values), r_squared(*values)
+        printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
+        over = tuple(one / other for one, other in zip(mse, printed_mse, strict=True))
+        gaps = {name: tuple(x - y for x, y in zip(own, printed_r2, strict=True)) for name, own in r2.items()}
+        of = {"material": material.name, "channel": CHANNELS[channel], "model": model}
+        of |= {"range_choice": choice, "range_mm": end}
+        found.append({**of, "mse": mse, "r2": r2, "mse_over_printed": over, "r2_minus_printed": gaps})
+    return found
 
 
 def _r_squared_of(law: Floats, data: Floats) -> dict[str, float]:

@@ -235,7 +235,7 @@ def _provenance(source: _Source, before: str) -> list[str]:
     measured = dict(content["quality"]["regenerated"])
     measured |= content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
-    worst = [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]
+    worst = [f"{one.words} at most {np.max(measured[one.name]):.2g}" for one in known]
     if worst:
         lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
     if content.get("data_digest"):

@@ -161,9 +161,7 @@ def _of_light(media: tuple[Medium, ...], illumination: str, tracing: Tracing) ->
         own = [(light, gaussians.joint([light], count)) for light in lights]
         by_count.append(
             {
-                "result": fitted.best.result,
-                "steps": fitted.best.steps,
-                "condition_number": fitted.best.condition_number,
+                **{key: getattr(fitted.best, key) for key in ("result", "steps", "condition_number")},
                 **{key: [one[key] for one in each] for key in ("rel", "rms", "ks")},
                 # rel where a colour has variances of its own.
                 "alone": [quality(light, one.variances, one.weights[0])["rel"] for light, one in own],

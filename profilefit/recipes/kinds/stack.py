@@ -53,8 +53,7 @@ QUALITY: Fields = {
 USED: Fields = {
     **dict.fromkeys(("unit", "equations", "note"), TEXT),
     "layers": LIST,
-    "half_spaces": TABLE,
-    **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
+    **under("half_spaces", {" ".join(CHANNELS): LIST}),
     **QUALITY,
     "data_digest": DIGEST,
 }

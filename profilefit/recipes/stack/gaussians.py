@@ -83,11 +83,10 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES,
         edges = fit.ring_edges(first, medium.layers)
         rings = tracing.rings(medium, illumination, edges, fit.STACK_PHOTONS, OFFSET)
         counts = rings.weight > 0
-        first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
-        inside = slice(first_ring, last_ring + 1)
-        weight = np.where(counts, 1.0, 0.0)[inside] / np.sqrt(np.count_nonzero(counts))
-        edges = rings.edges[first_ring : last_ring + 2] / unit
-        return SumLight(edges, rings.energy[inside], weight, rings.whole, rings.noise[inside], np.nan)
+        begin, end = np.flatnonzero(counts)[[0, -1]] + [0, 1]
+        weight = np.where(counts, 1.0, 0.0)[begin:end] / np.sqrt(np.count_nonzero(counts))
+        edges = rings.edges[begin : end + 1] / unit
+        return SumLight(edges, rings.energy[begin:end], weight, rings.whole, rings.noise[begin:end], np.nan)
     light, r = exact.solve(medium, illumination, nodes), fit.radii(medium)
     share = np.asarray(light.cdf(r))
     seen = share <= fit.LAST_SHARE
@@ -213,12 +212,11 @@ def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
+    one = np.full((1, variances.size), TO_ONE)
     found = []
     for light in lights:
         rings = ring_shares(light.edges, variances) * (light.weight * light.whole / light.energy)[:, None]
-        columns = np.vstack([rings, np.full(variances.size, TO_ONE)])
-        weights, _ = nnls(columns, np.append(light.weight, TO_ONE))
-        found.append(weights)
+        found.append(nnls(np.vstack([rings, one]), np.append(light.weight, TO_ONE))[0])
     return np.array(found)
 
 
