@@ -61,20 +61,12 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     monkeypatch.setitem(law.PIPELINES, "profile", pipeline)
     written = regenerate(of_recipes(*recipes), run)
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
-    assert made == [
-        ("albedo-n1.4", refracted),
-        ("albedo-rational", None),
-        ("checked", diffuse),
-        ("profile-n1.4", refracted),
-        ("profile-diffuse", None),
-    ]
-    assert [step.name for step in written] == [
-        f"photons: {refracted}",
-        f"photons: {diffuse}",
-        *(name for name, _ in made),
-    ]
-    assert [step.path.stem for step in written[2:]] == [name for name, _ in made]
-    assert [line.split(":")[0] for line in said[2:]] == [name for name, _ in made]
+    maps = [("albedo-n1.4", refracted), ("albedo-rational", None), ("checked", diffuse)]
+    assert made == [*maps, ("profile-n1.4", refracted), ("profile-diffuse", None)]
+    names = [name for name, _ in made]
+    assert [step.name for step in written] == [f"photons: {refracted}", f"photons: {diffuse}", *names]
+    assert [step.path.stem for step in written[2:]] == names
+    assert [line.split(":")[0] for line in said[2:]] == names
 
 
 @pytest.mark.slow
@@ -94,22 +86,13 @@ def test_records_are_the_same_bytes_whatever_the_processes(tmp_path):
 
 # Photons of each setting
 
-SETTINGS = {
-    Setting(): "",
-    Setting("diffuse"): "diffuse",
-    Setting(n=1.4): "n1.4",
-    Setting("diffuse", n=1.4): "diffuse-n1.4",
-}
-
-
-@pytest.fixture
-def run(tmp_path):
-    said: list[str] = []
-    return RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
+SETTINGS = {Setting(): "", Setting("diffuse"): "diffuse"}
+SETTINGS |= {Setting(n=1.4): "n1.4", Setting("diffuse", n=1.4): "diffuse-n1.4"}
 
 
 @pytest.mark.slow
-def test_every_setting_has_its_own_store_and_resumes(run):
+def test_every_setting_has_its_own_store_and_resumes(tmp_path):
+    run = RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, progress=False)
     for setting, folder in SETTINGS.items():
         light = run.light(setting)
         assert (light.setting, light.photons, light.seed) == (setting, 2000, 3)
@@ -146,8 +129,7 @@ def made(tmp_path_factory, request):
 
 def test_a_small_record_is_reproduced(made):
     found = reproduction(made, made.stem)
-    assert found.is_reproduced
-    assert found.constants == NAMES[made.stem]
+    assert (found.is_reproduced, found.constants) == (True, NAMES[made.stem])
     # Processors and the order of sums move a constant by 1e-5 of itself at most: its error is a hundredth of it.
     assert found.moved < 1e-3
     assert found.relative < 1e-5
@@ -174,16 +156,17 @@ def content(value=1.0, error=0.1, **more):
     return {"constants": {"a": {"regenerated": value, "model_error": error, **more}}, "fit": {"result": "converged"}}
 
 
-def test_a_constant_that_was_not_fitted_must_be_equal():
-    same = compared("one", content(error=None), content(error=None), {}, {})
-    assert same.is_reproduced
-    moved = compared("one", content(error=None), content(1 + 1e-10, error=None), {}, {})
-    assert "a was not fitted and is" in moved.problem
+def problem(shipped, other, chains=(), others=()):
+    return compared("one", shipped, other, dict(chains), dict(others)).problem
 
 
-def test_a_fit_that_fails_is_not_reproduced():
-    other = {**content(), "fit": {"result": "degenerate"}}
-    assert "'degenerate' in place of 'converged'" in compared("one", content(), other, {}, {}).problem
+def test_what_is_not_reproduced_is_named():
+    """A constant that was not fitted must be equal."""
+    assert compared("one", content(error=None), content(error=None), {}, {}).is_reproduced
+    assert "a was not fitted and is" in problem(content(error=None), content(1 + 1e-10, error=None))
+    assert "'degenerate' in place of 'converged'" in problem(content(), {**content(), "fit": {"result": "degenerate"}})
+    one, draws = of_chain(np.random.default_rng(5).standard_normal(1000))
+    assert "the chain of misfit is in one record only" in problem(one, content(), draws)
 
 
 def of_chain(draws):
@@ -201,12 +184,7 @@ def test_intervals_of_two_right_chains_agree_and_of_a_shifted_one_do_not():
     assert np.mean(np.array(found) > 1.0) <= 0.01
     assert np.median(found) > 0.2  # the allowance is no wider than the noise asks for
     (one, draws), (other, again) = of_chain(random.standard_normal(1000)), of_chain(random.standard_normal(1000) + 0.4)
-    assert "the interval of a, misfit" in compared("one", one, other, draws, again).problem
-
-
-def test_a_chain_that_is_missing_is_named():
-    one, draws = of_chain(np.random.default_rng(5).standard_normal(1000))
-    assert "the chain of misfit is in one record only" in compared("one", one, content(), draws, {}).problem
+    assert "the interval of a, misfit" in problem(one, other, draws, again)
 
 
 def test_records_of_other_photons_are_not_compared(made, tmp_path):

@@ -42,6 +42,7 @@ def test_every_job_is_done_once_whatever_the_processes(processes):
         numbers = {number for _, number in workers.each(eval, [OF_PROCESS % "getpid()"] * 2 * processes)}
         assert len(numbers) == processes
         assert (os.getpid() in numbers) == (processes == 1)
+    assert 1 <= cores() <= os.cpu_count()
     assert not any(map(_is_alive, numbers - {os.getpid()}))
     assert not multiprocessing.active_children()
 
@@ -65,10 +66,8 @@ def test_a_process_that_is_ended_from_outside_is_missed():
 @pytest.mark.parametrize("by", ["SIGKILL", *slow("SIGINT", "SIGTERM")])
 def test_no_process_outlives_the_one_that_started_it(by):
     """Ctrl-C reaches all of them, a kill only the first."""
-    script = [sys.executable, "-c", SLEEPERS]
-    with subprocess.Popen(
-        script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as one:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    with subprocess.Popen([sys.executable, "-c", SLEEPERS], **pipes) as one:
         started = list(map(int, one.stdout.readline().split()))
         assert len(started) == 2
         time.sleep(1.0)
@@ -90,30 +89,19 @@ def _is_alive(pid):
     return True
 
 
-def test_cores_are_those_that_this_process_may_use():
-    assert 1 <= cores() <= os.cpu_count()
-
-
-@pytest.fixture
-def two_cores():
-    """Two cores or more, though a worker of the tests has one of its own."""
-    if not hasattr(os, "sched_setaffinity"):
-        pytest.skip("this system has no shares of cores")
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system has no shares of cores")
+def test_each_process_has_cores_of_its_own():
+    """Of two or more, though a worker of the tests has one."""
     own = os.sched_getaffinity(0)
     os.sched_setaffinity(0, range(os.cpu_count()))
     try:
         if cores() < 2:
             pytest.skip("shares of two cores or more")
-        yield
+        with Workers(2) as workers:
+            shares = workers.each(eval, [OF_PROCESS % "sched_getaffinity(0)"] * 4)
+            first, second = {frozenset(share) for _, share in shares}
+        assert first.isdisjoint(second)
+        assert first | second <= os.sched_getaffinity(0)
+        assert len(first) < cores()
     finally:
         os.sched_setaffinity(0, own)
-
-
-@pytest.mark.usefixtures("two_cores")
-def test_each_process_has_cores_of_its_own():
-    with Workers(2) as workers:
-        shares = workers.each(eval, [OF_PROCESS % "sched_getaffinity(0)"] * 4)
-        first, second = {frozenset(share) for _, share in shares}
-    assert first.isdisjoint(second)
-    assert first | second <= os.sched_getaffinity(0)
-    assert len(first) < cores()
