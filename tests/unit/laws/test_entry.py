@@ -1,4 +1,4 @@
-"""The entry of each law, and a law that is added by its file, its text, its record and one line of the table."""
+"""The entry of each law, its printed constants, and a law that is added by its files and one line of the table."""
 
 import subprocess
 import sys
@@ -15,6 +15,7 @@ from profilefit import laws
 from profilefit.errors import InputError
 from profilefit.laws.base import Entry, Range, Sampler, Text
 from profilefit.laws.escape import EscapeLaw
+from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record
 from profilefit.recipes.folder import fits_folder
@@ -41,9 +42,8 @@ def test_an_entry_tells_of_what_there_is(name):
     for base in entry.records:
         assert recipe.find(base, fits_folder()).law in (entry.name, entry.name.partition(":")[0])
     if entry.has_text:
-        assert all(
-            (TEXTS / f"{file}.glsl").is_file() for file in (entry.text.file, *entry.text.parts, *entry.text.ends)
-        )
+        files = (entry.text.file, *entry.text.parts, *entry.text.ends)
+        assert all((TEXTS / f"{file}.glsl").is_file() for file in files)
     else:
         with pytest.raises(InputError, match=entry.text):
             emit.law_text(profilefit.load(name))
@@ -55,9 +55,9 @@ def test_no_record_is_of_an_index_that_its_law_is_not_made_for():
             assert one.law.entry.n.holds(one.setting.n), one.label
 
 
-@pytest.mark.parametrize("n", [0.5, 3.0])
-def test_dipoles_hold_for_any_index(n):
-    for name in ("dipole", "better_dipole"):
+@pytest.mark.parametrize("name", ["dipole", "better_dipole"])
+def test_dipoles_hold_for_any_index(name):
+    for n in (0.5, 3.0):
         law = profilefit.load(name, setting=Setting(n=n))
         assert law.entry.n.holds(n)
         assert 0.0 < law.profile(1.0, 0.8) < 1.0
@@ -68,6 +68,34 @@ def test_a_range_has_ends():
     assert Range().holds(ends).tolist() == [True, True, True]
     assert Range(open_low=True, open_high=True).holds(ends).tolist() == [False, True, False]
     assert str(Range(0.0, 0.5, open_low=True)) == "(0, 0.5]"
+
+
+# Printed constants, typed here a second time from their sources: the two copies must agree, digit for digit.
+# Liang et al.: (9)-(11) a, (12)-(13) b, (14)-(15) c, (19)-(20) the inverse; (8). Christensen and Burley 2015:
+# s = 1.85 - A + 7 |A - 0.8|^3, 1.9 - A + 3.5 (A - 0.8)^2, 3.5 + 100 (A - 0.33)^4. Kulla and Conty 2017:
+# s = 4.09712 + 4.20863 A - sqrt(9.59217 + 41.6808 A + 17.7126 A^2). Chiang, Kutz and Burley 2016:
+# alpha = 1 - exp(-5.09406 A + 2.61188 A^2 - 4.31805 A^3).
+LIANG = "a1 -0.0064 a2 0.00316 a3 30 b0 0.461 b1 6.7 b2 0.45 b3 2.6 b4 1.3 c1 0.0097 c2 4.2 c3 0.166 g1 1.504 g2 2.175 "
+LIANG += "g3 0.7 g4 0.19 h1 3.993 h2 3.268 h3 0.2838"
+PRINTED = {
+    ("liang", "published", "searchlight"): LIANG,
+    ("liang", "corrected", "searchlight"): LIANG.replace("b0 0.461", "b0 0.0641"),
+    ("burley", "published", "searchlight"): "s0 1.85 s1 1 s2 7 s3 0.8",
+    ("burley", "diffuse", "diffuse"): "s0 1.9 s1 1 s2 3.5 s3 0.8",
+    ("burley_diffuse_mfp", "published", "searchlight"): "s0 3.5 s1 100 s2 0.33",
+    ("liang_albedo", "published", "searchlight"): "p 5.67 q 3.84 w 0.84",
+    ("van_de_hulst_albedo", "published", "diffuse"): "p0 4.09712 p1 4.20863 q0 9.59217 q1 41.6808 q2 17.7126",
+    ("chiang_albedo", "published", "diffuse"): "e1 -5.09406 e2 2.61188 e3 -4.31805",
+}
+
+
+def test_constants_are_the_printed_ones():
+    """Each set once, under its light, and from a source."""
+    assert [(s.law, s.name, s.setting) for s in SETS] == [(law, name, Setting(light)) for law, name, light in PRINTED]
+    for one, text in zip(SETS, PRINTED.values(), strict=True):
+        words = text.split()
+        assert one.constants == dict(zip(words[::2], map(float, words[1::2]), strict=True)), one.law
+        assert one.source
 
 
 class ToySampler(Sampler):
@@ -105,7 +133,6 @@ struct LAW_Shape {
     float reflectance; // A [-]
     float rate; // q [1/mfp]
 };
-
 LAW_Shape LAW_shape(float alpha) {
     LAW_Shape s;
     s.reflectance = LAW_map_reflectance(alpha);
@@ -154,11 +181,8 @@ def test_a_law_is_added_by_one_line_of_the_table(toy):
     edges = np.append(0.0, np.geomspace(0.1, 20.0, 12))
     found = profilefit.fit(profilefit.Profiles.from_exact(np.linspace(0.3, 0.9, 4), edges), start, jackknife=False)
     assert found.result == "converged"
-    told = {
-        **{"law": "toy", "pipeline": "profile", "setting": Setting()},
-        "constants": {name: {"regenerated": value} for name, value in found.constants.items()},
-    }
-    record.write(toy, "toy", told, {})
+    constants = {name: {"regenerated": value} for name, value in found.constants.items()}
+    record.write(toy, "toy", {"law": "toy", "pipeline": "profile", "setting": Setting(), "constants": constants}, {})
     assert "toy" in profilefit.names()
     law = profilefit.load("toy", folder=toy)
     assert law.constants() == pytest.approx(found.constants, rel=1e-11)
