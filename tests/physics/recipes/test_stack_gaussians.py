@@ -28,12 +28,11 @@ WHOLE = (0.6, 0.3)
 
 def lights_of(variances=VARIANCES, weights=WEIGHTS, noise=0.0, random=None):
     """Light that is a sum; a run's rings have independent noise, and its A is what leaves in all."""
-    found = []
+    found, weight = [], np.full(60, 60**-0.5)
     for own, whole in zip(weights, WHOLE, strict=False):
         energy = whole * (ring_shares(EDGES, variances) @ own)
         more = energy * noise * (0.0 if random is None else random.standard_normal(energy.size))
         inside = float(own @ -np.expm1(-0.5 * EDGES[0] ** 2 / variances))
-        weight = np.full(60, 60**-0.5)
         found.append(SumLight(EDGES, energy + more, weight, whole + more.sum(), np.full(60, noise), inside))
     return found
 
@@ -54,6 +53,9 @@ def test_a_sum_is_found_again():
     np.testing.assert_allclose(variances, VARIANCES, rtol=1e-4)
     np.testing.assert_allclose(weights, WEIGHTS[0], rtol=1e-4)
     assert fitted([light], 2).cost > 1e4 * best.cost  # two are not three
+    for count in (0, 9, True, 2.5):
+        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
+            gaussians.shared_gaussians((HEART,), "diffuse", count)
 
 
 @pytest.mark.slow
@@ -72,8 +74,8 @@ def test_more_of_them_are_nearer(illumination):
 def test_colours_share_their_variances():
     """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
     both = gaussians.shared_gaussians((HEART, BLUE), "diffuse", 4)
-    units = [medium.layers[0].mfp for medium in (HEART, BLUE)]
-    first, second = (np.array(one.variance) * unit**2 for one, unit in zip(both, units, strict=True))
+    pairs = zip(both, (HEART, BLUE), strict=True)
+    first, second = (np.array(one.variance) * medium.layers[0].mfp ** 2 for one, medium in pairs)
     np.testing.assert_allclose(first, second, rtol=1e-12)
     for light, one in zip(gaussians.lights_of((HEART, BLUE), "diffuse"), both, strict=True):
         alone = fitted([light], 4).cost
@@ -93,12 +95,6 @@ def test_many_fixed_ones_are_exact_light():
         assert np.abs(apart).max() < 3e-3
     six = joint(lights, 6)
     assert np.sqrt(np.mean(off(lights[0], six.variances, six.weights[0]) ** 2)) > 0.02
-
-
-def test_counts_are_checked():
-    for count in (0, 9, True, 2.5):
-        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
-            gaussians.shared_gaussians((HEART,), "diffuse", count)
 
 
 @pytest.mark.slow
@@ -148,9 +144,8 @@ def test_derivatives_are_those_of_the_formula():
         parameters = np.array([-1.0, 0.5, 0.3, -0.7])
         level, weights, slopes = gaussians._of(parameters, 2)
         np.testing.assert_allclose(np.append(level, weights), unbounded(jnp.asarray(parameters)), rtol=1e-12)
-        np.testing.assert_allclose(
-            slopes, jax.jit(jax.jacfwd(unbounded))(jnp.asarray(parameters)), rtol=1e-10, atol=1e-15
-        )
+        twin = jax.jit(jax.jacfwd(unbounded))(jnp.asarray(parameters))
+        np.testing.assert_allclose(slopes, twin, rtol=1e-10, atol=1e-15)
 
 
 @pytest.mark.slow
@@ -215,10 +210,9 @@ def test_a_weight_that_would_be_negative_is_held_at_zero():
     assert all(np.isnan(one[8]) and np.all(np.isfinite(one[:8])) for one in known.values() if one is not None)
     for share in (1e-4, 1e-3, 1e-2):
         moved = found.weights[1] * (1.0 - share) + share * np.array([0.0, 0.0, 1.0])
-        worse = 0.0
-        for own, light in zip((found.weights[0], moved), lights, strict=True):
-            worse += gaussians.quality(light, found.variances, own)["rms"] ** 2
-        assert worse > found.best.cost
+        pairs = zip(lights, (found.weights[0], moved), strict=True)
+        worse = [gaussians.quality(light, found.variances, own)["rms"] ** 2 for light, own in pairs]
+        assert sum(worse) > found.best.cost
     assert joint(lights_of(), 3).free.all()  # negative control
 
 
