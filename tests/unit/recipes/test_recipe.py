@@ -85,11 +85,8 @@ def test_every_shipped_recipe_reads_and_is_named_after_its_setting(path):
         assert not re.search(r"-diffuse|-n\d", path.stem)
 
 
-def test_there_are_shipped_recipes():
-    assert {"liang-whole", "liang-as-published", "burley-whole", "albedo-rational"} <= set(available(fits_folder()))
-
-
 def test_every_objective_has_a_pipeline_and_the_other_way_round():
+    assert {"liang-whole", "liang-as-published", "burley-whole", "albedo-rational"} <= set(available(fits_folder()))
     named = [objective for objectives, _ in PIPELINES.values() for objective in objectives]
     assert sorted(named) == sorted(OBJECTIVES)
     assert list(PIPELINES) == [*albedo_map.PIPELINES, *law.PIPELINES]
@@ -119,68 +116,65 @@ def test_a_setting_is_read(write):
     assert read(write(refracted.replace("n = 1.4", "n = 2"))).setting == Setting("diffuse", n=2.0)
 
 
-ALBEDO, LIMIT = "must be a number > 0 and <= 1, got", "must be a number in 0 ... 1000000, got"
-COUNT, STARTS = "must be a whole number in 3 ... 1000, got", "random_starts must be a whole number in 0 ... 1000, got"
-TEXT, DEEP = "must be a text of 1000 characters at most, got", "is not TOML: tables or lists nested more than 32 deep"
-LENGTHS = "mfp must be a list of lengths from 0.001 to 1000, got"
+SHARE, LIMIT, LENGTHS = "a number > 0 and <= 1", "a number in 0 ... 1000000", "a list of lengths from 0.001 to 1000"
 KEYS = "title, law, equations, pipeline, truth, start, setting, indices,"
+COUNT, STARTS = "a whole number in 3 ... 1000", "random_starts must be a whole number in 0 ... 1000, got"
+TEXT, DEEP = "a text of 1000 characters at most", "is not TOML: tables or lists nested more than 32 deep"
+# A key, the line of a good recipe that says it or after which it may stand, what it must be; what is given, as shown.
+VALUES = [
+    ("title", 'title = "A fit"', TEXT, {"": "nothing", "7": "7"}),
+    ("[weighting] objective", 'objective = "energy"', TEXT, {"": "nothing"}),
+    ("[albedos] low", "low = 0.1", SHARE, {"": "nothing", '"a tenth"': "'a tenth'", "true": "True"}),
+    ("[albedos] low", "low = 0.1", SHARE, {"0.0": "0.0", "nan": "nan"}),
+    ("[albedos] high", "high = 0.9", SHARE, {"1.1": "1.1"}),
+    ("[albedos] count", "count = 9", COUNT, {one: one for one in ("9.5", "2", "1001")}),
+    ("[albedos] count", "count = 9", COUNT, {f"0x1{'0' * 5000}": "one of more than 4300 digits"}),
+    ("[albedos] spacing", 'spacing = "alpha"', "one of alpha, reflectance, sqrt(1-alpha)", {'"even"': "'even'"}),
+    ("held", TRUTH, "a list of texts of 1000 characters at most", {'"a3"': "'a3'"}),
+    ("truth", TRUTH, "one of orders, exact", {'"hearsay"': "'hearsay'"}),
+    ("objective", 'objective = "energy"', "one of energy, relative", {'"beauty"': "'beauty'", '"radius"': "'radius'"}),
+    ("mfp", TRUTH, LENGTHS, {one: one for one in ("1.0", "[1.0, 0.0]", "[-1]", "[inf]", "[]")}),
+    ("mfp", TRUTH, LENGTHS, {'["far"]': "['far']", "[true]": "[True]", "[1e300]": "[1e+300]", "[1e-9]": "[1e-09]"}),
+    ("mfp", TRUTH, "a list of different lengths", {"[1, 2, 1.0]": "[1.0, 2.0, 1.0]"}),
+    ("[rings] first", "first = 0.01", "a number >= 0", {"-0.01": "-0.01"}),
+    ("[rings] first", "first = 0.01", "at least 0.0025 mfp", {"0.001": ""}),
+    ("[rings] last", "last = 30", "beyond the first ring and within 1000 mfp", {"0.005": "0.005"}),
+    ("[rings] last", "last = 30", "a number > 0 and <= 1000", {"1e4": "10000.0", "nan": "nan"}),
+    ("[rings] count", "count = 20", "a whole number in 0 ... 1000", {"5000": "5000"}),
+    ("[rings] count", "count = 20", "a whole number in 3 ... 1000", {"2": "2"}),
+    ("[rings] trim", "last = 30", "one of r R_d, R_d, none", {'"R"': ""}),
+    ("[rings] epsilon", "last = 30", "a number in (0, 1)", {"1.0": "1.0"}),
+    ("[rings] dr", "last = 30", "a number >= 0", {"-0.1": "-0.1"}),
+    ("[weighting] energy_limit", "energy_limit = 3.0", LIMIT, {"-3.0": "-3.0", "nan": "nan"}),
+    ("[weighting] source_limit", "energy_limit = 3.0", LIMIT, {"inf": "inf", "1e7": "10000000.0"}),
+    ("[weighting] shares", "energy_limit = 3.0", "a whole number in 0 ... 10000", {"-1": "-1"}),
+    ("[weighting] last_share", "energy_limit = 3.0", SHARE, {"0.0": "0.0"}),
+]  # fmt: skip
+
+
+def of_value(key, line, accepted, given, got):
+    """The line and what takes its place, and the words of the mistake."""
+    said = f"{key.rpartition(' ')[2]} = {given}" * bool(given)
+    new = said if line.startswith(key.rpartition(" ")[2]) else f"{line}\n{said}"
+    return line, new, f"{key} must be {accepted}, got {got}" if got else f"{key} must be {accepted}"
+
+
 # In a good recipe, a piece and what takes its place.
 IN_GOOD = [
+    *(of_value(*row, *case) for *row, cases in VALUES for case in cases.items()),
     ('law = "liang"', 'lore = "liang"', f"keys must be of {KEYS}"),
     ('spacing = "alpha"', 'spaces = "alpha"', "[albedos] keys must be of low, high, count, spacing, got 'spaces'"),
-    ('title = "A fit"', "", f"title {TEXT} nothing"),
-    ("low = 0.1", "", f"[albedos] low {ALBEDO} nothing"),
-    ('objective = "energy"', "", f"[weighting] objective {TEXT} nothing"),
-    ('title = "A fit"', "title = 7", f"title {TEXT} 7"),
-    ("low = 0.1", 'low = "a tenth"', f"[albedos] low {ALBEDO} 'a tenth'"),
-    ("low = 0.1", "low = true", f"[albedos] low {ALBEDO} True"),
-    ("count = 9", "count = 9.5", f"count {COUNT} 9.5"),
-    (TRUTH, f'{TRUTH}\nheld = "a3"', "held must be a list of texts of 1000 characters at most, got 'a3'"),
     (LAST, "[[weighting]]\n", "weighting must be a table [weighting], got"),
     ('pipeline = "profile"', 'pipeline = "magic"', "pipeline must be one of albedo, profile, as-published"),
-    (TRUTH, 'truth = "hearsay"', "truth must be one of orders, exact, got 'hearsay'"),
-    ('objective = "energy"', 'objective = "beauty"', "must be one of energy, relative, got 'beauty'"),
-    ('objective = "energy"', 'objective = "radius"', "must be one of energy, relative, got 'radius'"),
-    ("high = 0.9", "high = 1.1", f"[albedos] high {ALBEDO} 1.1"),
-    ("low = 0.1", "low = 0.0", f"[albedos] low {ALBEDO} 0.0"),
     ("low = 0.1", "low = 0.9", "[albedos] high must be a number > low, which is 0.9, and <= 1, got 0.9"),
-    ("low = 0.1", "low = nan", f"[albedos] low {ALBEDO} nan"),
-    ("count = 9", "count = 2", f"[albedos] count {COUNT} 2"),
-    ("count = 9", "count = 1001", f"[albedos] count {COUNT} 1001"),
-    ('= "alpha"', '= "even"', "[albedos] spacing must be one of alpha, reflectance, sqrt(1-alpha), got"),
-    *(
-        (TRUTH, f"{TRUTH}\nmfp = {given}", f"{LENGTHS} {got}")
-        for given, got in (
-            *((one, one) for one in ("1.0", "[1.0, 0.0]", "[-1]", "[inf]", "[]")),
-            *(('["far"]', "['far']"), ("[true]", "[True]"), ("[1e300]", "[1e+300]"), ("[1e-9]", "[1e-09]")),
-        )
-    ),
-    (TRUTH, f"{TRUTH}\nmfp = [1, 2, 1.0]", "a list of different lengths, got [1.0, 2.0, 1.0]"),
     ("first = 0.01", "first = 0.01\ndr = 0.1", "either dr > 0 or both first > 0 and count > 0"),
-    ("first = 0.01", "first = -0.01", "[rings] first must be a number >= 0, got -0.01"),
-    ("last = 30", "last = 0.005", "[rings] last must be beyond the first ring and within 1000 mfp, got 0.005"),
-    ("last = 30", "last = 1e4", "[rings] last must be a number > 0 and <= 1000, got 10000.0"),
-    ("last = 30", "last = nan", "[rings] last must be a number > 0 and <= 1000, got nan"),
-    ("count = 20", "count = 5000", "[rings] count must be a whole number in 0 ... 1000, got 5000"),
-    ("last = 30", 'last = 30\ntrim = "R"', "[rings] trim must be one of r R_d, R_d, none"),
-    ("last = 30", "last = 30\nepsilon = 1.0", "[rings] epsilon must be a number in (0, 1), got 1.0"),
-    ("energy_limit = 3.0", "energy_limit = -3.0", f"[weighting] energy_limit {LIMIT} -3.0"),
-    ("energy_limit = 3.0", "energy_limit = nan", f"energy_limit {LIMIT} nan"),
-    ("energy_limit = 3.0", "source_limit = inf", f"source_limit {LIMIT} inf"),
-    ("energy_limit = 3.0", "source_limit = 1e7", f"source_limit {LIMIT} 10000000.0"),
     ("energy_limit = 3.0", f"energy_limit = {10**400}", "401 digits, of 300 at most, of 'energy_limit' (at line"),
     ("count = 9", f"count = {10**400}", "401 digits, of 300 at most, of 'count' (at line"),
-    ("count = 9", f"count = 0x1{'0' * 5000}", f"count {COUNT} one of more than 4300 digits"),
     ("count = 9", f"count = {'9' * 5000}", "5000 digits, of 300 at most, of 'count' (at line"),
     ("count = 9", f"{'x' * 5000} = 9", "[albedos] keys must be of low, high, count, spacing, got 'xxx"),
     ("count = 9", f"count = {'[' * 100_000}", DEEP),
     ("count = 9", f"{'a.' * 100_000}a = 9", DEEP),
     ("count = 9", "count = 1e400", "is not TOML: the number 1e400, beyond floating point"),
-    ("first = 0.01", "first = 0.001", "[rings] first must be at least 0.0025 mfp"),
-    ("count = 20", "count = 2", "[rings] count must be a whole number in 3 ... 1000, got 2"),
-    ("first = 0.01", "dr = -0.1\nfirst = 0.01", "[rings] dr must be a number >= 0, got -0.1"),
-    ("energy_limit = 3.0", "shares = -1", "[weighting] shares must be a whole number in 0 ... 10000, got -1"),
-    ("energy_limit = 3.0", "last_share = 0.0", f"[weighting] last_share {ALBEDO} 0.0"),
     ("\ntitle", '\nsetting = "diffuse"\ntitle', "setting must be a table [setting], got 'diffuse'"),
     (RINGS, "", "mine.toml: a recipe of pipeline 'profile' needs a table [rings]"),
     (ALBEDOS, "", "mine.toml: missing [albedos]"),
@@ -190,7 +184,7 @@ SHARES = "[weighting] shares must be a whole number in 1 ... 10000 of pipeline '
 # Of the light, indices and mean cosines that a recipe is for: lines before it, those of [setting], and words.
 IN_SETTING = [
     ("", 'illumination = "lamp"', "[setting] illumination must be one of searchlight, diffuse, got 'lamp'"),
-    ("", "illumination = 1", f"[setting] illumination {TEXT} 1"),
+    ("", "illumination = 1", f"[setting] illumination must be {TEXT}, got 1"),
     ("", "n = 0", "[setting] n must be a refractive index > 0, got 0.0"),
     ("", "n = nan", "[setting] n must be a finite number, got nan"),
     ("", 'n = "glass"', "[setting] n must be a finite number, got 'glass'"),
@@ -265,39 +259,29 @@ def test_a_mistake_is_one_line(write, good, old, new, words):
     assert "this is no" not in new or "line 2" in str(caught.value)
 
 
-def test_indices_are_read_and_photons_have_one(write):
+def test_indices_and_cosines_are_read_and_photons_have_one_index(write):
     text = f"indices = [1.02, 1.2, 1.4, 1.6]\n{with_setting('n = 1.4')}"
     found = read(write(text))
     assert (found.indices, found.span) == ((1.02, 1.2, 1.4, 1.6), (1.0, 1.6))
     assert read(write(text.replace("1.02", "1.1"))).span == (1.1, 1.6)
     with pytest.raises(RecipeError, match=r"indices need truth = \"exact\" and pipeline 'albedo' or 'profile'"):
         read(write(text.replace('"exact"', '"orders"')))
-
-
-def test_cosines_are_read_with_every_index(write):
     found = read(write(f"{SPANS}cosines = [0.1, 0.5, 0.9]\n{with_setting('n = 1.4', 'g = 0.9')}"))
     assert (found.cosines, found.span) == ((0.1, 0.5, 0.9), (1.3, 1.5))
     assert found.settings == tuple(Setting(n=n, g=g) for n in (1.33, 1.4, 1.45) for g in (0.1, 0.5, 0.9))
 
 
-@pytest.mark.parametrize(
-    ("good", "laws"), [(EVEN, "'as-published' must be liang"), (INVERSE, "'inverse' must be liang or quantile")]
-)
-def test_a_pipeline_takes_the_laws_that_its_objective_sees(write, good, laws):
-    require_known(read(write(good)))
-    with pytest.raises(RecipeError, match=f"law of pipeline {laws}, got 'burley'"):
-        require_known(read(write(good.replace('law = "liang"', 'law = "burley"'))))
-
-
-@pytest.mark.parametrize(("dr", "last"), [(0.05, 0.15), (0.01, 40.0)])
-def test_the_fewest_and_the_most_rings_are_accepted(write, dr, last):
-    rings = read(write(EVEN.replace("dr = 0.05", f"dr = {dr}").replace("last = 30", f"last = {last}"))).rings
-    assert (rings.dr, rings.last) == (dr, last)
-
-
-def test_albedos_need_no_rings(write):
-    text = GOOD.replace(RINGS, "")
-    assert read(write(text.replace('"profile"', '"albedo"').replace('"energy"', '"albedo"'))).rings is None
+def test_pipelines_take_what_they_can_fit(write):
+    """The laws that their objectives see, the fewest and the most rings, and none where albedos are fitted."""
+    for good, laws in ((EVEN, "'as-published' must be liang"), (INVERSE, "'inverse' must be liang or quantile")):
+        require_known(read(write(good)))
+        with pytest.raises(RecipeError, match=f"law of pipeline {laws}, got 'burley'"):
+            require_known(read(write(good.replace('law = "liang"', 'law = "burley"'))))
+    for dr, last in ((0.05, 0.15), (0.01, 40.0)):
+        rings = read(write(EVEN.replace("dr = 0.05", f"dr = {dr}").replace("last = 30", f"last = {last}"))).rings
+        assert (rings.dr, rings.last) == (dr, last)
+    text = GOOD.replace(RINGS, "").replace('"profile"', '"albedo"').replace('"energy"', '"albedo"')
+    assert read(write(text)).rings is None
 
 
 def test_a_file_that_cannot_be_read(tmp_path):
