@@ -1,8 +1,6 @@
 """Records: what is written is read, the same twice, whole or not at all; and what measurements say of records."""
 
-import functools
 import json
-import operator
 import os
 import shutil
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record, schema
 from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
 from profilefit.recipes.folder import fits_folder
+from tests.unit.recipes.stack.test_record import GONE, spoil
 
 NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
 CONTENT = {**NAMED, "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}
@@ -110,38 +109,25 @@ def test_what_is_no_record_is_named(tmp_path, content, words):
         path.mkdir()
     elif content is not None:
         path.write_bytes(content)
-    with pytest.raises(RecordError, match=rf"mine\.json: {words}"):
+    with pytest.raises(RecordError, match=rf"mine\.json: {words}") as caught:
         record.read(path)
+    assert isinstance(caught.value, InputError)
 
 
-def changed(tmp_path, name, change):
-    """The path of a copy of a shipped record that a function has changed."""
-    content = json.loads((fits_folder() / f"{name}.json").read_text())
-    change(content)
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(content))
-    return path
+@pytest.fixture
+def spoilt(tmp_path):
+    """Copies a shipped record in which something stands at a place, names with slashes between, or is lost."""
+
+    def copy(name, place, value=GONE):
+        path = Path(shutil.copy(fits_folder() / f"{name}.json", tmp_path / "mine.json"))
+        spoil(path, place, value)
+        return path
+
+    return copy
 
 
 ALWAYS = {**schema.NAMED, **schema.CONSTANTS}
 PROFILE_KEYS = {**ALWAYS, **schema.TOLD, **schema.PROFILE}
-
-
-def _spoiled(tmp_path, key, spoil):
-    """A shipped record of which the value at a dotted key is lost, or made true."""
-    names = key.split(".")
-
-    def change(content):
-        for place, name in enumerate(names):
-            names[place] = next(iter(content)) if name == "*" else name
-            if place < len(names) - 1:
-                content = content[names[place]]
-        if spoil == "lost":
-            del content[names[-1]]
-        else:
-            content[names[-1]] = True
-
-    return changed(tmp_path, "liang-whole", change), names[-1]
 
 
 @pytest.mark.parametrize("path", record.available(fits_folder()).values(), ids=lambda path: path.stem)
@@ -172,12 +158,15 @@ def test_format_1_is_read_in_the_words_of_format_2(tmp_path):
 
 
 @pytest.mark.parametrize("key", [key for key in PROFILE_KEYS if not key.endswith("*") and "?" not in key])
-@pytest.mark.parametrize("spoil", ["lost", "another type"])
-def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
-    path, last = _spoiled(tmp_path, key, spoil)
-    got = "nothing" if spoil == "lost" else "true"
-    words = rf"mine\.json: is damaged: .*{last} must be .*, got {got}; regenerate it"
-    if key in ALWAYS or (spoil != "lost" and f"{key}?" in ALWAYS):
+@pytest.mark.parametrize("value", [GONE, True], ids=["lost", "another type"])
+def test_what_a_record_lacks_is_named(spoilt, key, value):
+    content, place = json.loads((fits_folder() / "liang-whole.json").read_text()), []
+    for name in key.split("."):
+        place.append(next(iter(content)) if name == "*" else name)
+        content = content[place[-1]]
+    path, got = spoilt("liang-whole", "/".join(place), value), "nothing" if value is GONE else "true"
+    words = rf"mine\.json: is damaged: .*{place[-1]} must be .*, got {got}; regenerate it"
+    if key in ALWAYS or (value is True and f"{key}?" in ALWAYS):
         with pytest.raises(RecordError, match=words):
             record.read(path)
     else:
@@ -186,69 +175,52 @@ def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
         record.read(path, whole=True)
 
 
-def put(*place, **values):
-    """A change of a record: values under a table at a place."""
-    return lambda content: functools.reduce(operator.getitem, place, content).update(values)
-
-
-def lose(*place):
-    """A change of a record: the last of a list, or a key of a table."""
-    return lambda content: functools.reduce(operator.getitem, place[:-1], content).pop(place[-1])
-
-
 DAMAGED = [
-    ("liang-whole", put(pipeline="magic"), 'pipeline must be one of albedo, profile, .*, got "magic"'),
-    ("liang-whole", put(pipeline=["x"]), r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
-    ("liang-whole", put(constants={"a1": 3.0}), r"constants\.a1 must be a table, got 3\.0; regenerate it"),
-    ("liang-as-published", put(stages=[]), r"stages must be a table, got \[\]"),
-    ("hazard", put(preset="; rm x"), r'preset must be quick or full, got "; rm x"'),
-    ("reproduction", put(readings={}), r"readings must be a list, got {}"),
-    ("reproduction", put(table1=["skin"]), r'table1\.0 must be a table, got "skin"'),
+    ("liang-whole", "pipeline", "magic", 'pipeline must be one of albedo, profile, .*, got "magic"'),
+    ("liang-whole", "pipeline", ["x"], r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
+    ("liang-whole", "constants", {"a1": 3.0}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
+    ("liang-as-published", "stages", [], r"stages must be a table, got \[\]"),
+    ("hazard", "preset", "; rm x", r'preset must be quick or full, got "; rm x"'),
+    ("reproduction", "readings", {}, r"readings must be a list, got {}"),
+    ("reproduction", "table1", ["skin"], r'table1\.0 must be a table, got "skin"'),
     *(
-        ("albedo-rational-diffuse", put(part, **{key: value}), words)
-        for part, key, value, words in (
-            ("crosscheck", "chi2", "much", r'crosscheck\.chi2 must be a number or null, got "much"'),
-            ("crosscheck", "constants", {"b": 1.0}, r"crosscheck\.constants\.b must be a table, got 1\.0"),
-            ("starts", "share_best", None, r"starts\.share_best must be a number, got null"),
-            ("starts", "outcomes", [{}], r"starts\.outcomes\.0\.count must be a whole number, got nothing"),
+        ("albedo-rational-diffuse", *row)
+        for row in (
+            ("crosscheck/chi2", "much", r'crosscheck\.chi2 must be a number or null, got "much"'),
+            ("crosscheck/constants", {"b": 1.0}, r"crosscheck\.constants\.b must be a table, got 1\.0"),
+            ("starts/share_best", None, r"starts\.share_best must be a number, got null"),
+            ("starts/outcomes", [{}], r"starts\.outcomes\.0\.count must be a whole number, got nothing"),
         )
     ),
     # Lists that belong together are of one length.
-    *(
-        ("burley-whole", change, rf".*{words}")
-        for change, words in (
-            (lose("quality", "regenerated", "rel", -1), "rel must be as long as quality.alpha"),
-            (lose("covariance", "model", -1), "covariance.model must be a square matrix"),
-            (lambda content: content["covariance"]["names"].append("zz"), "names must be of its constants, got 'zz'"),
-            (lose("derived", "value", -1), "derived.value must be as long as derived.alpha"),
-            (lose("quality", "published", "ks"), "quality.published.ks must be there"),
-        )
-    ),
-    ("hazard-refracting", lose("quality", "by_index", "rel", -1), r".*by_index.rel must be as long as .*.n"),
-    # Its own index and g, of which it is exported, are among those that a law spans.
-    *(
-        (f"hazard-{name}", change, rf".*{words}")
-        for name, change, words in (
-            ("refracting", put("setting", n=1.7), r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
-            ("refracting", put("setting", n=1.0), r"setting.n must be in \(1, 1.6\]"),
-            ("refracting", put(indices=[None, 1.6]), "indices must be a list of two numbers"),
-            ("forward", put("setting", g=0), r"g must be in .*, as its cosines are, got 0"),
-            ("forward", put("setting", g=0.96), r"g must be in .*, as its cosines are, got 0.96"),
-        )
-    ),
+    ("burley-whole", "quality/regenerated/rel/0", GONE, ".*rel must be as long as quality.alpha"),
+    ("burley-whole", "covariance/model/0", GONE, "covariance.model must be a square matrix"),
+    ("burley-whole", "covariance/names", lambda names: [*names, "zz"], ".*names must be of its constants, got 'zz'"),
+    ("burley-whole", "derived/value/0", GONE, "derived.value must be as long as derived.alpha"),
+    ("burley-whole", "quality/published/ks", GONE, "quality.published.ks must be there"),
+    ("hazard-refracting", "quality/by_index/rel/0", GONE, ".*by_index.rel must be as long as .*.n"),
+]
+# Its own index and g, of which it is exported, are among those that a law spans.
+OUTSIDE = [
+    ("refracting", "setting/n", 1.7, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
+    ("refracting", "setting/n", 1.0, r"setting.n must be in \(1, 1.6\]"),
+    ("refracting", "indices", [None, 1.6], "indices must be a list of two numbers"),
+    *(("forward", "setting/g", g, f".*g must be in .*, as its cosines are, got {g:g}") for g in (0, 0.96)),
 ]
 
 
-@pytest.mark.parametrize(("name", "change", "words"), DAMAGED, ids=[words[:40] for _, _, words in DAMAGED])
-def test_what_a_pipeline_needs_is_named(tmp_path, name, change, words):
-    path = changed(tmp_path, name, change)
+@pytest.mark.parametrize(
+    ("name", "place", "value", "words", "whole"),
+    [*((*row, True) for row in DAMAGED), *((f"hazard-{name}", *row, False) for name, *row in OUTSIDE)],
+)
+def test_what_a_pipeline_needs_is_named(spoilt, name, place, value, words, whole):
     with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
-        record.read(path, whole=not name.startswith("hazard-") or "by_index" in words)
+        record.read(spoilt(name, place, value), whole=whole)
 
 
 @pytest.mark.parametrize("part", ["crosscheck", "starts"])
-def test_what_a_recipe_may_ask_for_need_not_be_there(tmp_path, part):
-    assert record.read(changed(tmp_path, "albedo-rational-diffuse", lose(part)), whole=True)["law"] == "rational"
+def test_what_a_recipe_may_ask_for_need_not_be_there(spoilt, part):
+    assert record.read(spoilt("albedo-rational-diffuse", part), whole=True)["law"] == "rational"
 
 
 STRANGE = ["\x1b[31m", "\x00", "\x9b", "\u202e", "\u2066", "\ud800", "x" * 1001]
@@ -257,16 +229,12 @@ BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u202
 
 @pytest.mark.parametrize("place", ["title", "equations", "law", "a key"])
 @pytest.mark.parametrize("strange", [*BREAKS, *STRANGE], ids=ascii)
-def test_text_that_is_no_printable_line_is_refused(tmp_path, place, strange):
+def test_text_that_is_no_printable_line_is_refused(spoilt, place, strange):
     """It would become a comment in code, and would be shown on a terminal."""
-
-    def spoilt(content):
-        if place == "a key":
-            content["constants"][f"a{strange}"] = {"regenerated": 1.0}
-        else:
-            content[place] += f"{strange}import os"
-
-    path = changed(tmp_path, "hazard", spoilt)
+    if place == "a key":
+        path = spoilt("hazard", "constants", lambda own: {**own, f"a{strange}": {"regenerated": 1.0}})
+    else:
+        path = spoilt("hazard", place, lambda text: f"{text}{strange}import os")
     words = "damaged: .*one line of printable text|not a record: .*surrogates"
     with pytest.raises(RecordError, match=rf"mine\.json: is ({words})") as caught:
         record.read(path)
@@ -337,20 +305,12 @@ def test_no_flipped_byte_gets_past_as_another_error(tmp_path):
     assert named > len(whole) / 2
 
 
-def test_digest_tells_numbers_apart():
+def test_digest_tells_numbers_apart_and_versions_name_what_decides_them():
     a, b = np.arange(4.0), np.array([1.0, 2.0])
     assert record.digest(a, b) == record.digest(a[::-1][::-1], b)
     assert record.digest(a, b) != record.digest(a, b + 1e-15)
     assert len(record.digest()) == 64
-
-
-def test_versions_name_what_decides_the_numbers():
     assert {"profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy"} == set(record.versions())
-
-
-def test_a_record_error_is_an_input_error():
-    assert issubclass(RecordError, InputError)
-    assert json.loads(json.dumps(record.plain({"a": np.nan}))) == {"a": None}
 
 
 # What a measured thing says of itself, and when it no longer holds
