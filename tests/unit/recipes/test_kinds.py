@@ -32,7 +32,6 @@ TOY = '''\
 
 from functools import partial
 from pathlib import Path
-
 from mcml_sim import Setting
 from profilefit.recipes import record
 from profilefit.recipes.record import read
@@ -79,15 +78,11 @@ def test_every_kind_has_the_functions_of_the_shelf(kind):
     assert list(inspect.signature(kind.module.find).parameters)[:2] == ["name", "folder"]
 
 
-NAMES = {
-    "law": ("hazard", "dipole", "liang-inverse-whole"),
-    "stack": ("skin",),
-    "phase": ("petzold",),
-    "albedo_map": ("albedo liang", "chiang", "albedo-rational-diffuse"),
-}
+FIRST = dict.fromkeys(("hazard", "dipole", "liang-inverse-whole"), "law") | {"skin": "stack", "petzold": "phase"}
+FIRST |= dict.fromkeys(("albedo liang", "chiang", "albedo-rational-diffuse"), "albedo_map")
 
 
-@pytest.mark.parametrize(("name", "key"), [(name, key) for key, names in NAMES.items() for name in names])
+@pytest.mark.parametrize(("name", "key"), FIRST.items())
 def test_a_name_is_that_of_the_first_kind_that_has_it(name, key):
     first = next(kind for kind in KINDS if kind.find(name) is not None)
     assert first.key == key
@@ -185,18 +180,14 @@ def test_traced_light_resumes(tmp_path):
         np.testing.assert_array_equal(one.energy, first.energy)
 
 
-@pytest.fixture
-def sixth(monkeypatch, tmp_path):
+def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(command, monkeypatch, tmp_path):
     """Two files are touched: the toy's own, and a line of the table of kinds."""
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "dice.py").write_text(TOY)
     monkeypatch.setattr(kinds, "__path__", [*kinds.__path__, str(tmp_path / "more")])
     monkeypatch.setattr(kinds, "KINDS", (*KINDS, Kind("dice", "a die", "dice", "dice", plural="dice")))
-    yield
-    sys.modules.pop("profilefit.recipes.kinds.dice", None)
-
-
-def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(sixth, command, monkeypatch):
+    monkeypatch.setitem(sys.modules, "profilefit.recipes.kinds.dice", None)  # so that it is gone afterwards
+    monkeypatch.delitem(sys.modules, "profilefit.recipes.kinds.dice")
     monkeypatch.setattr("profilefit.recipes.workers.cores", lambda: 1)
     Path("fair.dice").write_text("1\n2\n3\n4\n5\n6\n")
     status, out, err = command("regenerate", "fair.dice", "--seed", "7", "--out", "mine", "--json", "--quiet")

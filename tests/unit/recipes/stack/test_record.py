@@ -45,17 +45,16 @@ mu_a = [0.20, 0.80, 1.2]
 mu_s = [1.13, 1.2, 1.3]
 g = 0.0
 """
+LAYERS = STACK[STACK.index("[[layers]]") :]
 VEIL = """\
 [[layers]]
-name = "veil"
 n = 1.38
 mu_a = 0.1
 mu_s = [3, 4, 5]
 g = 0.0
 thickness = 0.05
-
 """
-THREE = VEIL + STACK[STACK.index("[[layers]]") :]
+THREE = VEIL + LAYERS
 LAST = "mu_s = [1.13, 1.2, 1.3]\ng = 0.0"
 # Near what a fit of heart muscle gives for its interface; each channel and interface here has its own.
 CONSTANTS = {"w": 0.171, "u": -0.189, "g1": 1.03, "g2": 1.49, "b1": 0.027, "b2": 0.0075, "h0": 0.81, "h1": 1.08}
@@ -75,8 +74,7 @@ def constants(medium, number):
 def made(illumination, medium, starts=(), tracing=None):
     """What `_channel` gives after a minute, at once: exact light has no photons, and nothing was fitted."""
     setting = Setting(illumination, n=medium.layers[0].n)
-    own = catalogue.load("hazard", setting=setting).constants()
-    number = len(medium.layers) - 1
+    own, number = catalogue.load("hazard", setting=setting).constants(), len(medium.layers) - 1
     named = {f"{i + 1}.{name}": one for i in range(number) for name, one in constants(medium, i).items()}
     return {
         "constants": {name: {**FITTED, "regenerated": value} for name, value in named.items()},
@@ -153,19 +151,16 @@ def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, t
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_grey_layers_are_fitted_once(asked, file, tmp_path):
+def test_grey_layers_are_fitted_once_and_starts_are_those_of_their_colours(asked, file, tmp_path):
     grey = ("[0.05, 0.20, 0.35]", "0.2", "[1.8, 2.2, 2.6]", "2", "[0.20, 0.80, 1.2]", "0.8", "[1.13, 1.2, 1.3]", "1.2")
     path = recorded(stacks.fit(request(file(*grey)), RUN), tmp_path)
     assert len(asked) == 1
     red, green, blue = load(path).laws
     assert red.constants() == green.constants() == blue.constants()
-
-
-def test_starts_of_the_file_are_those_of_its_colours(asked, file, tmp_path):
     rows = {name: [0.2, -0.1, *[1.0] * 6, float(place)] for place, name in enumerate(CHANNELS, start=1)}
     text = "\n[start]\n" + "\n".join(f"{name} = [{row}]" for name, row in rows.items())
     recorded(stacks.fit(request(file(text=STACK + text)), RUN), tmp_path)
-    assert [given[2][0].tolist() for given in asked] == list(rows.values())
+    assert [given[2][0].tolist() for given in asked[1:]] == list(rows.values())
 
 
 def test_the_record_says_what_it_is_worth(written):
@@ -267,17 +262,12 @@ def test_a_damaged_record_is_one_line(written, reader, place, value, message):
     refused(reader, written, message)
 
 
-def test_what_is_a_stack(file, tmp_path):
-    recipe = tmp_path / "recipe.toml"
-    recipe.write_text((fits_folder() / "hazard.toml").read_text())
-    assert request(file())
-    assert request("heart")
+def test_what_is_a_stack_and_what_its_file_says(file, tmp_path):
+    (tmp_path / "recipe.toml").write_text((fits_folder() / "hazard.toml").read_text())
     assert request("heart").stack.names == ("epicardium", "heart muscle")
-    for name in (str(recipe), "hazard", "nothing", str(tmp_path / "nothing.toml"), "a" * 300, "a" * 300 + ".toml"):
+    others = ("hazard", "nothing", "a" * 300, "a" * 300 + ".toml")
+    for name in (*others, str(tmp_path / "recipe.toml"), str(tmp_path / "nothing.toml")):
         assert not request(name)
-
-
-def test_what_a_file_says(file):
     of = request(file(name="mine"))
     assert (of.name, of.title, of.illumination) == ("mine", "Muscle under its skin", "diffuse")
     plain = request(file(STACK.partition("\n[[layers]]")[0], ""))
@@ -287,7 +277,7 @@ def test_what_a_file_says(file):
     assert drawn.stack.media == of.stack.media
 
 
-LIGHT, TITLE, LAYERS = 'illumination = "diffuse"', '"Muscle under its skin"', STACK[STACK.index("[[layers]]") :]
+LIGHT, TITLE = 'illumination = "diffuse"', '"Muscle under its skin"'
 IN_START = [
     ("violet = [[1]]", "keys must be of red, green, blue, got 'violet'"),
     ("red = [[1, 2]]", r"red must be lists of w, u, .* one an interface.*, got \[\[1.0, 2.0\]\]"),
@@ -334,7 +324,7 @@ def test_what_no_law_is_for_is_refused_before_any_fit(asked, file, tmp_path, old
     assert not asked
 
 
-def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
+def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, asked, file, tmp_path):
     """Not after two colours, either; and an old record stays as it was."""
 
     def fails(illumination, medium, starts, tracing):
@@ -343,19 +333,20 @@ def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
         return made(illumination, medium)
 
     of = request(file())
-    monkeypatch.setattr(stacks, "_channel", fails)
-    with pytest.raises(FloatingPointError, match="blue diverges"):
-        recorded(stacks.fit(of, RUN), tmp_path / "mine")
+
+    def failing(of):
+        with monkeypatch.context() as patched:
+            patched.setattr(stacks, "_channel", fails)
+            with pytest.raises(FloatingPointError, match="blue diverges"):
+                recorded(stacks.fit(of, RUN), tmp_path / "mine")
+
+    failing(of)
     assert not (tmp_path / "mine").exists()
-    monkeypatch.setattr(stacks, "_channel", made)
     path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
     before = path.read_bytes()
-    monkeypatch.setattr(stacks, "_channel", fails)
-    with pytest.raises(FloatingPointError, match="blue diverges"):
-        recorded(stacks.fit(of.changed(title="another"), RUN), tmp_path / "mine")
+    failing(of.changed(title="another"))
     assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
     (tmp_path / "full").write_text("in the way")
-    monkeypatch.setattr(stacks, "_channel", made)
     with pytest.raises(OutputError, match=r"cannot write into .*full"):
         recorded(stacks.fit(of, RUN), tmp_path / "full")
 
@@ -387,6 +378,11 @@ def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
     for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
         assert matching(request(file(*pieces, name="x")), folder) is None
     assert matching(same, tmp_path) is None
+    # The one that is asked for must be whole: its layers say which one it is, and to go on without it would hide that.
+    spoil(written, "half_spaces/green/1/a00", lambda a: 1.001 * a)
+    with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
+        matching(request(file()), folder)
+    assert matching(request(file("0.3\n", "0.31\n")), folder) is None
 
 
 CAUSES = [
@@ -411,14 +407,6 @@ def test_a_damaged_record_of_something_else_stops_nothing(written, file, tmp_pat
         assert (found and found.name) == name
         assert len(said) == 1
         assert str(said[0].message).isprintable()
-
-
-def test_the_record_that_is_asked_for_must_be_whole(written, file, tmp_path):
-    """Its layers say which one it is: to go on without it would hide that."""
-    spoil(written, "half_spaces/green/1/a00", lambda a: 1.001 * a)
-    with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
-        matching(request(file()), tmp_path / "mine")
-    assert matching(request(file("0.3\n", "0.31\n")), tmp_path / "mine") is None
 
 
 def test_a_record_matches_an_image_of_thicknesses(asked, file, tmp_path):
