@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
 
 import equinox as eqx
@@ -54,14 +55,11 @@ def test_an_entry_tells_of_what_there_is(name):
 
 
 def test_no_record_is_of_an_index_that_its_law_is_not_made_for():
+    """Dipoles hold for any."""
     for find in (catalogue.profile_laws, catalogue.albedo_laws):
         for one in find(fits_folder(), matched=False):
             assert one.law.entry.n.holds(one.setting.n), one.label
-
-
-@pytest.mark.parametrize("name", ["dipole", "better_dipole"])
-def test_dipoles_hold_for_any_index(name):
-    for n in (0.5, 3.0):
+    for name, n in product(("dipole", "better_dipole"), (0.5, 3.0)):
         law = profilefit.load(name, setting=Setting(n=n))
         assert law.entry.n.holds(n)
         assert 0.0 < law.profile(1.0, 0.8) < 1.0
@@ -164,31 +162,26 @@ weighting = { objective = "energy" }
 """
 
 
-@pytest.fixture
-def toy(monkeypatch, tmp_path):
-    """A folder with the recipe of a law that is in the table; its file and its text are there, too."""
+@pytest.mark.filterwarnings("ignore:no record 'albedo-rational'")
+def test_a_law_is_added_by_one_line_of_the_table(monkeypatch, tmp_path):
+    """From its recipe by a fit to a record, from that to a law by name, and from that to a text."""
     monkeypatch.setitem(sys.modules, "toys.toy", SimpleNamespace(Toy=Toy))
     monkeypatch.setitem(laws.PROFILES, "toy", "toys.toy.Toy")
     shipped = emit.read_text
     monkeypatch.setattr(emit, "read_text", lambda file: TOY_TEXT if file == "toy" else shipped(file))
     (tmp_path / "toy.toml").write_text(TOY_RECIPE)
-    return tmp_path
-
-
-@pytest.mark.filterwarnings("ignore:no record 'albedo-rational'")
-def test_a_law_is_added_by_one_line_of_the_table(toy):
-    """From its recipe by a fit to a record, from that to a law by name, and from that to a text."""
-    chosen = recipe.find("toy", toy)
+    chosen = recipe.find("toy", tmp_path)
     require_known(chosen)
-    start = starting_law(chosen, toy)
+    start = starting_law(chosen, tmp_path)
     assert start.constants() == {"q0": 1.0, "q1": 1.0}
     edges = np.append(0.0, np.geomspace(0.1, 20.0, 12))
     found = profilefit.fit(profilefit.Profiles.from_exact(np.linspace(0.3, 0.9, 4), edges), start, jackknife=False)
     assert found.result == "converged"
     constants = {name: {"regenerated": value} for name, value in found.constants.items()}
-    record.write(toy, "toy", {"law": "toy", "pipeline": "profile", "setting": Setting(), "constants": constants}, {})
+    told = {"law": "toy", "pipeline": "profile", "setting": Setting(), "constants": constants}
+    record.write(tmp_path, "toy", told, {})
     assert "toy" in profilefit.names()
-    law = profilefit.load("toy", folder=toy)
+    law = profilefit.load("toy", folder=tmp_path)
     assert law.constants() == pytest.approx(found.constants, rel=1e-11)
     names = {}
     exec(emit.law_text(law, "python"), names)
@@ -233,7 +226,7 @@ class Halver(Doubler):
     constant: float
 
 
-def test_numbers_give_a_float_and_arrays_float64():
+def test_numbers_give_a_float_arrays_float64_and_jax_jax():
     for x in (3, 3.0, np.float32(3.0), np.array(3)):
         assert type(Doubler().twice(x)) is float
         assert Doubler().twice(x) == 6.0
@@ -244,17 +237,7 @@ def test_numbers_give_a_float_and_arrays_float64():
     assert Doubler().twice(0.1) == 0.2
     assert not jax.config.jax_enable_x64
     assert (Doubler.twice.__name__, Doubler.twice.__doc__) == ("twice", "Twice x, and y.")
-
-
-def test_constants_may_be_many(burley):
-    """As the draws of a posterior are: a row a draw."""
-    draws = replace(burley, s0=np.array([[1.8], [1.9]]))
-    expected = [replace(burley, s0=s0).profile([0.1, 1.0, 3.0], 0.9) for s0 in (1.8, 1.9)]
-    np.testing.assert_allclose(draws.profile([0.1, 1.0, 3.0], 0.9), expected, rtol=1e-12)
-
-
-def test_jax_anywhere_stays_jax():
-    one = jnp.float32(1.0)
+    one = jnp.float32(1.0)  # jax anywhere stays jax
     for out in (Doubler().twice(one), Doubler().twice(1.0, y=one), Halver(one).twice(jnp.float32(1.0))):
         assert isinstance(out, jax.Array)
         assert out.dtype == jnp.float32
@@ -285,6 +268,10 @@ def test_a_grid_keeps_its_shape(burley):
     for row, a in zip(found[0], alpha[:, 0], strict=True):
         np.testing.assert_allclose(row, burley.profile(r, a, 1.5), rtol=1e-14)
     assert burley.profile(1.0, [0.5]).shape == (1,)
+    # Constants may be many, as the draws of a posterior are: a row a draw.
+    draws = replace(burley, s0=np.array([[1.8], [1.9]]))
+    expected = [replace(burley, s0=s0).profile([0.1, 1.0, 3.0], 0.9) for s0 in (1.8, 1.9)]
+    np.testing.assert_allclose(draws.profile([0.1, 1.0, 3.0], 0.9), expected, rtol=1e-12)
 
 
 def test_no_length_and_no_constant_compiles_anew(burley):

@@ -27,21 +27,21 @@ def make_record(folder, name, law, values, pipeline="profile", setting=None):
     return record.write(folder, name, content, {})
 
 
-@pytest.fixture
-def mine(tmp_path):
-    """A record of the printed constants of normalized diffusion."""
-    return make_record(tmp_path, "mine", "burley", constants_of("burley"))
-
-
 def test_names():
     assert {"liang", "burley", "gaussians"} <= set(profilefit.names())
     assert isinstance(profilefit.names(), tuple)
     assert not [name for name in profilefit.names() if ":" in name]
+    for name in ("liang", "rational"):
+        law = profilefit.albedo_law(name)
+        assert isinstance(law, AlbedoLaw)
+        # Equation (8) is right to .005 in alpha where A <= .75; the rational one to 1e-5.
+        assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name, kind in profile_classes().items() if kind.entry.records or not kind.constant_names()]
-)
+LOADED = [name for name, kind in profile_classes().items() if kind.entry.records or not kind.constant_names()]
+
+
+@pytest.mark.parametrize("name", LOADED)
 def test_every_law_loads_as_regenerated_and_is_a_law(name):
     law = profilefit.load(name)
     assert isinstance(law, ProfileLaw)
@@ -51,14 +51,6 @@ def test_every_law_loads_as_regenerated_and_is_a_law(name):
     if law.albedo is not None:  # a diffusion model has a reflectance of its own
         assert float(law.albedo.reflectance(0.8)) == pytest.approx(exact.reflectance(0.8), abs=1e-5)
     assert all(isinstance(sampler, Sampler) and sampler.law == law for sampler in law.samplers.values())
-
-
-@pytest.mark.parametrize("name", ["liang", "rational"])
-def test_every_map_loads_as_regenerated(name):
-    law = profilefit.albedo_law(name)
-    assert isinstance(law, AlbedoLaw)
-    # Equation (8) is right to .005 in alpha where A <= .75; the rational one to 1e-5.
-    assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
 
 
 def test_printed_sets_by_name():
@@ -81,6 +73,12 @@ def test_a_records_path(tmp_path):
     path = make_record(tmp_path, "map", "liang", MAP, pipeline="albedo")
     assert profilefit.albedo_law("liang", str(path)).constants() == MAP
     with pytest.raises(RecordError, match=r"holds constants of law 'albedo liang', got a request for 'liang'"):
+        profilefit.load("liang", str(path))
+    path = make_record(tmp_path, "other", "burley", constants_of("burley"), setting=DIFFUSE)
+    with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
+        profilefit.load("burley", str(path), Setting())
+    assert profilefit.load("burley", str(path)).setting == DIFFUSE
+    with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
         profilefit.load("liang", str(path))
 
 
@@ -122,15 +120,6 @@ def test_what_there_is_not_is_told_with_what_is_accepted(load, arguments, words)
         load(*arguments)
 
 
-def test_a_record_of_another_setting_or_law_is_refused(tmp_path, mine):
-    path = make_record(tmp_path, "other", "burley", constants_of("burley"), setting=DIFFUSE)
-    with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
-        profilefit.load("burley", str(path), Setting())
-    assert profilefit.load("burley", str(path)).setting == DIFFUSE
-    with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
-        profilefit.load("liang", str(mine))
-
-
 DAMAGE = [
     *({"constants": {"s0": one}} for one in ({"published": 1.0}, {"regenerated": None}, {"regenerated": "much"})),
     {"constants": {"s9": {"regenerated": 1.0}}},
@@ -140,7 +129,8 @@ DAMAGE = [
 
 
 @pytest.mark.parametrize("damage", DAMAGE, ids=str)
-def test_damaged_records_are_told_in_one_line(mine, damage):
+def test_damaged_records_are_told_in_one_line(tmp_path, damage):
+    mine = make_record(tmp_path, "mine", "burley", constants_of("burley"))
     content = {**json.loads(mine.read_text()), **damage}
     mine.write_text(json.dumps({key: value for key, value in content.items() if value is not ...}))
     with pytest.raises(RecordError, match=r"mine"):

@@ -101,15 +101,12 @@ def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
     assert np.all(inversion_error(catalogue.load("liang", "published"), alpha) > 0.03)
 
 
-def test_printed_sets_are_those_of_the_recipes_setting():
+def test_printed_sets_are_those_of_the_recipes_setting_and_who_needs_photons():
     burley = recipe.find("burley-whole", FITS)
     searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
     assert (searchlight["published"]["s0"], diffuse["published"]["s0"]) == (1.85, 1.9)
     assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
     assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
-
-
-def test_who_needs_photons():
     orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
     assert needs_photons(orders)
     assert not needs_photons(exactly)
