@@ -57,7 +57,8 @@ OF_LIGHT: Fields = {
     "by_count": LIST,
     **under("by_count.*", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE, " ".join(MEASURED): NUMBERS}),
 }
-SHOWN: Fields = USED | {key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()}
+SUMS_SHOWN = {key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()}
+SHOWN: Fields = {**USED, **SUMS_SHOWN}
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 

@@ -132,9 +132,9 @@ def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
     return np.append(0.0, np.geomspace(near, TRACED_FARTHEST / min(rates), RINGS))
 
 
-def lowest(found: Sequence[Solution]) -> Solution:
+def lowest(solutions: Sequence[Solution]) -> Solution:
     """Return the solution of the lowest cost; one that is not finite comes last."""
-    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+    return min(solutions, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
 def traced_half_space(layer: Layer, setting: Setting, tracing: Tracing = USUAL, offset: int = 0) -> LayerLaw:
