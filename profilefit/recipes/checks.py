@@ -47,6 +47,7 @@ SMALLEST_SHARE = 1e-7
 LARGEST_CUT = 0.1  # of a standard error of A: what the end of the longest paths may take away
 LEAST_CHANCE = 0.0027  # of a difference by noise alone that is none: three standard errors of a single constant
 AGREE, DIFFER = "the fits agree", "the fits differ by more than the photons' noise"
+NO_ERRORS = "the photon fit has no finite errors: leave out radial bins that hold next to no light"
 # Widths of rings [of those fitted], as many at once as the jackknife has groups: that solver is compiled already. Of
 # the trusted ones the error is made; wider rings show the order.
 FACTORS, TRUSTED, ORDER = tuple(range(1, estimate.JACKKNIFE_GROUPS + 1)), (2, 3), 2
@@ -163,9 +164,7 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
     covariance = np.asarray(photons.statistical)
     failed = [(name, each) for name, each in (("exact", exact), ("photon", photons)) if not each.solution.converged]
     if failed or photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
-        result = "the photon fit has no finite errors: leave out radial bins that hold next to no light"
-        if failed:
-            result = f"the {failed[0][0]} fit failed: {failed[0][1].result}"
+        result = f"the {failed[0][0]} fit failed: {failed[0][1].result}" if failed else NO_ERRORS
         covariance = np.full((one.size,) * 2, np.nan)
         distance, rank, chance = np.nan, 0, np.nan
     else:

@@ -193,10 +193,8 @@ def description(recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit)
         "covariance": {"names": result.free, **covariances},
         "discrepancy": off.content(),
         "fit": {
-            "result": result.result,
-            "steps": result.solution.steps,
-            "condition_number": result.solution.condition_number,
-            "residuals": result.structure,
+            **{key: getattr(result.solution, key) for key in ("steps", "condition_number")},
+            **{"result": result.result, "residuals": result.structure},
         },
         "posterior": {
             c.kind: {

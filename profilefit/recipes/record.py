@@ -36,6 +36,7 @@ DIGITS = 12
 CONVERGED = "converged"
 SEARCHLIGHT = Setting()
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
+Problem = Callable[[dict[str, Any]], str | None]  # in words, of a record's content
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
 
@@ -88,9 +89,7 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
         return {f"{MISFIT}{ending}" if key == f"{MISFIT_BEFORE}{ending}" else key: one for key, one in table.items()}
 
     found = {**content, "format": FORMAT}
-    for name in ("covariance", "posterior"):
-        if name in found:
-            found[name] = renamed(found[name])
+    found |= {name: renamed(found[name]) for name in ("covariance", "posterior") if name in found}
     if isinstance(found.get("constants"), dict):
         found["constants"] = {name: renamed(one, "_error") for name, one in found["constants"].items()}
         for one in found["constants"].values():
@@ -100,11 +99,7 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_of(
-    path: Path,
-    pipeline: str,
-    words: str,
-    shown: schema.Fields | None = None,
-    problem: Callable[[dict[str, Any]], str | None] = lambda content: None,
+    path: Path, pipeline: str, words: str, shown: schema.Fields | None = None, problem: Problem | None = None
 ) -> dict[str, Any]:
     """Read a record of one pipeline, `words` what it is, which holds what is `shown`; RecordError on any other.
 
@@ -113,7 +108,7 @@ def read_of(
     content = read(path)
     if content["pipeline"] != pipeline:
         raise RecordError(f"{path}: must be {words}, got pipeline {content['pipeline']!r}")
-    if text := schema.mistyped(content, shown or {}) or problem(content):
+    if text := schema.mistyped(content, shown or {}) or (problem(content) if problem else None):
         raise damaged(path, text)
     return content
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from mcml_sim import Orders
 from mcml_sim.media.arrays import Floats
-from profilefit.errors import RecipeError
 from profilefit.fitting import staged
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
@@ -57,8 +56,7 @@ def _inverse(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordCont
 
 def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
     rings = recipe.rings
-    if rings is None:
-        raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
+    assert rings is not None  # a recipe of this pipeline has them
     start = starting_law(recipe, run.out)
     truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
     points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
