@@ -1,6 +1,7 @@
 """The paper: its protocol, readings of it and its table 1, on hand-made input and with controls that say no."""
 
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -93,12 +94,6 @@ def test_simpson_on_the_spline_is_the_exact_ring():
 # Readings
 
 
-@pytest.fixture(scope="module")
-def found():
-    """Takes 61 fits."""
-    return reproduction.readings()
-
-
 def _of(found, equation, *words):
     return [r for r in found if r["equation"] == equation and all(w in r["choices"] for w in words)]
 
@@ -110,8 +105,9 @@ def test_verdict_follows_the_figures():
 
 
 @pytest.mark.slow
-def test_what_comes_out_of_the_protocol_and_what_does_not(found):
-    """Readings are plain data, and their verdicts those of their distances."""
+def test_what_comes_out_of_the_protocol_and_what_does_not():
+    """Readings are plain data, and their verdicts those of their distances: 61 fits."""
+    found = reproduction.readings()
     for reading in found:
         assert reading["verdict"] == reproduction.judge(reading["constant_distance"], reading["curve_distance"])
         assert set(reading["constants"]) == set(reading["published"])
@@ -146,26 +142,13 @@ def test_printed_b0_breaks_the_papers_own_energy():
 # Table 1
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return reproduction.table1({})
-
-
-def _row(rows, material, model, choice="one stride before (6)"):
-    wanted = {"material": material, "channel": "red", "model": model, "range_choice": choice}
-    (row,) = [r for r in rows if r.items() >= wanted.items()]
-    return row
-
-
 def test_measures_by_hand():
     assert reproduction.mean_squared_errors(np.array([1.0, 2, 3, 4]), np.array([1.0, 0, 3, 1])) == (2.0, 4.5, 3.25)
     r2 = reproduction.r_squared(np.array([1.0, 2, 3, 1, 2, 3]), np.array([1.0, 2, 3, 0, 2, 4]))
     assert r2["determination"][:2] == pytest.approx([1.0, 1 - 2 / 8])
     assert r2["explained"][:2] == pytest.approx([1.0, 2 / 4])
     assert r2["correlation"][:2] == pytest.approx([1.0, 1.0])
-
-
-def test_definitions_of_r_squared_agree_for_a_regression_only():
+    # Definitions of R^2 agree for a regression only.
     x = np.linspace(0, 1, 50)
     data = np.concatenate([x + 0.1 * np.sin(40 * x)] * 2)
     slope, shift = np.polyfit(np.tile(x, 2), data, 1)
@@ -185,29 +168,29 @@ def test_models_hold_their_energy_and_materials_are_those_of_the_table():
     assert BY_NAME["ketchup"].alpha == pytest.approx([0.7469, 0.0673, 0.0203], abs=1e-4)
 
 
-def test_apple_comes_out_one_stride_before_the_end_of_the_walk_and_ketchup_does_not(rows):
-    diffusion = _row(rows, "apple", NORMALIZED_DIFFUSION)
+def test_what_comes_out_of_table_1_and_what_does_not():
+    """Apple comes out one stride before the end of the walk, ketchup does not.
+
+    Printed R^2 is explained over explained and residual; and one printed half contradicts its whole.
+    """
+    rows = reproduction.table1({})
+    wanted = {"channel": "red", "range_choice": "one stride before (6)"}
+    by_model = {(row["material"], row["model"]): row for row in rows if row.items() >= wanted.items()}
+    diffusion, corrected = by_model["apple", NORMALIZED_DIFFUSION], "paper, b0 = .0641"
     assert diffusion["range_mm"] == pytest.approx(8.0)
     assert diffusion["mse_over_printed"] == pytest.approx((1, 1, 1), abs=0.03)
-    assert _row(rows, "apple", "paper, b0 = .0641")["mse_over_printed"] == pytest.approx((1, 1, 1), abs=0.08)
-    assert min(_row(rows, "apple", "paper as printed")["mse_over_printed"]) > 1000
-    ketchup = [r for r in rows if r["material"] == "ketchup"]
-    assert min(max(abs(x - 1) for x in r["mse_over_printed"]) for r in ketchup) > 0.15
+    assert by_model["apple", corrected]["mse_over_printed"] == pytest.approx((1, 1, 1), abs=0.08)
+    assert min(by_model["apple", "paper as printed"]["mse_over_printed"]) > 1000
+    ketchup = [row for row in rows if row["material"] == "ketchup"]
+    assert min(max(abs(x - 1) for x in row["mse_over_printed"]) for row in ketchup) > 0.15
     assert len(json.loads(json.dumps(rows, allow_nan=False))) == len(rows)
-
-
-def test_printed_r_squared_is_explained_over_explained_and_residual(rows):
-    for material in ("apple", "marble"):
-        for model in (NORMALIZED_DIFFUSION, "paper, b0 = .0641"):
-            gaps = _row(rows, material, model)["r2_minus_printed"]
-            first, second, whole = np.abs(gaps["explained"])
-            assert max(first, whole) < 0.001
-            assert second < abs(gaps["determination"][1]) / 3
-    # and what is not reproduced stays visible: normalized diffusion's .50 over the second half
-    assert _row(rows, "apple", NORMALIZED_DIFFUSION)["r2_minus_printed"]["explained"][1] > 0.1
-
-
-def test_one_printed_half_contradicts_its_whole():
-    off = {(c["material"], c["model"]): c["off"] for c in reproduction.printed_halves()}
+    for key in product(("apple", "marble"), (NORMALIZED_DIFFUSION, corrected)):
+        gaps = by_model[key]["r2_minus_printed"]
+        first, second, whole = np.abs(gaps["explained"])
+        assert max(first, whole) < 0.001
+        assert second < abs(gaps["determination"][1]) / 3
+    # And what is not reproduced stays visible: normalized diffusion's .50 over the second half.
+    assert diffusion["r2_minus_printed"]["explained"][1] > 0.1
+    off = {(one["material"], one["model"]): one["off"] for one in reproduction.printed_halves()}
     assert off.pop(("apple", "paper")) > 0.004
     assert max(map(abs, off.values())) < 0.0005

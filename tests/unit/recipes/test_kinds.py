@@ -92,11 +92,19 @@ def test_a_name_is_that_of_the_first_kind_that_has_it(name, key):
             first.find(name, n=1.4)
 
 
-def test_a_record_by_its_path_is_of_its_own_kind():
+def test_records_of_paths_and_names_are_of_their_own_kinds(tmp_path):
+    """A name means the first record of it, and those beside that."""
     for folder, key in (("stacks", "stack"), ("gaussians", "gaussians"), ("phases", "phase")):
         path = next((fits_folder() / folder).glob("*.json"))
         assert [kind.key for kind in KINDS if kind.find(str(path)) is not None] == [key]
     assert BY_KEY["law"].find("hazard", n=1.4).setting.n == 1.4
+    found = records_of(["skin", "hazard", "petzold"])
+    keys = [("stack", "skin"), ("gaussians", "skin"), ("law", "hazard"), ("phase", "petzold")]
+    assert [(kind.key, name) for kind, name, _ in found] == keys
+    with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
+        records_of(["petzhold"])
+    with pytest.raises(RecordError, match="has no records"):
+        records_of(["skin"], tmp_path)
 
 
 def test_every_name_that_ships_is_requested_of_its_kinds():
@@ -107,16 +115,6 @@ def test_every_name_that_ships_is_requested_of_its_kinds():
     assert {one.pipeline for one in keys["albedo_map"]} == {"albedo"}
     shipped = [path for place in ("", "*/") for path in fits_folder().glob(f"{place}*.json")]
     assert len(found) == len([path for path in shipped if path.parent.name != "evidence"])
-
-
-def test_records_of_names_are_those_beside_the_first(tmp_path):
-    found = records_of(["skin", "hazard", "petzold"])
-    keys = [("stack", "skin"), ("gaussians", "skin"), ("law", "hazard"), ("phase", "petzold")]
-    assert [(kind.key, name) for kind, name, _ in found] == keys
-    with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
-        records_of(["petzhold"])
-    with pytest.raises(RecordError, match="has no records"):
-        records_of(["skin"], tmp_path)
 
 
 TRACED = Medium((Layer(1.4, 0.1, 10.0, 0.8, 0.5), Layer(1.4, 0.5, 5.0, 0.5, np.inf)))

@@ -31,10 +31,7 @@ def test_round_trip(tmp_path):
     assert sorted(arrays) == ["alpha", "samples"]
     np.testing.assert_array_equal(arrays["samples"], ARRAYS["samples"])
     assert record.available(path.parent) == {"mine": path}
-
-
-def test_the_same_content_is_the_same_bytes(tmp_path):
-    """Whatever the order of keys, and whenever it is written."""
+    # The same content is the same bytes, whatever the order of keys, and whenever it is written.
     turned = {**dict(reversed(CONTENT.items())), "constants": dict(reversed(CONTENT["constants"].items()))}
     first, again = (record.write(tmp_path / d, "mine", c, ARRAYS) for d, c in (("a", CONTENT), ("b", turned)))
     os.utime(first, (0, 0))

@@ -139,7 +139,11 @@ def shipped():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_stack_has_its_sums(shipped, name):
-    """Of the layers that its file has; all fits converged, each error there where it applies."""
+    """Of the layers that its file has; all fits converged, each error there where it applies.
+
+    It is as far from its light as it says, by the laws that it makes, in their own lengths; those of another colour are
+    farther.
+    """
     found = shipped[name]
     assert record.plain(found.stack.media) == record.plain(request(name).stack.media)
     assert found.content["fit"]["result"] == "converged"
@@ -149,11 +153,6 @@ def test_a_shipped_stack_has_its_sums(shipped, name):
         assert one["free"] or one["regenerated"] in (0, 1), place
         assert all(one[key] > 0 for key in known), place
 
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_a_shipped_record_is_as_far_from_its_light_as_it_says(shipped, name):
-    """By the laws that it makes, in their own lengths; those of another colour are farther."""
-    found = shipped[name]
     units = [medium.layers[0].mfp for medium in found.stack.media]
 
     for light, count in product(ILLUMINATIONS, (2, 6)):
