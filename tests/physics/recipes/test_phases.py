@@ -73,15 +73,15 @@ def test_every_form_is_a_phase_function(name):
         assert mean == pytest.approx(2 * np.pi * np.trapezoid(p * x, x) + left, abs=5e-4)
 
 
-@pytest.mark.parametrize(
-    ("factor", "unit", "line"),
-    [
-        (1.0, " [1/sr]", "over all directions, 0.9993."),
-        (0.4367, " [1/(m sr)]", "over all directions, b = 0.4364 1/m."),
-        (0.4367, " [cm^-1 sr^-1]", "over all directions, b = 0.4364 1/cm."),
-        (4 * np.pi, "", "over all directions, 12.56 (4 pi times 0.9993)."),
-    ],
-)
+SCALES = [
+    (1.0, " [1/sr]", "over all directions, 0.9993."),
+    (0.4367, " [1/(m sr)]", "over all directions, b = 0.4364 1/m."),
+    (0.4367, " [cm^-1 sr^-1]", "over all directions, b = 0.4364 1/cm."),
+    (4 * np.pi, "", "over all directions, 12.56 (4 pi times 0.9993)."),
+]
+
+
+@pytest.mark.parametrize(("factor", "unit", "line"), SCALES)
 def test_a_table_of_any_scale_with_a_row_at_zero(tmp_path, factor, unit, line):
     degrees, path = np.arange(181.0), tmp_path / "table.csv"
     values = factor * HenyeyGreenstein(0.8).pdf(np.cos(np.radians(degrees)))
@@ -128,14 +128,6 @@ def test_shares_of_angles_without_rows(tmp_path):
                 assert min(both) * 0.99 < share < max(both) * 1.01
 
 
-@pytest.mark.parametrize(("last", "other"), [(0.09, pytest.approx(0.0759, rel=0.05)), (1e300, 1e3)])
-def test_a_last_row_that_is_noise(tmp_path, last, other):
-    """Two rows side by side do not decide what lies beyond, and no share is infinite."""
-    path = tmp_path / "table.csv"
-    path.write_text(HEAD + "".join(f"{a}, 0.08\n" for a in range(1, 151)) + f"150.01, {last}\n")
-    assert read_phase(path).spans[-1]["other"] == other
-
-
 def test_the_lines_of_the_guide(tmp_path):
     path, degrees = tmp_path / "gaps.csv", np.degrees(PETZOLD.angles)
     kept = (degrees > 0.3) & ((degrees < 26) | (degrees > 64)) & (degrees < 161)
@@ -146,7 +138,7 @@ def test_the_lines_of_the_guide(tmp_path):
     assert lines in (ROOT / "docs" / "guide" / "phases.md").read_text()
 
 
-def test_a_first_gap_under_a_row_at_zero(tmp_path):
+def test_a_first_gap_under_a_row_at_zero_and_a_last_row_that_is_noise(tmp_path):
     """A peak that 5 degrees do not resolve: the scale is 30 % off, and the difference of both rules says so."""
     data = read_phase(table(tmp_path / "table.csv", HenyeyGreenstein(0.95), degrees=np.arange(0.0, 181, 5)))
     (span,) = data.spans
@@ -155,6 +147,11 @@ def test_a_first_gap_under_a_row_at_zero(tmp_path):
     right = 1 - HenyeyGreenstein(0.95).invert(np.cos(np.radians(5.0)))
     assert span["other"] * data.integral < right < span["share"] * data.integral
     assert abs(data.integral - 1) < (span["share"] - span["other"]) * data.integral
+    # Two rows side by side, the last of which is noise, do not decide what lies beyond, and no share is infinite.
+    path, rows = tmp_path / "noise.csv", "".join(f"{a}, 0.08\n" for a in range(1, 151))
+    for last, other in ((0.09, pytest.approx(0.0759, rel=0.05)), (1e300, 1e3)):
+        path.write_text(f"{HEAD}{rows}150.01, {last}\n")
+        assert read_phase(path).spans[-1]["other"] == other
 
 
 def test_statistical_errors_are_those_of_the_noise(tmp_path):

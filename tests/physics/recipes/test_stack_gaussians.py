@@ -97,20 +97,6 @@ def test_many_fixed_ones_are_exact_light():
     assert np.sqrt(np.mean(off(lights[0], six.variances, six.weights[0]) ** 2)) > 0.02
 
 
-@pytest.mark.slow
-def test_light_that_is_traced():
-    """Of layers that scatter forward; the similar stack's sum is another."""
-    forward = Medium(tuple(Layer(1.4, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
-    light, similar = (gaussians.lights_of((medium,), "searchlight")[0] for medium in (forward, HEART))
-    assert np.mean(light.noise) < 0.05
-    best = fitted([light], 8)
-    counts = light.weight > 0
-    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
-    variances, (weights,) = shared_sum(fitted([similar], 8).parameters)
-    lost = ring_shares(light.edges, variances) @ weights * similar.whole / light.energy - 1.0
-    assert np.mean(np.abs(lost[counts])) > 0.5
-
-
 # Errors
 
 
@@ -228,7 +214,17 @@ def test_quality_is_that_of_the_rings_and_of_what_is_inside():
 
 
 @pytest.mark.slow
-def test_traced_light_has_a_statistical_error_and_none_of_nodes():
+def test_light_that_is_traced():
+    """Of layers that scatter forward; the similar stack's sum is another, and no error is one of nodes."""
+    forward = Medium(tuple(Layer(1.4, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
+    light, similar = (gaussians.lights_of((medium,), "searchlight")[0] for medium in (forward, HEART))
+    assert np.mean(light.noise) < 0.05
+    best = fitted([light], 8)
+    counts = light.weight > 0
+    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
+    variances, (weights,) = shared_sum(fitted([similar], 8).parameters)
+    lost = ring_shares(light.edges, variances) @ weights * similar.whole / light.energy - 1.0
+    assert np.mean(np.abs(lost[counts])) > 0.5
     forward = Medium((Layer(1.38, 0.2, 22.0, 0.9, 0.3), Layer(1.38, 0.8, 12.0, 0.9)))
     lights = gaussians.lights_of((forward,), "diffuse")
     found = joint(lights, 4)

@@ -107,8 +107,6 @@ def test_a_good_recipe_holds_what_its_file_says(write):
     with_lists = read(write('mfp = [1, 2.5]\nheld = ["a3", "b0"]\n' + GOOD))
     assert (with_lists.mfp, with_lists.held) == ((1.0, 2.5), ("a3", "b0"))
 
-
-def test_a_setting_is_read(write):
     assert read(write(with_setting(DIFFUSE))).setting == Setting("diffuse")
     assert read(write(with_setting(DIFFUSE, good=INVERSE))).setting == Setting("diffuse")
     refracted = with_setting(DIFFUSE, "n = 1.4").replace('"exact"', '"orders"')

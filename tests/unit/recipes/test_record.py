@@ -308,16 +308,12 @@ def test_digest_tells_numbers_apart_and_versions_name_what_decides_them():
 # What a measured thing says of itself, and when it no longer holds
 
 
-@pytest.fixture
-def records(tmp_path) -> Path:
-    """Two records, to be changed."""
+def test_a_measurement_tells_of_its_records_and_is_stale_once_one_changes_comes_or_goes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "records").mkdir()
     for name in ("albedo-rational", "hazard"):
         shutil.copy(fits_folder() / f"{name}.json", tmp_path / "records")
-    return tmp_path / "records"
-
-
-def test_it_tells_command_version_date_machine_and_records(records):
+    records = tmp_path / "records"
     told = measurement_origin("profilefit check hazard", records)
     assert list(told) == ["command", "version", "date", "machine", "sha256"]
     assert (told["command"], told["version"]) == ("profilefit check hazard", __version__)
@@ -325,10 +321,6 @@ def test_it_tells_command_version_date_machine_and_records(records):
     assert told["machine"]["processor"] == processor() != ""
     assert told["machine"]["cores"] >= 1
     assert told["sha256"] == digest(records)
-
-
-def test_it_is_stale_once_a_record_changes_comes_or_goes_or_changes_its_name(records, tmp_path):
-    told = measurement_origin("", records)
     shutil.copytree(records, tmp_path / "copy")
     (records / "notes.txt").write_text("no record")
     assert not stale(told, records)
@@ -350,10 +342,7 @@ def test_it_is_stale_once_a_record_changes_comes_or_goes_or_changes_its_name(rec
         for name, text in (("one", "xyz"[:cut]), ("two", "xyz"[cut:])):
             (tmp_path / place / f"{name}.json").write_text(text)
     assert digest(tmp_path / "a") != digest(tmp_path / "b")
-
-
-def test_measurements_do_not_lie_among_records(records, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+    # Measurements do not lie among records.
     for out in (records, tmp_path / "records" / ".." / "records", Path("fits")):
         with pytest.raises(InputError, match="out must be another folder than that of the records, got"):
             require_apart(out, records)

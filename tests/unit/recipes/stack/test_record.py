@@ -163,16 +163,6 @@ def test_grey_layers_are_fitted_once_and_starts_are_those_of_their_colours(asked
     assert [given[2][0].tolist() for given in asked[1:]] == list(rows.values())
 
 
-def test_the_record_says_what_it_is_worth(written):
-    content = record.read(written)
-    assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
-    assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
-    assert content["fit"]["result"] == "converged"
-    assert content["layers"] == load(written).stack.layers
-    assert len(content["constants"]) == 3 * len(CONSTANTS)
-    assert content["constants"]["green.1.w"] == {**FITTED, "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}")}
-
-
 GONE = object()
 
 
@@ -351,7 +341,14 @@ def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, asked, file, tmp_pa
         recorded(stacks.fit(of, RUN), tmp_path / "full")
 
 
-def test_a_record_is_found_by_path_and_by_name(written, tmp_path):
+def test_a_record_says_what_it_is_worth_and_is_found_by_path_and_by_name(written, tmp_path):
+    content = record.read(written)
+    assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
+    assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
+    assert content["fit"]["result"] == "converged"
+    assert content["layers"] == load(written).stack.layers
+    assert len(content["constants"]) == 3 * len(CONSTANTS)
+    assert content["constants"]["green.1.w"] == {**FITTED, "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}")}
     folder = tmp_path / "mine"
     digest = hashlib.sha256(written.read_bytes()).hexdigest()
     assert find(str(written), tmp_path).digest == find("heart", folder).digest == digest
