@@ -82,14 +82,6 @@ def test_a_records_path(tmp_path):
         profilefit.load("liang", str(path))
 
 
-def test_regenerated_records_of_another_folder_come_first(tmp_path):
-    make_record(tmp_path, "burley-whole", "burley", FOUR)
-    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
-        here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
-    assert here.constants() == FOUR != shipped.constants()
-    assert here.albedo == shipped.albedo  # not in that folder: the installation's own
-
-
 @pytest.mark.parametrize(
     ("load", "arguments", "words"),
     [
@@ -144,22 +136,17 @@ BY_NAME = {
 }
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-def test_the_record_of_a_setting_has_its_name(name):
-    assert record_name("map", BY_NAME[name]) == name
-
-
 SETTINGS = [Setting(illumination, n) for illumination in ("searchlight", "diffuse") for n in (1.0, 1.4)]
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_the_map_that_normalises_is_there_for_every_setting(setting):
-    law = catalogue.normalisation(setting)
-    assert law.setting == setting
-    assert law == profilefit.albedo_law("rational", setting=setting)
-
-
-def test_settings_without_a_record_are_told_which_there_are():
+def test_settings_have_records_by_their_names_or_are_told_which_there_are():
+    """The map that normalises is there for every setting."""
+    for name, setting in BY_NAME.items():
+        assert record_name("map", setting) == name
+    for setting in SETTINGS:
+        law = catalogue.normalisation(setting)
+        assert law.setting == setting
+        assert law == profilefit.albedo_law("rational", setting=setting)
     assert set(SETTINGS) <= set(Records(FITS).settings("albedo-rational"))
     words = r"albedo-rational belongs to .*diffuse, n in \(1, 1\.6\], g = 0.*, n = 1\.7, g = 0$"
     with pytest.raises(SettingError, match=words):
@@ -168,7 +155,13 @@ def test_settings_without_a_record_are_told_which_there_are():
         profilefit.albedo_law("rational", setting=Setting(g=0.8))
 
 
-def test_a_law_is_found_by_its_setting(tmp_path):
+def test_records_of_another_folder_come_first_and_by_their_setting(tmp_path):
+    make_record(tmp_path, "burley-whole", "burley", FOUR)
+    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
+        here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
+    assert here.constants() == FOUR != shipped.constants()
+    assert here.albedo == shipped.albedo  # not in that folder: the installation's own
+    (tmp_path / "burley-whole.json").unlink()
     make_record(tmp_path, "burley-whole-diffuse", "burley", FOUR, setting=DIFFUSE)
     with pytest.warns(ShippedMap, match="albedo-rational-diffuse"):
         law = profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)

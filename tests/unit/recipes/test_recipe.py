@@ -106,7 +106,6 @@ def test_a_good_recipe_holds_what_its_file_says(write):
     assert (checked.check, checked.random_starts) == ("orders", 50)
     with_lists = read(write('mfp = [1, 2.5]\nheld = ["a3", "b0"]\n' + GOOD))
     assert (with_lists.mfp, with_lists.held) == ((1.0, 2.5), ("a3", "b0"))
-
     assert read(write(with_setting(DIFFUSE))).setting == Setting("diffuse")
     assert read(write(with_setting(DIFFUSE, good=INVERSE))).setting == Setting("diffuse")
     refracted = with_setting(DIFFUSE, "n = 1.4").replace('"exact"', '"orders"')

@@ -98,15 +98,12 @@ def test_three_colours(read):
     assert hash(read()) == hash(stack)
 
 
-def test_single_numbers_are_grey_and_infinite_may_be_said(read):
+def test_single_numbers_are_grey_infinite_may_be_said_and_a_material_be_named(read):
     stack = read(new='unit = "cm"\nother = 1\n[[layers]]\nn = 1\nmu_a = 0.1\nmu_s = [9, 9.0, 9]\ng = 0\nthickness = 2')
     assert stack.is_grey
     assert stack.unit == "cm"
     assert stack.media[2] == Medium((Layer(1.0, 0.1, 9.0, 0.0, 2.0),))
     assert math.isinf(read("g = 0\n", "g = 0\nthickness = inf\n").media[0].layers[1].thickness)
-
-
-def test_published_material(read):
     given, marble = "mu_a = 1\nmu_s = [1, 2, 3]\ng = 0\n", BY_NAME["marble"]
     stack = read(given, 'material = "marble"\n')
     assert [medium.layers[1] for medium in stack.media] == [

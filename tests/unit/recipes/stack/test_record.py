@@ -265,6 +265,12 @@ def test_what_is_a_stack_and_what_its_file_says(file, tmp_path):
     # A scene's file is one of a stack: what draws it is not looked at.
     drawn = request(file('[[layers]]\nname = "epi', 'scene = "layers"\npose = 3\n[[layers]]\nname = "epi'))
     assert drawn.stack.media == of.stack.media
+    path, other = file(), tmp_path / "other" / "heart.toml"
+    other.parent.mkdir()
+    other.write_text(STACK)
+    assert [kind.key for kind, _ in requests_of([path, "skin", path])] == ["stack", "gaussians"] * 2
+    with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
+        requests_of([path, "skin", str(other)])
 
 
 LIGHT, TITLE = 'illumination = "diffuse"', '"Muscle under its skin"'
@@ -375,6 +381,16 @@ def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
     for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
         assert matching(request(file(*pieces, name="x")), folder) is None
     assert matching(same, tmp_path) is None
+    # An image's mean thickness has more digits than a record.
+    Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
+    of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
+    mean = of.stack.media[0].layers[0].thickness
+    assert mean != float(f"{mean:.12g}")
+    path = recorded(stacks.fit(of, RUN), tmp_path / "image")
+    found = matching(of, tmp_path / "image")
+    assert found is not None
+    assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
+    assert load(path).stack.map is None
     # The one that is asked for must be whole: its layers say which one it is, and to go on without it would hide that.
     spoil(written, "half_spaces/green/1/a00", lambda a: 1.001 * a)
     with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
@@ -406,19 +422,6 @@ def test_a_damaged_record_of_something_else_stops_nothing(written, file, tmp_pat
         assert str(said[0].message).isprintable()
 
 
-def test_a_record_matches_an_image_of_thicknesses(asked, file, tmp_path):
-    """Whose mean has more digits than a record."""
-    Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
-    of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
-    mean = of.stack.media[0].layers[0].thickness
-    assert mean != float(f"{mean:.12g}")
-    path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
-    found = matching(of, tmp_path / "mine")
-    assert found is not None
-    assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
-    assert load(path).stack.map is None
-
-
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 
 
@@ -432,12 +435,3 @@ def test_a_shipped_stack_has_its_record(name):
     for channel, law in enumerate(found.laws):
         ends = sorted([law.top.reflectance, law.below.reflectance])
         assert ends[0] <= law.total(0.2) <= ends[1], channel
-
-
-def test_stacks_of_one_name_would_write_one_record(file, tmp_path):
-    path, other = file(), tmp_path / "other" / "heart.toml"
-    other.parent.mkdir()
-    other.write_text(STACK)
-    assert [kind.key for kind, _ in requests_of([path, "skin", path])] == ["stack", "gaussians"] * 2
-    with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
-        requests_of([path, "skin", str(other)])
