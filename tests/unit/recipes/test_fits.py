@@ -1,6 +1,7 @@
 """What a recipe names: where albedos, rings and fits begin, its photons; and random constants around such a start."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,14 +88,9 @@ def test_what_a_recipe_must_name(change, words):
 
 
 def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
-    class Exactly:
-        setting = Setting()
-
-        class sampler:
-            sample = staticmethod(lambda xi, alpha: exact.quantile(xi, alpha))
-
+    exactly = SimpleNamespace(setting=Setting(), sampler=SimpleNamespace(sample=exact.quantile))
     alpha = np.array([0.3, 0.9])
-    assert inversion_error(Exactly(), alpha) == pytest.approx([0, 0], abs=1e-8)
+    assert inversion_error(exactly, alpha) == pytest.approx([0, 0], abs=1e-8)
     assert np.all(inversion_error(catalogue.load("liang", "published"), alpha) > 0.03)
 
 

@@ -178,6 +178,23 @@ IN_GOOD = [
     (LAST, "", "mine.toml: missing [weighting]"),
 ]  # fmt: skip
 SHARES = "[weighting] shares must be a whole number in 1 ... 10000 of pipeline 'inverse'"
+AT_N = {
+    "[1.1, 1.2, 1.4]": "indices must be at least 4, got [1.1, 1.2, 1.4]",
+    "[1.0, 1.1, 1.2, 1.4]": "indices must rise, each in (1, 3], got [1.0, 1.1, 1.2, 1.4]",
+    "[1.1, 1.1, 1.2, 1.4]": "indices must rise, each in (1, 3], got [1.1, 1.1, 1.2, 1.4]",
+    "[1.1, 1.2, 1.3, 1.5]": "[setting] n must be one of the indices [1.1, 1.2, 1.3, 1.5], got 1.4",
+    '["a"]': "indices must be a list of finite numbers",
+}
+FORWARD = "indices must be in [1.33, 1.45] where there are cosines"
+AT_G = {
+    "indices = [1.2, 1.3, 1.4]\ncosines = [0.1, 0.5, 0.9]": FORWARD,
+    "cosines = [0.1, 0.5, 0.9]": f"{FORWARD}, got []",
+    f"{SPANS}cosines = [0.5, 0.9]": "cosines must rise, at least 3 in (0, 0.95], got [0.5, 0.9]",
+    f"{SPANS}cosines = [0.9, 0.5, 0.1]": "cosines must rise",
+    f"{SPANS}cosines = [0.1, 0.8, 0.97]": "cosines must rise",
+    f"{SPANS}cosines = [0.1, 0.5, 0.8]": "[setting] g must be one of the cosines",
+    "": "[setting] g must be 0 where there are no cosines, got 0.9",
+}
 # Of the light, indices and mean cosines that a recipe is for: lines before it, those of [setting], and words.
 IN_SETTING = [
     ("", 'illumination = "lamp"', "[setting] illumination must be one of searchlight, diffuse, got 'lamp'"),
@@ -189,32 +206,8 @@ IN_SETTING = [
     ("", "g = 0.5", "[setting] g must be 0 where there are no cosines, got 0.5"),
     ("", "eta = 1.4", "[setting] keys must be of illumination, n, g, got 'eta'"),
     ("", "n = 0.9", "[setting] n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got 0.9"),
-    ("indices = [1.1, 1.2, 1.4]\n", "n = 1.4", "indices must be at least 4, got [1.1, 1.2, 1.4]"),
-    *(
-        (f"indices = {given}\n", "n = 1.4", f"indices must rise, each in (1, 3], got {given}")
-        for given in ("[1.0, 1.1, 1.2, 1.4]", "[1.1, 1.1, 1.2, 1.4]")
-    ),
-    (
-        "indices = [1.1, 1.2, 1.3, 1.5]\n",
-        "n = 1.4",
-        "[setting] n must be one of the indices [1.1, 1.2, 1.3, 1.5], got 1.4",
-    ),
-    ('indices = ["a"]\n', "n = 1.4", "indices must be a list of finite numbers"),
-    *(
-        (f"{given}\n", "n = 1.4\ng = 0.9", words)
-        for given, words in (
-            (
-                "indices = [1.2, 1.3, 1.4]\ncosines = [0.1, 0.5, 0.9]",
-                "indices must be in [1.33, 1.45] where there are cosines",
-            ),
-            ("cosines = [0.1, 0.5, 0.9]", "indices must be in [1.33, 1.45] where there are cosines, got []"),
-            (f"{SPANS}cosines = [0.5, 0.9]", "cosines must rise, at least 3 in (0, 0.95], got [0.5, 0.9]"),
-            (f"{SPANS}cosines = [0.9, 0.5, 0.1]", "cosines must rise"),
-            (f"{SPANS}cosines = [0.1, 0.8, 0.97]", "cosines must rise"),
-            (f"{SPANS}cosines = [0.1, 0.5, 0.8]", "[setting] g must be one of the cosines"),
-            ("", "[setting] g must be 0 where there are no cosines, got 0.9"),
-        )
-    ),
+    *((f"indices = {given}\n", "n = 1.4", words) for given, words in AT_N.items()),
+    *((f"{given}\n", "n = 1.4\ng = 0.9", words) for given, words in AT_G.items()),
 ]
 N, ORDERS = "[setting]\nn = 1.4\n\n[albedos]", GOOD.replace('"exact"', '"orders"')
 MISTAKES = [

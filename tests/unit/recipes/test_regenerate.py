@@ -40,11 +40,6 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     assert not Path(tmp_path / "store").exists()
 
 
-def of_recipes(*recipes):
-    by_key = {kind.key: kind for kind in KINDS}
-    return [(by_key["albedo_map" if one.pipeline == "albedo" else "law"], one) for one in recipes]
-
-
 def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, tmp_path):
     made = []
 
@@ -55,8 +50,7 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     said: list[str] = []
     run = RecipeRun("quick", 0, tmp_path / "out", None, 1000, said.append, False)
     refracted, diffuse = Setting(n=1.4), Setting("diffuse")
-    profile = recipe.find("burley-whole", FITS)
-    exactly = recipe.find("albedo-rational", FITS).changed(check="")
+    profile, exactly = recipe.find("burley-whole", FITS), recipe.find("albedo-rational", FITS).changed(check="")
     recipes = (
         profile.changed("profile-n1.4.toml", setting_table={"n": 1.4}),
         profile.changed("profile-diffuse.toml", truth="exact", setting_table={"illumination": "diffuse"}),
@@ -66,7 +60,9 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     )
     monkeypatch.setitem(albedo_map.PIPELINES, "albedo", pipeline)
     monkeypatch.setitem(law.PIPELINES, "profile", pipeline)
-    written = regenerate(of_recipes(*recipes), run)
+    by_key = {kind.key: kind for kind in KINDS}
+    keys = {"albedo": "albedo_map", "profile": "law"}
+    written = regenerate([(by_key[keys[one.pipeline]], one) for one in recipes], run)
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
     maps = [("albedo-n1.4", refracted), ("albedo-rational", None), ("checked", diffuse)]
     assert made == [*maps, ("profile-n1.4", refracted), ("profile-diffuse", None)]

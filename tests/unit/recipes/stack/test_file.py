@@ -193,12 +193,8 @@ LARGE = [
 @pytest.mark.parametrize(("image", "size"), LARGE, ids=[str(size) for _, size in LARGE])
 def test_too_large_is_refused_undecoded(of_image, monkeypatch, image, size):
     """What a tiny file says, which Pillow's Image.open would warn of."""
-
-    def decoded(self):
-        raise AssertionError("it was decoded")
-
-    monkeypatch.setattr("PIL.ImageFile.ImageFile.load", decoded)
-    monkeypatch.setattr("PIL.TiffImagePlugin.TiffImageFile.load", decoded)
+    for name in ("ImageFile.ImageFile", "TiffImagePlugin.TiffImageFile"):
+        monkeypatch.setattr(f"PIL.{name}.load", lambda self: pytest.fail("it was decoded"))
     refused(lambda: of_image(image), rf"\[layers 1.thickness\] {SIZE}thickness.png of {size[0]} x {size[1]}$")
 
 

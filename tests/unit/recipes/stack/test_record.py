@@ -19,7 +19,7 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds import stack as stacks
-from profilefit.recipes.kinds.stack import StackRequest, find, load, matching, read, request
+from profilefit.recipes.kinds.stack import find, load, matching, read, request
 from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
 from tests.fixtures import recorded, slow
@@ -116,17 +116,6 @@ def written(asked, file, tmp_path):
     return recorded(stacks.fit(request(file()), RUN), tmp_path / "mine")
 
 
-def by_hand(of: StackRequest, channel: int) -> StackLaw:
-    medium = of.stack.media[channel]
-    setting = Setting(of.illumination, n=medium.layers[0].n)
-    own = catalogue.load("hazard", setting=setting)
-    *tops, law = (LayerLaw(setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
-    for number in reversed(range(len(tops))):
-        rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
-        law = StackLaw(setting, tops[number], law, medium.layers[number].thickness, **rounded)
-    return law
-
-
 @pytest.mark.parametrize("text", [STACK, *slow(THREE)], ids=["two layers", "three"])
 def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, text):
     said: list[str] = []
@@ -140,10 +129,14 @@ def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, t
     assert found.setting == Setting("diffuse", n=1.38)
     assert found.digest == hashlib.sha256(path.read_bytes()).hexdigest()
     assert found.content["title"] == of.title
-    for channel, law in enumerate(found.laws):
-        known = by_hand(of, channel)
+    own = catalogue.load("hazard", setting=found.setting)
+    for law, medium in zip(found.laws, of.stack.media, strict=True):
+        *tops, known = (LayerLaw(found.setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
+        for number in reversed(range(len(tops))):
+            rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
+            known = StackLaw(found.setting, tops[number], known, medium.layers[number].thickness, **rounded)
         assert law.constants() == known.constants()
-        assert law.thickness == of.stack.media[channel].layers[0].thickness
+        assert law.thickness == medium.layers[0].thickness
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
