@@ -39,6 +39,7 @@ def test_an_exponential_is_cut_where_it_should_be(rate, bound, expected):
 
 
 def test_where_the_walk_stops():
+    """The cut of a known exponential is the stride after its crossing."""
     r = np.array([0.5, 1.5, 2.5])
     # Between rings the data are straight lines: at 2.5 one reaches 0, and (6) asks at 2.0 (.25) and at 2.5.
     assert trimmed_radius(r, np.array([1.0, 0.5, 0.0])) == 2.5
@@ -46,8 +47,6 @@ def test_where_the_walk_stops():
     # r R_d is zero in the middle: a walk that took the first value for the largest would stop at once.
     assert trimmed_radius(R, R * np.exp(-R)) == 9.0  # r e^(1 - r) is .0073 at 8 and .0030 at 9
 
-
-def test_cut_of_a_known_exponential_is_the_stride_after_its_crossing():
     # e^{-r/s} falls to .005 of its first ring at r = s ln 200 + .005: 1.06 for s = .2, 4.24 for .8, 10.6 for 2
     for scale, ring, end, before in ((0.2, 1.065, 1.2, 1.0), (0.8, 4.25, 4.5, 4.0), (2.0, 10.605, 11.0, 10.0)):
         y = np.exp(-R / scale)

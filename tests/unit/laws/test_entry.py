@@ -192,12 +192,7 @@ def test_a_law_is_added_by_one_line_of_the_table(monkeypatch, tmp_path):
 def test_a_record_is_read_once(monkeypatch):
     """And only those that a law is made of: its own, and that of the map which normalises it."""
     seen, read = [], record.read
-
-    def counted(path, whole=False):
-        seen.append(path.stem)
-        return read(path, whole)
-
-    monkeypatch.setattr(record, "read", counted)
+    monkeypatch.setattr(record, "read", lambda path, *whole: seen.append(path.stem) or read(path, *whole))
     profilefit.load("hazard")
     assert seen == ["hazard", "albedo-rational"]
     records = Records(fits_folder())

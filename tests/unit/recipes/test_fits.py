@@ -59,7 +59,7 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
     assert np.max(np.abs(lost)) > 4.5
 
 
-def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
+def test_starts_printed_sets_and_photons_are_those_of_the_recipe(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
     chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
     law = starting_law(chosen, tmp_path)
@@ -68,6 +68,15 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     mapped = starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
     assert mapped.setting == Setting(n=1.4)
     assert mapped.constants() == RefractingRational.entry.start
+    burley = recipe.find("burley-whole", FITS)
+    searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
+    assert (searchlight["published"]["s0"], diffuse["published"]["s0"]) == (1.85, 1.9)
+    assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
+    assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
+    orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
+    assert needs_photons(orders)
+    assert not needs_photons(exactly)
+    assert needs_photons(exactly.changed(check="orders"))
 
 
 @pytest.mark.parametrize(
@@ -92,18 +101,6 @@ def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
     alpha = np.array([0.3, 0.9])
     assert inversion_error(exactly, alpha) == pytest.approx([0, 0], abs=1e-8)
     assert np.all(inversion_error(catalogue.load("liang", "published"), alpha) > 0.03)
-
-
-def test_printed_sets_are_those_of_the_recipes_setting_and_who_needs_photons():
-    burley = recipe.find("burley-whole", FITS)
-    searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
-    assert (searchlight["published"]["s0"], diffuse["published"]["s0"]) == (1.85, 1.9)
-    assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
-    assert set(printed_sets(recipe.find("liang-whole", FITS))) == {"published", "corrected"}
-    orders, exactly = recipe.find("albedo-liang", FITS), recipe.find("albedo-rational", FITS).changed(check="")
-    assert needs_photons(orders)
-    assert not needs_photons(exactly)
-    assert needs_photons(exactly.changed(check="orders"))
 
 
 # Random starts
