@@ -18,15 +18,6 @@ R = (np.arange(3000) + 0.5) * 0.01
 # The walk of (6), stride by stride, and where it stops
 
 
-def test_strides_by_hand():
-    """.05 on [0, .5], .1 to 1, .2 to 2, .5 to 5, 1 beyond; those up to 5 are always there."""
-    expected = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
-    expected += [1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0]
-    np.testing.assert_allclose(walk(8.0), expected, rtol=1e-14)
-    for last, end in ((8.5, 9.0), (6.0, 6.0), (0.3, 5.0)):
-        assert min(last, end) <= walk(last)[-1] <= max(last + 1, 5.0)
-
-
 # e^(-k r) <= .005 beyond ln 200 / k = 5.298 / k: the first radius of the walk past that; ln 20 = 2.996, ln 2 = .693.
 ENDS = [(1.0, 0.005, 6.0), (2.0, 0.005, 3.0), (4.0, 0.005, 1.4), (12.0, 0.005, 0.45), (0.6, 0.005, 9.0)]
 
@@ -39,7 +30,15 @@ def test_an_exponential_is_cut_where_it_should_be(rate, bound, expected):
 
 
 def test_where_the_walk_stops():
-    """The cut of a known exponential is the stride after its crossing."""
+    """The cut of a known exponential is the stride after its crossing.
+
+    Strides are .05 on [0, .5], .1 to 1, .2 to 2, .5 to 5, 1 beyond; those up to 5 are always there.
+    """
+    expected = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
+    expected += [1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0]
+    np.testing.assert_allclose(walk(8.0), expected, rtol=1e-14)
+    for last, end in ((8.5, 9.0), (6.0, 6.0), (0.3, 5.0)):
+        assert min(last, end) <= walk(last)[-1] <= max(last + 1, 5.0)
     r = np.array([0.5, 1.5, 2.5])
     # Between rings the data are straight lines: at 2.5 one reaches 0, and (6) asks at 2.0 (.25) and at 2.5.
     assert trimmed_radius(r, np.array([1.0, 0.5, 0.0])) == 2.5

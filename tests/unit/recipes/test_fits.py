@@ -61,14 +61,14 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
 
 def test_starts_printed_sets_and_photons_are_those_of_the_recipe(tmp_path):
     """Printed constants of the searchlight are numbers to start from elsewhere too."""
-    chosen = recipe.find("burley-whole", FITS).changed(setting_table={"illumination": "diffuse", "n": 1.4})
+    burley = recipe.find("burley-whole", FITS)
+    chosen = burley.changed(setting_table={"illumination": "diffuse", "n": 1.4})
     law = starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
     mapped = starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
     assert mapped.setting == Setting(n=1.4)
     assert mapped.constants() == RefractingRational.entry.start
-    burley = recipe.find("burley-whole", FITS)
     searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
     assert (searchlight["published"]["s0"], diffuse["published"]["s0"]) == (1.85, 1.9)
     assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}

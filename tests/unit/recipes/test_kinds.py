@@ -105,9 +105,7 @@ def test_records_of_paths_and_names_are_of_their_own_kinds(tmp_path):
         records_of(["petzhold"])
     with pytest.raises(RecordError, match="has no records"):
         records_of(["skin"], tmp_path)
-
-
-def test_every_name_that_ships_is_requested_of_its_kinds():
+    # Every name that ships is requested of its kinds.
     found = requests_of()
     keys = {key: [request for kind, request in found if kind.key == key] for key in BY_KEY}
     assert {kind.key for kind, _ in found} == set(BY_KEY)

@@ -6,6 +6,7 @@ import shutil
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -64,20 +65,13 @@ def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(OutputError, match=r"cannot write into .*file: "):
         record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
-
-    def failing(error):
-        def fail(*_):
-            raise error
-
-        return fail
-
-    monkeypatch.setattr(os, "fsync", failing(OSError(28, "No space left on device")))
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
         record.write(path.parent, "mine", {"law": "other"}, {})
     assert {one.name: one.read_bytes() for one in path.parent.iterdir()} == before
     assert record.read(path)["law"] == "liang"
     monkeypatch.undo()
-    monkeypatch.setattr(os, "replace", failing(KeyboardInterrupt()))
+    monkeypatch.setattr(os, "replace", Mock(side_effect=KeyboardInterrupt))
     (tmp_path / "new").mkdir()
     with pytest.raises(KeyboardInterrupt):
         record.write(tmp_path / "new", "mine", CONTENT, ARRAYS)
@@ -264,15 +258,9 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
 def test_damaged_arrays_are_named(tmp_path, damage):
     path = record.write(tmp_path, "mine", CONTENT, {"noise": np.random.default_rng(0).standard_normal(1000)})
     file = path.with_suffix(".npz")
-    whole = file.read_bytes()
-    flipped = bytearray(whole)
-    flipped[len(whole) // 2] ^= 0xFF
-    pieces = {
-        "empty": b"",
-        "text": b"no arrays",
-        "cut short": whole[: len(whole) // 2],
-        "a byte flipped": bytes(flipped),
-    }
+    whole, half = file.read_bytes(), len(file.read_bytes()) // 2
+    pieces = {"empty": b"", "text": b"no arrays", "cut short": whole[:half]}
+    pieces["a byte flipped"] = whole[:half] + bytes([whole[half] ^ 0xFF]) + whole[half + 1 :]
     file.unlink()
     if damage in pieces:
         file.write_bytes(pieces[damage])

@@ -184,7 +184,6 @@ def refused(reader, path, message):
     assert not text.startswith(f"{path}: is damaged") or text.endswith("; regenerate it")
 
 
-IMAGE = {"image": "thickness.png", "range": [0.1, 0.2]}
 DAMAGE = [
     ("format", 9, r"is not a record of format 1 or 2, got 9"),
     ("constants/red.1.w", GONE, r"'red.1.w' is missing"),
@@ -209,7 +208,7 @@ DAMAGE = [
     ("layers/1/n", 1.5, r"layers must have one n for a law of a stack"),
     ("setting/n", 1.5, r"setting.n must be that of its layers, got 1.5"),
     # Whatever is at that place: a record is no reason to open another file.
-    ("layers/0/thickness", IMAGE, r"thickness must be a number or null, got \{\"image\""),
+    ("layers/0/thickness", {"image": "thickness.png"}, r"thickness must be a number or null, got \{\"image\""),
     ("note", GONE, r"'note' is missing"),
     ("quality", GONE, r"'quality' is missing"),
     ("quality/regenerated/rel", [], r"quality.regenerated.rel must be a list of numbers, got \[\]"),
