@@ -516,7 +516,7 @@ def _channel_rows(
         printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
         over = tuple(one / other for one, other in zip(mse, printed_mse, strict=True))
         gaps = {name: tuple(x - y for x, y in zip(own, printed_r2, strict=True)) for name, own in r2.items()}
-        of = {"material": material.name, "channel": CHANNELS[channel], "model": model}
+        of: dict[str, Any] = {"material": material.name, "channel": CHANNELS[channel], "model": model}
         of |= {"range_choice": choice, "range_mm": end}
         found.append({**of, "mse": mse, "r2": r2, "mse_over_printed": over, "r2_minus_printed": gaps})
     return found
