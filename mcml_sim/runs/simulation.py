@@ -57,11 +57,8 @@ def simulate(
     """
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
-    require_resolved(grid)
     require_illumination(illumination)
-    require_own_process()
-    number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
-    key = checked_whole("seed", seed, lowest=0)
+    number, key = _checked_run(grid, photons, seed)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
     goal = precision if isinstance(precision, Precision | None) else Precision(precision)
@@ -192,7 +189,7 @@ def trace_share(
     return traced
 
 
-def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
+def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting = SEARCHLIGHT) -> tuple[int, int]:
     """Return the number of photons and the seed; InputError if the run cannot be done."""
     require_own_process()
     if not isinstance(setting, Setting):
