@@ -347,7 +347,6 @@ def test_what_was_written_comes_back(tally, tmp_path):
     ("change", "message"),
     [
         (("A1", "B2"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got 'B2'"),
-        (("A1", "1.0"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got '1.0'"),
         (("\nInParm \t", "\nInput \t"), r"x.mco:\d+: expected the section InParm, got 'Input'"),
         (("3.0000E+01", "-nan"), r"x.mco:38: expected number 1 of 3 of Rd_r, got '-nan'"),
         (("2.0000E+00", "-2.0"), r"x.mco:39: expected number 2 of 3 of Rd_r, a number from 0 to 1e\+30, got '-2.0'"),
@@ -425,18 +424,9 @@ def test_mcml_2_is_read(tmp_path):
     [
         ("mcmli2.0", "mcmli1.0", r":11: expected the input's version, mcmli2.0, got 'mcmli1.0'"),
         ("skin	0.2", "bone	0.2", r":22: expected one of the media air, glass, skin, got 'bone'"),
-        ("skin	0.2", "skin", r":24: expected a medium above, layers with their thickness, and a medium below"),
-        ("pencil", "isotropic", r":25: expected a pencil beam, pencil, got 'isotropic'"),
-        (
-            "0					# start",
-            "0.1	# start",
-            r":26: expected light that starts at the surface, 0, got '0.1'",
-        ),
         ("Rd_r A_rz", "A_rz", r":29: expected Rd_r among what was scored, got 'A_rz Rd_t'"),
-        ("1E3", "1.5", r":30: expected the number of photons, a whole number from 1"),
         ("1.4	1	100	0.9", "1.4	1	100	1", r":16: expected g of 'skin' between -1 and 1"),
         ("  2.5000E-01\n", "", r":57: expected number 4 of 4 of Rd_r, a number from 0 to 1e\+30, got 'Rd_t'"),
-        ("3	4	1", "3	99999999	1", r":28: expected nr, a number of bins, a whole number from 1 to"),
     ],
 )
 def test_what_is_wrong_in_mcml_2_is_named(old, new, told):

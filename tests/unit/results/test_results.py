@@ -79,7 +79,6 @@ def medium(*layers, **changes):
 HEADERS = {
     "photons 0": ({"photons": 0}, "photons must be a whole number >= 1 and <= 1e\\+13, got 0"),
     "photons true": ({"photons": True}, "photons must be a whole number .*, got True"),
-    "photons text": ({"photons": "9"}, "photons must be a whole number .*, got '9'"),
     "photons list": ({"photons": [1] * 1000}, r"photons must be a whole number .*, got \[1, 1.*\.\.\.$"),
     "photons long": ({"photons": 10**400}, "a whole number of 401 digits"),
     "seed": ({"seed": 1.5}, "seed must be a whole number >= 0, got 1.5"),
@@ -97,7 +96,6 @@ HEADERS = {
     "no layer": (medium(), "a medium must have 1 to 1000 layers, got 0"),
     "depth": (medium(layer(depth=1)), "layer 1 has the unknown key 'depth'"),
     "mu_a": (medium(layer(mu_a=-1)), "mu_a must be a coefficient >= 0, got -1"),
-    "mu_a true": (medium(layer(mu_a=True)), "mu_a must be a coefficient >= 0, got True"),
     "other layers": (medium(layer()), r"'absorbed_per_layer' must have the shape \(1,\), got \(2,\)"),
 }
 FIELDS = {
@@ -107,7 +105,6 @@ FIELDS = {
     "header": ({"header": np.array(3)}, "'header' must be one text"),
     "rings": ({"r_edges": np.arange(6.0)}, r"'reflectance_r' must have the shape \(5,\), got \(4,\)"),
     "edges": ({"r_edges": np.array([0, 2, 1, 3.0])}, "r must rise, got 1 after 2"),
-    "edges inf": ({"r_edges": np.array([0, 2, np.inf])}, "r must be finite edges"),
     "edges text": ({"r_edges": np.array(["0", "1"])}, "'r_edges' must be real numbers"),
     "cells": ({"r_edges": np.arange(65537.0), "z_edges": np.arange(65537.0)}, "grid must have at most 2097152 bins"),
     "angles": ({"a_edges": np.array([0, 0.1, 1, 1.5])}, "a_edges must be even from 0 to pi/2"),
