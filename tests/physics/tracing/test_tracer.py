@@ -108,15 +108,6 @@ def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
     assert np.abs(from_exact(counts, illumination)).max() < sidak(4 * 13)
 
 
-@pytest.mark.slow
-def test_other_settings_take_the_general_kernel():
-    glass = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
-    free = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000)
-    assert glass.is_closed
-    # Under glass fewer than half of those that come up leave.
-    assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
-
-
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
     """At all corners of the range and a million points between."""
     near = np.arange(2**17)
