@@ -52,8 +52,8 @@ def simulate(
         scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
         illumination: "searchlight", the pencil beam, or "diffuse", cosine-weighted light that arrives at r = 0.
 
-    InputError on other arguments; StoreError if the folder is another run's or cannot be written. Ctrl-C stops after
-    the batches in flight, which the store keeps too.
+    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
+    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
     """
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
@@ -128,18 +128,9 @@ def simulate_orders(
 ) -> Orders:
     """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
-    Args:
-        grid: rings, edges in mean free paths [mfp].
-        photons: how many to start, 1 to 1e13.
-        seed: whole number >= 0; equal seeds start with equal photons.
-        setting: the light and the surface; Setting() and its diffuse twin are the fastest.
-        store: folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes.
-        workers: threads, by default one a core; the result does not depend on it.
-        progress: show a bar on stderr; by default only if that is a terminal.
-        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
-
-    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
-    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
+    `grid` has rings, their edges in mean free paths [mfp]. `setting` is the light and the surface; Setting() and its
+    diffuse twin are the fastest. The other arguments, errors and Ctrl-C are as for `simulate`; a batch in the `store`
+    has 2^20 photons.
     """
     number, key = _checked_run(grid, photons, seed, setting)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
@@ -200,7 +191,6 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting = SEARCHL
 
 def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
     bins = order_bins.bins_of(setting)
-    # What decides which photons a batch holds and how they are counted.
     made_by: dict[str, object] = {
         "kind": "orders",
         "setting": str(setting),

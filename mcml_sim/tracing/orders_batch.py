@@ -1,7 +1,4 @@
-"""Batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
-
-Since random words belong to (photon, event), and ends to photons, the number of lanes does not change a bit.
-"""
+"""Batch of the order-resolved run on one device: where each photon left, and after how many scatterings."""
 
 from __future__ import annotations
 
