@@ -124,7 +124,6 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
         (5, "0 0.02", "dz in cm, a number from 1e-12 to 1e[+]12", "'0'"),
         (5, "0.01 nan", "dr in cm, .*", "'nan'"),
         (5, "0.01 1e999", "dr in cm, .*", "'1e999'"),
-        (5, "0.01,0.02", "2 values, dz and dr", "1: '0.01,0.02'"),
         (6, "3 4", "3 values, nz, nr and na", "2: '3 4'"),
         (6, "3 4.5 5", "nr, a number of bins, a whole number from 1 to 65536", "'4.5'"),
         (6, "3 4 65537", "na, a number of bins, .*", "'65537'"),
