@@ -18,11 +18,10 @@ from mcml_sim.exact.special_functions import squared_decay_rate
 from mcml_sim.exact.transform import STANDARD, Transform
 from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import checked_range, require_one_shape, require_own_process
-from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting, is_traced
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, SEARCHLIGHT, Setting, is_traced
 
 Numbers = ArrayLike | jax.Array
 
-SEARCHLIGHT = Setting()
 FINER = STANDARD.scaled(1.5)
 
 WHERE = (

@@ -10,7 +10,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
-from mcml_sim.media.setting import Setting, require_illumination
+from mcml_sim.media.setting import SEARCHLIGHT, Setting, require_illumination
 from mcml_sim.results.orders import Orders
 from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
@@ -20,7 +20,6 @@ from mcml_sim.tracing.deposits import Deposits
 from mcml_sim.tracing.order_bins import Counts
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
-SEARCHLIGHT = Setting()
 
 
 def simulate(
