@@ -183,20 +183,6 @@ def with_error(estimate: Estimate) -> str:
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
-def speed(photons: int, seconds: float, compiling: float) -> str:
-    """Return the seconds of a run, and photons per second of the time that was not spent in compiling [s]."""
-    rate = photons / max(seconds - compiling, 1e-3)
-    shown = f"{rate / 1e6:.3g} M" if rate >= SLOW else f"{rate:.0f}"
-    return f"{times(seconds, compiling)}, {shown} photons/s"
-
-
-def times(seconds: float, compiling: float) -> str:
-    """Return the seconds of a run, those of compiling apart."""
-    if compiling < SHORT:
-        return f"{seconds:.1f} s"
-    return f"{max(seconds - compiling, 0):.1f} s and {compiling:.1f} s to compile"
-
-
 def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
     """Return whether the precision was reached, and if not, what would reach it."""
     import numpy as np
@@ -229,13 +215,18 @@ def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
 
 
 def pace(done: Done, on_workers: bool) -> str:
-    """Return how fast a run went."""
+    """Return the seconds of a run, those of compiling apart, and the photons per second of the others."""
     if done.seconds is None:
         return "finished before"
+    traced, times = max(done.seconds - done.compiling, 0.0), f"{done.seconds:.1f} s"
+    if done.compiling >= SHORT:
+        times = f"{traced:.1f} s and {done.compiling:.1f} s to compile"
     if done.resumed:  # the batches that were there cost nothing: a rate would be too good
-        return f"{times(done.seconds, done.compiling)}, resumed"
+        return f"{times}, resumed"
+    rate = done.results.photons / max(traced, 1e-3)
+    shown = f"{rate / 1e6:.3g} M" if rate >= SLOW else f"{rate:.0f}"
     there = ", compiling on the workers included" if on_workers else ""
-    return speed(done.results.photons, done.seconds, done.compiling) + there
+    return f"{times}, {shown} photons/s{there}"
 
 
 def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:

@@ -38,18 +38,10 @@ photons know; up to 5 % far from the source of darker media, 9 % where g = .95. 
 light, which is A to within 8e-4, and 3.2e-3 in white media (alpha' > .999).
 """
 
-from mcml_sim.exact.half_space import (
-    FINER,
-    SEARCHLIGHT,
-    cdf,
-    decay_rate,
-    error_estimate,
-    profile,
-    quantile,
-    reflectance,
-)
+from mcml_sim.exact.half_space import FINER, cdf, decay_rate, error_estimate, profile, quantile, reflectance
 from mcml_sim.exact.stack.quadrature import Nodes
 from mcml_sim.exact.stack.solution import Solution, solve
+from mcml_sim.media.setting import SEARCHLIGHT
 
 __all__ = [
     "FINER",

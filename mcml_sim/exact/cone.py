@@ -53,14 +53,6 @@ class System(NamedTuple):
     source: jax.Array  # vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)
 
 
-class _Cone(NamedTuple):
-    """Nodes of the escape cone along the paths, each complex128 (paths, angles)."""
-
-    mu: jax.Array
-    sine: jax.Array
-    weight: jax.Array
-
-
 def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -> jax.Array:
     """Return m_j, where R^(k) / alpha = sum alpha^j m_j over the orders of scattering less one: (2, orders)."""
     matrix, leaving, source = system(n, k, x_nodes, angles)
@@ -136,8 +128,11 @@ def _between_singularities(n: jax.Array, k: jax.Array, x: jax.Array) -> jax.Arra
     return 0.5 * (jnp.min(above, axis=(0, 1)) + jnp.max(below, axis=(0, 1)))
 
 
-def _cone(n: jax.Array, k: jax.Array, angles: int) -> _Cone:
-    """Return nodes for k = |k|. The weights have Fresnel's transmittance and dmu in them."""
+def _cone(n: jax.Array, k: jax.Array, angles: int) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Return mu, sine and weight of the cone's nodes along the paths, for k = |k|: each complex128 (paths, angles).
+
+    The weights have Fresnel's transmittance and dmu in them.
+    """
     first = FIRST_TAU - jnp.log1p(k)
     cosine = jnp.sqrt((n - 1.0) * (n + 1.0)) / n  # of the critical angle
     last = LAST_TAU - jnp.log(jax.lax.stop_gradient(cosine))
@@ -152,7 +147,7 @@ def _cone(n: jax.Array, k: jax.Array, angles: int) -> _Cone:
     weight = passes * sine * outside / (n * n * mu) * theta * decay * share * step
     # Geometric series beyond the ends, where the integrand goes as e^{2 tau} and as e^{-3 tau}.
     ends = jnp.ones(angles).at[0].set(-1.0 / jnp.expm1(-2.0 * step)).at[-1].set(-1.0 / jnp.expm1(-3.0 * step))
-    return _Cone(mu, sine / n, weight * ends)
+    return mu, sine / n, weight * ends
 
 
 def _y_nodes(n: jax.Array, k: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:

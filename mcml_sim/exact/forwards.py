@@ -48,6 +48,7 @@ MOST_BYTES = 1 << 23
 NEAREST, FARTHEST = 1e-7, 1e30
 SHORTEST, LONGEST, HALVINGS = 1e-12, 1e12, 64
 FAR = 1e4
+DEGREE = 400  # of the harmonics that a decay rate is found with
 DARKEST, FAINTEST = 1e-200, 1e-300  # an albedo that stands for 0, whose shares are those next to it; a density
 
 
@@ -111,15 +112,15 @@ def digest(table: SplinedLight) -> str:
 
 
 @lru_cache(maxsize=2048)
-def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
+def decay_rate(alpha: float, g: float) -> float:
     """Return kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [1/mfp].
 
     1 over the largest eigenvalue of the tridiagonal matrix of l / sqrt(h_l-1 h_l), h_l = (2 l + 1)(1 - alpha g^l).
     """
-    ell = np.arange(degree + 1)
+    ell = np.arange(DEGREE + 1)
     h = (2 * ell + 1) * (1.0 - alpha * float(g) ** ell)
     beside = ell[1:] / np.sqrt(h[:-1] * h[1:])
-    last = scipy.linalg.eigh_tridiagonal(np.zeros(degree + 1), beside, True, select="i", select_range=(degree, degree))
+    last = scipy.linalg.eigh_tridiagonal(np.zeros(DEGREE + 1), beside, True, select="i", select_range=(DEGREE, DEGREE))
     return float(1.0 / last[0])
 
 

@@ -18,11 +18,10 @@ from mcml_sim.exact.special_functions import squared_decay_rate
 from mcml_sim.exact.transform import STANDARD, Transform
 from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import checked_range, require_one_shape, require_own_process
-from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting, is_traced
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, SEARCHLIGHT, Setting, is_traced
 
 Numbers = ArrayLike | jax.Array
 
-SEARCHLIGHT = Setting()
 FINER = STANDARD.scaled(1.5)
 
 WHERE = (
@@ -45,8 +44,7 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
     mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
     n > 1 below 3e-8. Its derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
     """
-    require_solved(setting)
-    (albedo,) = _all_checked(alpha=alpha)
+    (albedo,) = _all_checked(setting, alpha=alpha)
     if not setting.is_isotropic:
         return scalar_or_array(forwards.reflectance(albedo, setting))
     return scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo, surface(setting)))
@@ -57,16 +55,14 @@ def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = S
 
     2 pi r R_d tends to alpha/2 at r = 0 where n = 1, else to alpha times `single_scattering.source_strength`.
     """
-    require_solved(setting)
-    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    radius, albedo, length = _all_checked(setting, r=r, alpha=alpha, mfp=mfp)
     of_kind: Callable[..., Any] = partial(by_alpha, by_albedo.profile) if setting.is_isotropic else forwards.profile
     return scalar_or_array(of_kind(radius / length, albedo, setting) / length**2)
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Return the share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
-    require_solved(setting)
-    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    radius, albedo, length = _all_checked(setting, r=r, alpha=alpha, mfp=mfp)
     of_kind: Callable[..., Any] = partial(by_alpha, by_albedo.cdf) if setting.is_isotropic else forwards.cdf
     return scalar_or_array(of_kind(radius / length, albedo, setting))
 
@@ -76,8 +72,7 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
 
     The derivative at xi = 1, infinite, is given as 0.
     """
-    require_solved(setting)
-    share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
+    share, albedo, length = _all_checked(setting, xi=xi, alpha=alpha, mfp=mfp)
     if not setting.is_isotropic:
         values = forwards.quantile(share, albedo, setting)
     elif any(isinstance(value, jax.Array) for value in (share, albedo, setting.n)):
@@ -91,7 +86,7 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
 
 def decay_rate(alpha: Numbers) -> float | Floats:
     """Return kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls as e^{-kappa r / mfp} r^-2 [-]."""
-    return scalar_or_array(elementwise(_decay_rate, *_all_checked(alpha=alpha)))
+    return scalar_or_array(elementwise(_decay_rate, *_all_checked(SEARCHLIGHT, alpha=alpha)))
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -103,8 +98,7 @@ def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Sett
 
     Where g > 0: its change without the g of the table that is farthest from the setting's.
     """
-    require_solved(setting)
-    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    radius, albedo, length = _all_checked(setting, r=r, alpha=alpha, mfp=mfp)
     x = radius / length
     if setting.is_isotropic:
         coarse, fine = (by_alpha(by_albedo.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
@@ -162,8 +156,9 @@ def require_solved(setting: Setting) -> None:
         raise SettingError(f"exact light needs {WHERE}, got {setting}: simulate it instead (mcml_sim.simulate_orders)")
 
 
-def _all_checked(**given: Any) -> list[Any]:
-    """Return each argument as `_checked`; InputError if their shapes do not broadcast."""
+def _all_checked(setting: Setting, **given: Any) -> list[Any]:
+    """Return each argument as `_checked`; InputError if their shapes do not broadcast, or `setting` is not solved."""
+    require_solved(setting)
     require_own_process()
     values = {name: _checked(name, value) for name, value in given.items()}
     require_one_shape(**values)

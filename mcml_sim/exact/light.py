@@ -25,7 +25,7 @@ from scipy.interpolate import CubicSpline
 
 from mcml_sim.exact import single_scattering
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.setting import Setting
+from mcml_sim.media.setting import SEARCHLIGHT, Setting
 
 STEP = 0.06  # of ln x, of D_1
 SINGLE_NEAREST, SINGLE_FARTHEST = 1e-7, 1e5  # mfp
@@ -33,7 +33,6 @@ LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
 GONE = 40.0  # kappa x, from where there is no light that counts
 ENERGY = np.polynomial.legendre.leggauss(96)
-SEARCHLIGHT = Setting()
 
 
 class Reduced(NamedTuple):

@@ -33,9 +33,7 @@ from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.phase import Phase
-from mcml_sim.media.setting import Setting
-
-SEARCHLIGHT = Setting()
+from mcml_sim.media.setting import SEARCHLIGHT, Setting
 
 # f(k) is analytic in ln(k - k_c) within an angle of pi/2 of the real axis, so the step leaves an error of
 # e^{-pi^2 / step}: 1e-17. Beyond the ends the sum has less than 1e-17 of itself for radii above 1e-9 mfp.

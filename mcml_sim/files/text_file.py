@@ -12,7 +12,7 @@ import os
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
@@ -38,20 +38,20 @@ TOO_DEEP = f"tables or lists nested more than {MOST_LEVELS} deep"
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
     """Read a JSON file of at most so many bytes. InputError in one line, `FILE: is not JSON: ...`."""
-    content = read_whole(path, most)
-    try:
-        return parse_json(content, most)
-    except ValueError as error:
-        raise InputError(f"{path}: is not JSON: {error}") from None
+    return _parsed(path, most, parse_json, "JSON")
 
 
 def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, Any]:
     """Read a TOML file of at most so many bytes. InputError in one line, `FILE: is not TOML: ...`."""
+    return _parsed(path, most, parse_toml, "TOML")
+
+
+def _parsed(path: str | os.PathLike[str], most: int, parse: Callable[[bytes, int], Any], kind: str) -> Any:
     content = read_whole(path, most)
     try:
-        return parse_toml(content, most)
+        return parse(content, most)
     except ValueError as error:
-        raise InputError(f"{path}: is not TOML: {error}") from None
+        raise InputError(f"{path}: is not {kind}: {error}") from None
 
 
 def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) -> Any:

@@ -45,16 +45,16 @@ def checked_path(path: object) -> Path:
     raise InputError(f"path must be the name of a file, got {reprlib.repr(path)}")
 
 
-def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
+def read_whole(path: str | os.PathLike[str], most: int, expected: str = "a file that can be read") -> bytes:
     """Return the bytes of a file, at most `most` + 1 of them: a longer file is not read to its end.
 
-    InputError names the file and why it cannot be read.
+    InputError names the file, what was `expected`, and why it cannot be read.
     """
     try:
         with Path(path).open("rb") as file:
             return file.read(most + 1)
     except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: expected a file that can be read, got: {reason_of(error)}") from None
+        raise InputError(f"{path}: expected {expected}, got: {reason_of(error)}") from None
 
 
 def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = True) -> None:

@@ -92,3 +92,6 @@ def is_traced(n: object) -> bool:
     """Return whether jax may differentiate by an index."""
     jax = sys.modules.get("jax")  # half a second to import, for those who only name a setting
     return jax is not None and isinstance(n, jax.Array) and n.shape == ()
+
+
+SEARCHLIGHT = Setting()

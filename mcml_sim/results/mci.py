@@ -166,35 +166,33 @@ class Lines:
 
     def take(self, count: int, expected: str, optional: int = 0) -> list[str]:
         """Return the first `count` words of the next line with any, and up to `optional` more; no number may follow."""
-        for line in self._lines:
-            self._number += 1
-            if self._number > MAX_LINES:
-                raise self.error(expected, f"more than {MAX_LINES} lines before it")
-            most = count + optional
-            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=most + 1)
+        most = count + optional
+        for line in self._without_comments(expected):
+            words = CONTROL.sub("", line).split(maxsplit=most + 1)
             if len(words) > most and _is_number(words[most]):
                 numbers = itertools.takewhile(_is_number, " ".join(words[most:]).split())
                 raise self.error(f"{expected} alone", f"{most + sum(1 for _ in numbers)} values")
             if len(words) >= count:
-                return [self._text(word) for word in words[:most]]
+                if stray := STRAY.search(" ".join(words[:most])):
+                    raise self.error("text in UTF-8", f"the byte {ord(stray[0]) - 0xDC00:#04x}")
+                return words[:most]
             if words:
                 raise self.error(f"{count} values, {expected}", f"{len(words)}: {quoted(' '.join(words))}")
         raise self.error(expected, "the end of the file")
 
     def find(self, key: str) -> None:
         """Go on to the line that begins with the word `key`."""
+        expected = f"the section {key}"
+        if not any(line.split(maxsplit=1)[:1] == [key] for line in self._without_comments(expected)):
+            raise self.error(expected, "the end of the file")
+
+    def _without_comments(self, expected: str) -> Iterator[str]:
+        """Yield the lines that follow, as they are counted, up to their comments."""
         for line in self._lines:
             self._number += 1
             if self._number > MAX_LINES:
-                raise self.error(f"the section {key}", f"more than {MAX_LINES} lines before it")
-            if line.partition("#")[0].split(maxsplit=1)[:1] == [key]:
-                return
-        raise self.error(f"the section {key}", "the end of the file")
-
-    def _text(self, word: str) -> str:
-        if stray := STRAY.search(word):
-            raise self.error("text in UTF-8", f"the byte {ord(stray[0]) - 0xDC00:#04x}")
-        return word
+                raise self.error(expected, f"more than {MAX_LINES} lines before it")
+            yield line.partition("#")[0]
 
     def error(self, expected: str, got: str) -> InputError:
         """Return the error to raise about the line that was read last."""

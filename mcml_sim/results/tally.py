@@ -13,7 +13,6 @@ import os
 import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -24,7 +23,7 @@ from mcml_sim.exact.single_scattering import entered
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import checked_path, reason_of, write_whole
+from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
@@ -55,7 +54,7 @@ EDGES = ("r_edges", "z_edges", "a_edges")
 LIGHT = "illumination"
 HEADER = frozenset({"format", "mcml_sim", "photons", "seed", "cut", "medium"})
 PHASE = "phase"
-MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) - {PHASE} for kind in (Medium, Layer))
+MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) for kind in (Medium, Layer))
 MAX_BYTES = 2**28  # of a file; the finest tables have 2^27.2 unpacked
 MOST_FIRST = 2**22  # bytes of edges and header: 65537 numbers an axis, and a thousand layers
 MOST_BEFORE = 512  # bytes of an array's own header
@@ -335,12 +334,7 @@ def results_bytes(tally: Tally) -> bytes:
 
 def read_results(path: str | os.PathLike[str]) -> Results:
     """Read a file of `write_results`. InputError names the file and says what is wrong with it."""
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: expected results of mcml_sim, got: {reason_of(error)}") from None
-    return parse_results(content, str(path))
+    return parse_results(read_whole(path, MAX_BYTES, "results of mcml_sim"), str(path))
 
 
 def parse_results(content: bytes, name: str) -> Results:
@@ -389,9 +383,10 @@ def _medium(value: object) -> Medium:
     is_list = isinstance(objects, list) and len(objects) <= MAX_LAYERS
     require(is_list, "layers", f"a list of at most {MAX_LAYERS}", objects)
     for at, value in enumerate(objects, start=1):
-        values = dict(value) if isinstance(value, dict) else value
-        phase = values.pop(PHASE, None) if isinstance(values, dict) else None
-        layers.append(Layer(**_table(f"layer {at}", values, LAYER), phase=None if phase is None else from_table(phase)))
+        values = _table(f"layer {at}", {PHASE: None, **value} if isinstance(value, dict) else value, LAYER)
+        if values[PHASE] is not None:
+            values[PHASE] = from_table(values[PHASE])
+        layers.append(Layer(**values))
     return Medium(tuple(layers), **table)
 
 

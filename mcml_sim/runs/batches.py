@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from types import ModuleType
-from typing import Generic
+from typing import Generic, cast
 
 from rich.progress import Progress, TaskID
 
@@ -101,7 +101,7 @@ def run_batches(
                     future.result()
         finally:
             fold.stop()
-    return fold.total()
+    return cast(R, fold.sum)
 
 
 class _Fold(Generic[R]):
@@ -113,7 +113,8 @@ class _Fold(Generic[R]):
         self._stopped = False
         self._next = self._added = 0
         self._early: dict[int, R] = {}
-        self._sum: R | None = None
+        self.sum: R | None = None
+        """Sum so far; None before the first batch."""
 
     def take(self) -> int | None:
         """Return the next batch, as soon as it is not too far ahead of the sum; None if no more are needed."""
@@ -128,10 +129,10 @@ class _Fold(Generic[R]):
             self._early[batch] = result
             while not self._stopped and self._added in self._early:
                 result = self._early.pop(self._added)
-                self._sum = result if self._sum is None else self._sum + result
+                self.sum = result if self.sum is None else self.sum + result
                 self._added += 1
                 is_look = self._added >= FIRST_LOOK and self._added & (self._added - 1) == 0  # 8, 16, 32, ...
-                self._stopped = is_look and self._enough is not None and self._enough(self._sum)
+                self._stopped = is_look and self._enough is not None and self._enough(self.sum)
             self._turn.notify_all()
 
     def stop(self) -> None:
@@ -139,12 +140,6 @@ class _Fold(Generic[R]):
         with self._turn:
             self._stopped = True
             self._turn.notify_all()
-
-    def total(self) -> R:
-        """Return the sum so far."""
-        if self._sum is None:
-            raise RuntimeError("no batch was run")
-        return self._sum
 
 
 class Deserted(Notice):

@@ -15,7 +15,7 @@ from mcml_sim.files.whole_file import ROOM, read_whole, require_target, require_
 from mcml_sim.media.medium import Medium
 from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
-from mcml_sim.results.tally import Precision, Results, quantities, read_results, results_bytes
+from mcml_sim.results.tally import Precision, Results, read_results, require_quantity, results_bytes
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
 
@@ -182,8 +182,8 @@ def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
 def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
     owners = {file.resolve(): f"the input file {file}"}
     for job in jobs:
-        if options.goal is not None and options.goal.quantity not in (names := quantities(job.run.grid)):
-            raise InputError(f"quantity must be one of {', '.join(names)}, got {options.goal.quantity!r}")
+        if options.goal is not None:
+            require_quantity(options.goal.quantity, job.run.grid)
         for path in (job.mco, job.npz):
             require_target(path)
         for path in (job.mco, job.npz, job.store):

@@ -10,7 +10,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
-from mcml_sim.media.setting import Setting, require_illumination
+from mcml_sim.media.setting import SEARCHLIGHT, Setting, require_illumination
 from mcml_sim.results.orders import Orders
 from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
@@ -20,7 +20,6 @@ from mcml_sim.tracing.deposits import Deposits
 from mcml_sim.tracing.order_bins import Counts
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
-SEARCHLIGHT = Setting()
 
 
 def simulate(
@@ -52,16 +51,13 @@ def simulate(
         scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
         illumination: "searchlight", the pencil beam, or "diffuse", cosine-weighted light that arrives at r = 0.
 
-    InputError on other arguments; StoreError if the folder is another run's or cannot be written. Ctrl-C stops after
-    the batches in flight, which the store keeps too.
+    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
+    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
     """
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
-    require_resolved(grid)
     require_illumination(illumination)
-    require_own_process()
-    number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
-    key = checked_whole("seed", seed, lowest=0)
+    number, key = _checked_run(grid, photons, seed)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
     goal = precision if isinstance(precision, Precision | None) else Precision(precision)
@@ -131,18 +127,9 @@ def simulate_orders(
 ) -> Orders:
     """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
-    Args:
-        grid: rings, edges in mean free paths [mfp].
-        photons: how many to start, 1 to 1e13.
-        seed: whole number >= 0; equal seeds start with equal photons.
-        setting: the light and the surface; Setting() and its diffuse twin are the fastest.
-        store: folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes.
-        workers: threads, by default one a core; the result does not depend on it.
-        progress: show a bar on stderr; by default only if that is a terminal.
-        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
-
-    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
-    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
+    `grid` has rings, their edges in mean free paths [mfp]. `setting` is the light and the surface; Setting() and its
+    diffuse twin are the fastest. The other arguments, errors and Ctrl-C are as for `simulate`; a batch in the `store`
+    has 2^20 photons.
     """
     number, key = _checked_run(grid, photons, seed, setting)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
@@ -192,7 +179,7 @@ def trace_share(
     return traced
 
 
-def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
+def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting = SEARCHLIGHT) -> tuple[int, int]:
     """Return the number of photons and the seed; InputError if the run cannot be done."""
     require_own_process()
     if not isinstance(setting, Setting):
@@ -203,7 +190,6 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple
 
 def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
     bins = order_bins.bins_of(setting)
-    # What decides which photons a batch holds and how they are counted.
     made_by: dict[str, object] = {
         "kind": "orders",
         "setting": str(setting),

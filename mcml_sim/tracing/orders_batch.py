@@ -1,7 +1,4 @@
-"""Batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
-
-Since random words belong to (photon, event), and ends to photons, the number of lanes does not change a bit.
-"""
+"""Batch of the order-resolved run on one device: where each photon left, and after how many scatterings."""
 
 from __future__ import annotations
 
@@ -14,14 +11,13 @@ import numpy as np
 from jax import Array, lax
 
 from mcml_sim.media.grid import Grid
-from mcml_sim.media.setting import Setting
+from mcml_sim.media.setting import SEARCHLIGHT, Setting
 from mcml_sim.tracing import half_space_event, order_bins, pool, rng
 from mcml_sim.tracing.deposits import rounded_up
 from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.order_bins import Counts
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
-MATCHED = Setting()
 EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 
 
@@ -33,7 +29,7 @@ class Ends(NamedTuple):
 
 
 def trace_batch(
-    grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None, setting: Setting = MATCHED
+    grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None, setting: Setting = SEARCHLIGHT
 ) -> Counts:
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64 (`pool.lanes`).
 

@@ -33,7 +33,7 @@ from mcml_sim.exact import cone, half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import fluence, known
 from mcml_sim.exact.stack.fluence import Field
-from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, stack
+from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, slowest, stack
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, scalar_or_array
 from mcml_sim.media.checks import checked_range, require
@@ -129,7 +129,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
     """
     _require_solved(medium, illumination)
     require(isinstance(nodes, Nodes), "nodes", "a mcml_sim.exact.Nodes", nodes)
-    first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
+    first = medium.layers[_first_to_scatter(medium) or 0]
     (fine, down, absorbed), (coarse, _, other) = (_shares(medium, illumination, rule) for rule in (nodes, nodes.fewer))
     waves = np.array([first.mu_t])
     fines = np.append(fine, _each(lambda k: _reflected(medium, k, illumination, nodes), waves))
@@ -346,6 +346,6 @@ def _wave_edges(medium: Medium, last: float) -> Floats:
     scatter = [layer for layer in medium.layers if layer.mu_s > 0]
     if last == 0:
         return np.zeros(1)
-    slowest = min(layer.mu_t * max(float(half_space.decay_rate(layer.alpha)), FIRST_WAVE) for layer in scatter)
-    first = min(0.5 * slowest, 0.5 * last)
+    least = min(layer.mu_t * max(slowest(layer.alpha), FIRST_WAVE) for layer in scatter)
+    first = min(0.5 * least, 0.5 * last)
     return np.append(0.0, np.geomspace(first, last, int(np.ceil(np.log2(last / first))) + 1))

@@ -49,15 +49,14 @@ class FournierForand(Phase):
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
         """Return 1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, from the table."""
-        below_one = _pieces(self).quantile(0.5 * (1 - v))
-        return below_one, 2 - below_one
+        return _table(self).deflection(v)
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        return _pieces(self).moment(l)
+        return _table(self).moment(l)
 
     def for_kernel(self) -> Tabulated:
         """Return the table in float32."""
-        return Tabulated.of(angles=(), values=(), pieces=_pieces(self), integral=()).for_kernel()
+        return _table(self).for_kernel()
 
     @property
     def _nu(self) -> Any:
@@ -110,7 +109,8 @@ def _second_order(xp: Any, nu: Any, log: Any) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _pieces(phase: FournierForand) -> Pieces:
+def _table(phase: FournierForand) -> Tabulated:
     u = np.geomspace(LEAST, 2.0, ROWS)
     u[-1] = 2.0
-    return Pieces.of(u, 2 * np.pi * phase._density(u), phase._below(u))
+    pieces = Pieces.of(u, 2 * np.pi * phase._density(u), phase._below(u))
+    return Tabulated.of(angles=(), values=(), pieces=pieces, integral=())

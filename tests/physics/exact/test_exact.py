@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.special import expn
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.by_albedo import BLOCK
+from mcml_sim.exact.light import log_once
+from mcml_sim.exact.single_scattering import ring_shares
 from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS
 from tests.physics.exact.half_space_twins import RealAxis, profile_along_contour
 
@@ -30,16 +31,6 @@ def h_by_quadrature(mu, alpha):
         return np.log1p(-alpha * np.arctan(x) / x) / (np.cos(t) ** 2 + (mu * np.sin(t)) ** 2)
 
     return np.exp(-mu / np.pi * quad(integrand, 0, np.pi / 2, epsabs=1e-12, epsrel=1e-12, limit=200)[0])
-
-
-def single_scattering(r):
-    """R_d / alpha where light scatters once: e^-z down, e^-d back out from depth z, cosine z/d."""
-
-    def along(z):
-        d = np.hypot(r, z)
-        return np.exp(-z - d) * z / (4 * np.pi * d**3)
-
-    return quad(along, 0, np.inf, epsabs=0, epsrel=1e-11, limit=400)[0]
 
 
 # Printed values
@@ -97,21 +88,12 @@ def test_the_twins_are_that_sharp():
 
 
 def test_little_scattering_is_single_scattering():
-    """The light from depth z leaves within r with the cosines from z/d to 1, alike: half the integral of e^-z/c."""
-
-    def energy(r):
-        def along(z):
-            lowest = z / np.hypot(r, z)
-            return 0.5 * np.exp(-z) * (expn(2, z) - lowest * expn(2, z / lowest))
-
-        return quad(along, 0, np.inf, epsabs=0, epsrel=1e-10, limit=200)[0]
-
-    for r in (0.01, 0.3, 1.0, 5.0, 20.0):
-        alpha = 1e-7  # twice scattered light adds of order alpha r
-        assert exact.profile(r, alpha) / alpha == pytest.approx(single_scattering(r), rel=1e-5)
-    total = quad(lambda z: 0.5 * np.exp(-z) * expn(2, z), 0, np.inf, epsabs=0, epsrel=1e-11)[0]
-    for r in (0.2, 1.0, 4.0):
-        assert exact.cdf(r, 0.0) == pytest.approx(energy(r) / total, rel=1e-7)
+    """Its closed form is held against plain integrals in `test_single`."""
+    r, alpha = np.array([0.01, 0.3, 1.0, 5.0, 20.0]), 1e-7  # twice scattered light adds of order alpha r
+    once = np.exp(log_once(r, SEARCHLIGHT)) / (2 * np.pi * r)
+    np.testing.assert_allclose(exact.profile(r, alpha) / alpha, once, rtol=1e-5)
+    shares = ring_shares([0.0, 0.2, 1.0, 4.0], SEARCHLIGHT)
+    np.testing.assert_allclose(exact.cdf([0.2, 1.0, 4.0], 0.0), np.cumsum(shares)[:-1] / shares.sum(), rtol=1e-7)
 
 
 # Conservation and identities

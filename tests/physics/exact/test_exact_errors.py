@@ -108,10 +108,19 @@ def test_other_arguments_must_be_in_their_ranges(call, values, said):
             call(value)
 
 
-@pytest.mark.parametrize("setting", [Setting(n=0.9), Setting(g=0.5), Setting("diffuse", n=1.5, g=0.1), "diffuse", None])
+OUTSIDE = (
+    *(Setting(n=n, g=g) for n, g in ((0.9, 0), (1, 0.5), (1.4, 0.97), (1.4, -0.1))),
+    Setting("diffuse", 1.5, 0.1),
+)
+
+
+@pytest.mark.parametrize("setting", [*OUTSIDE, "diffuse", None], ids=str)
 def test_other_surfaces_are_refused_by_name(setting):
+    """And the tracer is named."""
+    assert setting not in OUTSIDE or not setting.is_solved
+    where = r"n >= 1 where g = 0, and n from 1.33 to 1.45 where .* g is from 0 to 0.95"
     for call in BY_SETTING:
-        with pytest.raises(SettingError, match=r"n >= 1 where g = 0, .*got .*simulate it instead"):
+        with pytest.raises(SettingError, match=rf"{where}, got .*: simulate it instead \(mcml_sim.simulate_orders\)"):
             call(0.5, setting)
 
 

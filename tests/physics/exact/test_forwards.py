@@ -162,15 +162,6 @@ def test_it_has_derivatives():
             assert float(slope) == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    "setting", [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)], ids=str
-)
-def test_outside_the_table_the_tracer_is_named(setting):
-    assert not setting.is_solved
-    with pytest.raises(SettingError, match=r"n from 1.33 to 1.45 where .* g is from 0 to 0.95, got .*simulate_orders"):
-        exact.reflectance(0.9, setting)
-
-
 def test_a_damaged_table_is_named(monkeypatch, tmp_path):
     content = forwards.FILE.read_bytes()
     bad = tmp_path / "half_space.npz"

@@ -115,12 +115,6 @@ def test_unscattered_light_is_told_apart():
 
 
 @pytest.mark.slow
-def test_lanes_and_workers_change_no_bit():
-    one, other = (simulate(STACK, GRID, 2**18 + 7, illumination="diffuse", workers=w, progress=False) for w in (1, 2))
-    assert np.array_equal(one.deposits.reflected, other.deposits.reflected)
-
-
-@pytest.mark.slow
 def test_files_and_stores_keep_the_light(tmp_path):
     grid = Grid(0.1, 5, dz=0.1, nz=3)
     tally = shone(STACK, 2000, grid=grid)

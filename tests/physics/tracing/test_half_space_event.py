@@ -92,10 +92,12 @@ def test_kernel_agrees_with_its_slow_twin_in_every_ring_and_order_and_with_no_ot
     assert (np.abs(z).max() < sidak(z.size)) == (setting == other)
 
 
-def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
-    ends = orders_batch.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(STOPS))
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_it_agrees_with_the_isotropic_kernel_where_that_applies(illumination, sidak):
+    key = jnp.asarray(rng.batch_key(8, 0))
+    ends = orders_batch.trace(key, jnp.int32(PHOTONS), jnp.asarray(STOPS), illumination=illumination)
     isotropic = table(np.asarray(ends.rho)[:PHOTONS], np.asarray(ends.order)[:PHOTONS])
-    z = deviations(table(*traced(Setting(), PHOTONS)), isotropic)
+    z = deviations(table(*traced(Setting(illumination), PHOTONS)), isotropic)
     assert np.abs(z).max() < sidak(z.size)
 
 

@@ -6,13 +6,9 @@ import pytest
 from mcml_sim import Grid, InputError, Setting, exact, simulate_orders
 from mcml_sim.results.estimate import estimate
 from mcml_sim.tracing import orders_batch
+from tests.physics.exact.test_exact_tracer import energy
 
 ALPHAS = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])
-
-
-def exact_energy(edges, alpha):
-    """Integral of the exact profile over each ring."""
-    return np.diff(exact.cdf(edges, alpha)) * exact.reflectance(alpha)
 
 
 def deviations(estimate_, truth):
@@ -35,7 +31,7 @@ def test_reflectance_is_the_exact_one(run):
 def test_rings_that_are_sampled_hold_the_exact_energy(run, alpha, sidak):
     found = run.energy(alpha)
     sampled = found.is_sampled()
-    z = deviations(found, exact_energy(run.grid.r_edges, alpha))[sampled]
+    z = deviations(found, energy(alpha, run.grid.r_edges))[sampled]
     assert sampled.sum() > 25
     assert np.abs(z).max() < sidak(sampled.sum())
 
@@ -44,7 +40,7 @@ def test_without_the_gate_far_rings_look_many_errors_wrong(run, sidak):
     """The photons that carry the light there were never seen, and the standard error collapsed with them."""
     found = run.energy(0.2)
     seen = (found.standard_error > 0) & ~found.is_sampled()
-    z = deviations(found, exact_energy(run.grid.r_edges, 0.2))[seen]
+    z = deviations(found, energy(0.2, run.grid.r_edges))[seen]
     assert np.abs(z).max() > 2 * sidak(seen.sum())
 
 
@@ -67,7 +63,7 @@ def test_derivative_is_the_slope_of_the_profile(run, sidak):
         np.testing.assert_allclose(run.profile_derivative(alpha).value, slope, rtol=1e-4, atol=1e-12 * slope.max())
     # And that of the exact energy.
     alpha, step = 0.9, 1e-4
-    truth = (exact_energy(run.grid.r_edges, alpha + step) - exact_energy(run.grid.r_edges, alpha - step)) / (2 * step)
+    truth = (energy(alpha + step, run.grid.r_edges) - energy(alpha - step, run.grid.r_edges)) / (2 * step)
     found = run.profile_derivative(alpha).scaled(run.grid.r_areas)
     sampled = found.is_sampled()
     assert np.abs(deviations(found, truth)[sampled]).max() < sidak(sampled.sum())
@@ -90,7 +86,7 @@ def test_shapes_are_alpha_then_rings(run):
 def test_light_scattered_once_is_exact_and_takes_most_of_the_error_near_the_source(run):
     """The same with the photons' own first scatterings: as right, and less precise where they are most of the light."""
     plain = estimate(run.ring_order_counts, run.weights(0.5), run.photons)
-    truth, found = exact_energy(run.grid.r_edges, 0.5), run.energy(0.5)
+    truth, found = energy(0.5, run.grid.r_edges), run.energy(0.5)
     near = slice(0, 10)
     assert np.all(found.standard_error[near] < 0.45 * plain.standard_error[near])
     assert np.abs((plain.value - truth)[near] / plain.standard_error[near]).max() < 4

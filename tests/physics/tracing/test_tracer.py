@@ -5,12 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Setting, exact
+from mcml_sim import Grid, Setting
 from mcml_sim.results.estimate import estimate
 from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
 from mcml_sim.tracing.half_space_event import OrderLanes
 from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
 from tests.fixtures import slow
+from tests.physics.exact.test_exact_tracer import energy
 from tests.physics.tracing.test_half_space_event import deviations, slow_twin, table
 
 STOPS = OrderBins().stops
@@ -82,24 +83,21 @@ def test_rings_are_those_of_float64_edges(ends):
     assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
-RADII = np.concatenate([[0.0], np.geomspace(0.03, 5, 12)])
+EDGES = np.concatenate([[0.0], np.geomspace(0.03, 5, 12), [np.inf]])
 EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
 
 
 @pytest.fixture(scope="module", params=["searchlight", "diffuse"])
 def lit(request):
     """Half a million photons of either light."""
-    grid = Grid.from_edges(r=RADII)
+    grid = Grid.from_edges(r=EDGES[:-1])
     return request.param, orders_batch.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
 
 
 def from_exact(counts, illumination):
     """z of the energy in every ring and beyond the last, (alphas, rings + 1)."""
     got = estimate(counts.exits, OrderBins().weights(EXACT_ALPHAS), counts.started)
-    setting = Setting(illumination)
-    alphas = EXACT_ALPHAS[:, None]
-    within = exact.cdf(np.append(RADII, np.inf), alphas, setting=setting) * exact.reflectance(alphas, setting)
-    return (got.value - np.diff(within, axis=1)) / got.standard_error
+    return (got.value - energy(EXACT_ALPHAS[:, None], EDGES, Setting(illumination))) / got.standard_error
 
 
 def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
@@ -108,27 +106,6 @@ def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
     other = {"searchlight": "diffuse", "diffuse": "searchlight"}[illumination]
     assert np.abs(from_exact(counts, other)).max() > 3 * sidak(4 * 13)
     assert np.abs(from_exact(counts, illumination)).max() < sidak(4 * 13)
-
-
-@pytest.mark.slow
-def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
-    illumination, counts = lit
-    where = half_space_event.half_space(Setting(illumination))
-    ends = orders_batch.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), STOPS, where)
-    rings = np.append(RADII, np.inf)
-    general = np.histogram(np.asarray(ends.rho)[np.asarray(ends.order) == 3], bins=rings)[0] / 2**18
-    fast = counts.exits[:, 2] / 2**19
-    error = np.sqrt(general / 2**18 + fast / 2**19)
-    assert np.abs((general - fast) / error).max() < sidak(13)
-
-
-@pytest.mark.slow
-def test_other_settings_take_the_general_kernel():
-    glass = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
-    free = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000)
-    assert glass.is_closed
-    # Under glass fewer than half of those that come up leave.
-    assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
 
 
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():

@@ -3,13 +3,11 @@
 from functools import reduce
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from mcml_sim import InputError, Layer, Medium, Setting, SettingError, exact
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, Tabulated, as_table, from_table
-from mcml_sim.tracing import rng
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.phases import read_phase
 
@@ -52,13 +50,6 @@ def test_stratified_draws_of_a_kernel(phase, most):
     v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
     assert apart(drawn(phase, v), phase) < most
     assert apart(drawn(HenyeyGreenstein(0.924), v), phase) > 1e-3
-
-
-@pytest.mark.slow
-@ALL
-def test_random_draws_of_a_kernel(phase):
-    words = np.random.default_rng(5).integers(0, 2**32, 10**7, dtype=np.uint32)
-    assert apart(drawn(phase, rng.symmetric(jnp.asarray(words))), phase) < 6e-4  # Kolmogorov's 0.15 % point
 
 
 @ALL

@@ -115,7 +115,6 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
         (2, "2", "the name of an output file, and A or B", "the end of the file"),
         (3, "a" * 256, "the name of an output file, at most 255 printable characters", f"'{'a' * 37}...'"),
         (4, "0", "the number of photons, a whole number from 1 to 10000000000000", "'0'"),
-        (4, "-5", "the number of photons, .*", "'-5'"),
         (4, "1e6", "the number of photons, .*", "'1e6'"),
         (4, "10000000000001", "the number of photons, .*", "'10000000000001'"),
         (4, "1_000", "the number of photons, .*", "'1_000'"),
@@ -125,8 +124,6 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
         (5, "0 0.02", "dz in cm, a number from 1e-12 to 1e[+]12", "'0'"),
         (5, "0.01 nan", "dr in cm, .*", "'nan'"),
         (5, "0.01 1e999", "dr in cm, .*", "'1e999'"),
-        (5, "0.01 0x10", "dr in cm, .*", "'0x10'"),
-        (5, "0.01,0.02", "2 values, dz and dr", "1: '0.01,0.02'"),
         (6, "3 4", "3 values, nz, nr and na", "2: '3 4'"),
         (6, "3 4.5 5", "nr, a number of bins, a whole number from 1 to 65536", "'4.5'"),
         (6, "3 4 65537", "na, a number of bins, .*", "'65537'"),
@@ -197,9 +194,7 @@ def test_what_is_no_text_is_said(tmp_path, content, message):
 def test_what_cannot_be_opened_is_said(tmp_path):
     with pytest.raises(InputError, match=r"none.mci: expected a file that can be read, got: No such file or directory"):
         read_mci(tmp_path / "none.mci")
-    with pytest.raises(InputError, match=r"expected a file that can be read, got: Is a directory"):
-        read_mci(tmp_path)
-    for path in ("a\x00b", 3, None):
+    for path in (tmp_path, "a\x00b", 3, None):
         with pytest.raises(InputError, match="expected a file that can be read"):
             read_mci(path)
 
@@ -298,7 +293,6 @@ def test_both_runs_of_mcml_2_are_read():
     [
         (SKIN, SKIN.replace("0.9", "1"), 9, "g of 'skin' between -1 and 1, or 1 where nothing"),
         (SKIN, SKIN.removesuffix("\t0.9"), 9, "a medium's name, n, mu_a, mu_s and g, 1000 media"),
-        (SKIN, SKIN.replace("\t1\t", f"\t{LONG}\t"), 9, f"mu_a of 'skin' in 1/cm, .*, got '{'9' * 37}\\.\\.\\.'"),
         ("  glass	1.5", "  air	1.5", 8, "each medium once, got 'air' again"),
         ("  skin	0.2", "  bone	0.2", 15, "one of the media air, glass, skin, got 'bone'"),
         ("  skin	0.2", "  skin", 17, "a medium above, layers with their thickness, and a medium below, got 4 lines"),
@@ -308,7 +302,6 @@ def test_both_runs_of_mcml_2_are_read():
         ("0					# starting", "0.1 # starting", 19, "light that starts at the surface, 0, got '0.1'"),
         ("0.01	0.02	0.1	", "0.01	0.02	0", 20, "dt in ps, a number from"),
         ("3	4	1	5", "3	4	1", 21, "4 values, nz, nr, nt and na, got 3"),
-        ("3	4	1	5", "65536	65536	1	5", 21, "nr nz, the cells of a table, to be at most"),
         ("Rd_r A_rz", "Rd_r A_rzt", 22, "quantities of Rd_r, .*, A_rz, none resolved in time, got 'A_rzt'"),
         ("a_z\n", "rd_t\n", 37, "quantities of .*none resolved in time, got 'rd_t'"),
         ("1E3	10:00", "10:00	", 23, "the number of photons, a whole number from 1 to 10+, got '10:00'"),

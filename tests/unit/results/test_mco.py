@@ -13,7 +13,6 @@ from mcml_sim.errors import OutputError
 from mcml_sim.results.mci import read_mci
 from mcml_sim.results.mco import begins_mco, parse_mco
 from mcml_sim.results.tally import Tally
-from mcml_sim.runs.simulation import simulate
 from mcml_sim.tracing.deposits import Deposits, shapes
 from tests.unit.results.test_mci import SECOND as INPUT
 
@@ -172,6 +171,8 @@ def test_v1_readers_find_v1_numbers(tally, tmp_path):
         np.testing.assert_allclose(found[name], numbers, rtol=ROUNDING.get(name, ROUNDING["table"]), err_msg=name)
     for name, numbers in by_keywords(path).items():
         np.testing.assert_array_equal(numbers, np.ravel(found[name]), err_msg=name)
+    totals = (tally.specular_reflectance, tally.diffuse_reflectance, tally.absorbed, tally.transmittance)
+    np.testing.assert_allclose(found["RAT"], [float(one) for one in totals], rtol=1e-5)
     assert found["photons"] == 1000
     assert (found["dz"], found["dr"], found["n_above"], found["n_below"]) == (0.02, 0.03, 1.1, 1.2)
     assert found["layers"] == [(1.3, 20, 200, 0.7, 0.01), (1.4, 10.123456789, 200, 0.9, 1e8)], "no digit is lost"
@@ -208,21 +209,6 @@ def test_totals_are_the_sums_of_the_tables(tally, tmp_path):
     found = by_lines(tmp_path / "out.mco")
     assert found["Rd_ra"].shape == (4, 1)
     assert found["Rd_a"] * 2 * math.pi * math.sin(math.pi / 4) * math.pi / 2 == pytest.approx(found["RAT"][1], rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_simulation_goes_out_and_comes_back(tmp_path):
-    medium = Medium((Layer(1.0, 10, 90, 0.75, 0.02),))
-    tally = simulate(medium, Grid(0.01, 10, 0.002, 10, na=5), 5000, seed=1, progress=False)
-    write_mco(tally, tmp_path / "slab.mco")
-    found = by_lines(tmp_path / "slab.mco")
-    totals = (tally.specular_reflectance, tally.diffuse_reflectance, tally.absorbed, tally.transmittance)
-    np.testing.assert_allclose(found["RAT"], [float(one) for one in totals], rtol=1e-5)
-    assert found["RAT"][3] > math.exp(-2), "with the ballistic light"
-    areas = 2 * math.pi * (np.arange(10) + 0.5) * 0.01**2
-    np.testing.assert_allclose(areas @ found["A_rz"], found["A_z"], rtol=1e-3)
-    np.testing.assert_allclose(found["A_z"].sum() * 0.002, found["RAT"][2], rtol=1e-3)
-    np.testing.assert_allclose(found["Rd_r"][:-1], tally.reflectance_r.value[:-1], rtol=1e-4)
 
 
 def test_arguments_may_come_in_either_order(tally, tmp_path):
@@ -347,7 +333,6 @@ def test_what_was_written_comes_back(tally, tmp_path):
     ("change", "message"),
     [
         (("A1", "B2"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got 'B2'"),
-        (("A1", "1.0"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got '1.0'"),
         (("\nInParm \t", "\nInput \t"), r"x.mco:\d+: expected the section InParm, got 'Input'"),
         (("3.0000E+01", "-nan"), r"x.mco:38: expected number 1 of 3 of Rd_r, got '-nan'"),
         (("2.0000E+00", "-2.0"), r"x.mco:39: expected number 2 of 3 of Rd_r, a number from 0 to 1e\+30, got '-2.0'"),
@@ -425,18 +410,9 @@ def test_mcml_2_is_read(tmp_path):
     [
         ("mcmli2.0", "mcmli1.0", r":11: expected the input's version, mcmli2.0, got 'mcmli1.0'"),
         ("skin	0.2", "bone	0.2", r":22: expected one of the media air, glass, skin, got 'bone'"),
-        ("skin	0.2", "skin", r":24: expected a medium above, layers with their thickness, and a medium below"),
-        ("pencil", "isotropic", r":25: expected a pencil beam, pencil, got 'isotropic'"),
-        (
-            "0					# start",
-            "0.1	# start",
-            r":26: expected light that starts at the surface, 0, got '0.1'",
-        ),
         ("Rd_r A_rz", "A_rz", r":29: expected Rd_r among what was scored, got 'A_rz Rd_t'"),
-        ("1E3", "1.5", r":30: expected the number of photons, a whole number from 1"),
         ("1.4	1	100	0.9", "1.4	1	100	1", r":16: expected g of 'skin' between -1 and 1"),
         ("  2.5000E-01\n", "", r":57: expected number 4 of 4 of Rd_r, a number from 0 to 1e\+30, got 'Rd_t'"),
-        ("3	4	1", "3	99999999	1", r":28: expected nr, a number of bins, a whole number from 1 to"),
     ],
 )
 def test_what_is_wrong_in_mcml_2_is_named(old, new, told):

@@ -44,6 +44,11 @@ def equal(a, b):
     return np.array_equal(a.exits, b.exits) and a.ledger == b.ledger
 
 
+def fails(scheduler, message, error=ClusterError, trace=TRACE):
+    with pytest.raises(error, match=message):
+        run_batches(trace, BATCH, BATCH, scheduler=scheduler)
+
+
 def pids(workers):
     with distributed.Client(workers.scheduler_address, set_as_default=False) as client:
         return set(client.run(os.getpid).values())
@@ -91,8 +96,8 @@ def test_a_worker_killed_in_the_middle_changes_no_bit(workers, alone, tmp_path):
 def test_a_worker_that_would_give_other_bits_is_refused_by_name(workers, monkeypatch):
     real = cluster.maker()
     monkeypatch.setattr(cluster, "maker", lambda: real | {"jaxlib": "0.0.1"})
-    with pytest.raises(ClusterError, match=r"worker tcp://127.* would give other bits: jaxlib is .* there, 0.0.1 here"):
-        run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
+    said = r"worker tcp://127.* would give other bits: jaxlib is .* there, 0.0.1 here"
+    fails(workers.scheduler_address, said)
 
 
 LACKING = r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"
@@ -108,20 +113,18 @@ LACKING = r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit th
     ids=["any error", "without the package", "a time-out, which is no silence"],
 )
 def test_an_error_on_a_worker_rises_here(workers, trace, error, message):
-    with pytest.raises(error, match=message):
-        run_batches(trace, BATCH, BATCH, scheduler=workers.scheduler_address)
+    fails(workers.scheduler_address, message, error, trace)
 
 
 def test_a_batch_that_kills_its_workers_is_given_up_by_name(workers, monkeypatch):
     monkeypatch.setattr(workers.scheduler, "allowed_failures", 0)
-    with pytest.raises(ClusterError, match=r"^batch 0 was on 1 workers of tcp://.* when they died, .*; look at their"):
-        run_batches(lambda batch, photons: os._exit(1), BATCH, BATCH, scheduler=workers.scheduler_address)
+    said = r"^batch 0 was on 1 workers of tcp://.* when they died, .*; look at their"
+    fails(workers.scheduler_address, said, trace=lambda batch, photons: os._exit(1))
 
 
 def test_a_scheduler_without_the_package_is_refused(workers, monkeypatch):
     monkeypatch.setattr(cluster, "cpu_class", lambda: __import__("mcml_sim_"))
-    with pytest.raises(ClusterError, match=r"cannot load mcml_sim \(No module named 'mcml_sim_'\); install the same"):
-        run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
+    fails(workers.scheduler_address, r"cannot load mcml_sim \(No module named 'mcml_sim_'\); install the same")
 
 
 @pytest.fixture
@@ -150,15 +153,12 @@ def test_a_cluster_without_workers_is_said_once(lonely, alone, monkeypatch):
 @pytest.mark.usefixtures("python_handles_sigint")
 def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
     threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
-    with pytest.raises(KeyboardInterrupt):
-        run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
+    fails(lonely.scheduler_address, None, KeyboardInterrupt)
 
 
 def test_a_scheduler_that_leaves_is_one_line(lonely):
     threading.Timer(0.5, lonely.close).start()
-    gone = r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
-    with pytest.raises(ClusterError, match=gone):
-        run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
+    fails(lonely.scheduler_address, r"^the scheduler at tcp://.* has gone; the same run with its store resumes$")
 
 
 @pytest.fixture
@@ -170,10 +170,8 @@ def impatient(monkeypatch):
 def test_no_scheduler_is_one_line():
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):
-            run_batches(TRACE, BATCH, BATCH, scheduler=address)
-    with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):  # now nobody listens
-        run_batches(TRACE, BATCH, BATCH, scheduler=address)
+        fails(address, f"^no Dask scheduler answers at {address} .*$")
+    fails(address, f"^no Dask scheduler answers at {address} .*$")  # now nobody listens
 
 
 @pytest.mark.usefixtures("impatient")
@@ -189,26 +187,21 @@ def test_another_server_is_one_line():
         thread = threading.Thread(target=answer)
         thread.start()
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):
-            run_batches(TRACE, BATCH, BATCH, scheduler=address)
+        fails(address, f"^no Dask scheduler answers at {address} .*$")
         thread.join()
 
 
 def test_a_worker_is_no_scheduler(workers):
-    worker = next(iter(workers.scheduler_info["workers"]))
-    with pytest.raises(ClusterError, match="there is a Dask Worker, not a scheduler"):
-        run_batches(TRACE, BATCH, BATCH, scheduler=worker)
+    fails(next(iter(workers.scheduler_info["workers"])), "there is a Dask Worker, not a scheduler")
 
 
 @pytest.mark.parametrize("address", ["here", "", "http://127.0.0.1:8786", 8786])
 def test_no_address_is_refused(address):
-    with pytest.raises(InputError, match=r"scheduler must be an address like tcp://host:8786, got "):
-        run_batches(TRACE, BATCH, BATCH, scheduler=address)
+    fails(address, r"scheduler must be an address like tcp://host:8786, got ", InputError)
 
 
 def test_the_optional_package_is_named_and_workers_here_and_there_are_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"the package distributed is missing; pip install distributed$"):
-        run_batches(TRACE, BATCH, BATCH, scheduler="tcp://127.0.0.1:8786")
+    fails("tcp://127.0.0.1:8786", r"the package distributed is missing; pip install distributed$", InputError)
     with pytest.raises(InputError, match="workers must be None where a scheduler is given"):
         run_batches(TRACE, BATCH, BATCH, workers=2, scheduler="tcp://127.0.0.1:8786")

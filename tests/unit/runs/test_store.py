@@ -191,25 +191,18 @@ def test_arrays_that_are_no_counts_are_refused(wrong):
     assert READ(COUNTS.arrays()).ledger == COUNTS.ledger
 
 
-@pytest.mark.parametrize(
-    ("arrays", "reason"),
-    [
-        ({"exits": np.zeros(2**26, np.int8)}, r"its arrays claim 6710\d+ bytes, more than the 1048576 that are read"),
-        ({"made_by": np.array(3)}, "'made_by' must be one text, got int64"),
-        ({"exits": np.array([None])}, "'exits' is no array of numbers or text"),
-    ],
-)
-def test_a_seal_is_no_proof(store, tmp_path, monkeypatch, arrays, reason):
+def test_a_seal_is_no_proof(store, tmp_path, monkeypatch):
     """Anybody can seal a batch: what it claims is checked, and one that claims too much is not unpacked."""
     monkeypatch.setattr("mcml_sim.runs.store.MAX_BATCH", 2**20)
     store.save(0, COUNTS)
     with np.load(tmp_path / "batch-00000000.npz") as whole:
-        fields = {**whole, **arrays}
+        fields = {**whole, "exits": np.zeros(2**26, np.int8)}
     file = io.BytesIO()
     np.savez_compressed(file, **fields)
     body = file.getvalue()[:-2] + (64).to_bytes(2, "little")
     (tmp_path / "batch-00000000.npz").write_bytes(body + hashlib.sha256(body).hexdigest().encode())
-    with pytest.warns(DamagedBatch, match=rf"is damaged \({reason}"):
+    claim = r"is damaged \(its arrays claim 6710\d+ bytes, more than the 1048576 that are read"
+    with pytest.warns(DamagedBatch, match=claim):
         assert store.load(0) is None
 
 

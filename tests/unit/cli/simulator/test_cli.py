@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -561,7 +562,8 @@ def test_a_value_with_two_digits_of_its_error(value, error, samples, text):
     ],
 )
 def test_speed_leaves_out_compiling(photons, seconds, compiling, text):
-    assert app.speed(photons, seconds, compiling) == text
+    done = input_runs.Done(SimpleNamespace(photons=photons), seconds, compiling)
+    assert app.pace(done, on_workers=False) == text
 
 
 def test_light_that_was_cut_is_a_line_of_the_sum():
