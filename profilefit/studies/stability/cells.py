@@ -408,7 +408,16 @@ def _region(cells: Cells, part: Mask, verdict: Verdict) -> Region:
     )  # fmt: skip
 
 
+def functions_of(law: Any) -> dict[str, Callable[..., Any]]:
+    """Return the functions in Python of a map or of a profile law, by quantity."""
+    if isinstance(law, AlbedoLaw):
+        return {ALPHA_OF: law.alpha, REFLECTANCE_OF: law.reflectance}
+    return {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
+
+
 NAME = "law"
+# Functions of texts that have another name than their quantity.
+CALLED = {PROFILE: "profile", ALPHA_OF: "alpha", REFLECTANCE_OF: "map_reflectance"}
 # 64 bits of mantissa and 15 of exponent on x86: float64's own rounding and overflow are seen from outside. Where it is
 # no more than float64, what float64 does wrong to its last digits goes unseen.
 EXTENDED = np.longdouble
@@ -442,10 +451,10 @@ class RoundedText:
         exec(compile(law.replace("import numpy as np\n", "", 1), f"{NAME}.py", "exec"), self._names)
 
     def call(self, function: str, *arguments: Any) -> Any:
-        """Call a function of the text, by its name less the prefix, with arrays that are rounded to the type first."""
+        """Call a quantity's or another function, by its name less the prefix, with arrays that are rounded first."""
         given = [one.astype(self.dtype) if isinstance(one, np.ndarray) else one for one in arguments]
         with np.errstate(all="ignore"):  # what is no number is what is looked for
-            return self._names[f"{NAME}_{function}"](*given)
+            return self._names[f"{NAME}_{CALLED.get(function, function)}"](*given)
 
     def replace(self, function: str, other: Callable[..., Any]) -> None:
         """Replace a function of the text, by that name less the prefix, with another."""

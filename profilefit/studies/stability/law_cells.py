@@ -148,7 +148,7 @@ def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> dict[str, Flo
         text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
         if arithmetic == cells.STORED16:
             alpha = _stored_albedo(text, alpha)
-        calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
+        calls = zip(cells.QUANTITIES, (r, r, xi, r), strict=True)
         values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
         if arithmetic == cells.STORED16:
             with np.errstate(over="ignore"):

@@ -37,7 +37,6 @@ OF_LAWS = (
 OF_BORROWER = "fit the constants to these layers: stack_law, or profilefit regenerate STACK.toml"
 OF_ONCE = "keep g at -0.5 or above; nothing known scatters farther back"
 BOTH = (FLOAT64, TEXT32)
-CALLED = {PROFILE: "profile", CDF: "cdf", TOTAL: "total", SAMPLE: "sample", PDF: "pdf"}
 UNDRAWN = (PROFILE, CDF, TOTAL)  # of recorded laws in float64: samplers of each of their settings compile for seconds
 THICKNESS = (0.0, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6)  # [mfp of the first layer]
 RADIUS = (1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 300.0, 1e3)
@@ -188,7 +187,7 @@ def _largest(law: StackLaw, d: Floats | float, r: Floats) -> Floats:
     return largest
 
 
-def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
+def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = (*UNDRAWN, SAMPLE, PDF)) -> Iterator[Cells]:
     """Yield quantities over thickness and radius or uniform number."""
     dtype, law, unit, channel = cells.DTYPES[arithmetic], case.law, case.law.top.mfp, np.zeros(1)
 
@@ -197,15 +196,13 @@ def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED
 
     d, r, xi = rounded(THICKNESS, unit)[:, None], rounded(RADIUS, unit), rounded(SHARE)
     text = case.text(np.float32) if arithmetic == TEXT32 else None
-    python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
+    python = {**cells.functions_of(law), TOTAL: law.total}
     whole, within = (np.asarray(case.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
     for name in names:
-        given = () if name == TOTAL else (xi if name == SAMPLE else r,)
-        reference = np.asarray(case.reference.call(CALLED[name], *given, channel, d), float)
-        if text is not None:
-            value = np.asarray(text.call(CALLED[name], *given, channel, d), float)
-        else:
-            value = np.asarray(law.total(d) if name == TOTAL else python[name](*given, d))
+        called, given = ("total", ()) if name == TOTAL else (name, (xi if name == SAMPLE else r,))
+        reference = np.asarray(case.reference.call(called, *given, channel, d), float)
+        value = python[name](*given, d) if text is None else text.call(called, *given, channel, d)
+        value = np.asarray(value, float)
         if name == TOTAL:  # whose ends are known
             ends = np.select([d == 0, d == d[-1]], [law.below.whole(), law.top.whole()], reference)
             value, reference = value[:, 0], ends[:, 0]

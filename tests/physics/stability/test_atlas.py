@@ -17,7 +17,7 @@ FITS = catalogue.fits_folder()
 
 
 def test_laws_and_functions_refuse_nonsense_by_name():
-    cells = [*misuse.of_law(find("hazard", FITS)), *misuse.of_map(find("albedo-rational", FITS))]
+    cells = [*misuse.of_law(find("hazard", FITS)), *misuse.of_law(find("albedo-rational", FITS))]
     cells += [*misuse.of_exact(), *misuse.of_convert()]
     assert {one.arithmetic for one in cells} == {FLOAT64, "float32 text"}
     for one in cells:
