@@ -201,7 +201,8 @@ def over_the_cylinder(law, place, radius):
     return strips[arc > 0].sum() / strips.sum()
 
 
-def test_plane_is_the_integral(hazard, share):
+def test_plane_is_the_integral_and_has_its_quartile(hazard, share):
+    assert share(np.array(share.quartile)) == pytest.approx(0.25, abs=1e-9)
     expected = step_response(PLACES, ALBEDO, law=hazard)
     for mfp in (1.0, 3.0):
         np.testing.assert_allclose(response(share, mfp * PLACES, mfp, np.inf), expected, atol=2e-5)
@@ -237,7 +238,3 @@ def test_average_is_the_mean_over_the_pixel(share, radius):
     found = module.averaged(share, middles, pixel, 1.0, radius)
     np.testing.assert_allclose(found, expected, atol=1e-5)
     assert abs(response(share, middles[:1], 1.0, radius) - expected[0])[0] > 1e-3
-
-
-def test_quartile(share):
-    assert share(np.array(share.quartile)) == pytest.approx(0.25, abs=1e-9)

@@ -44,13 +44,10 @@ def of_map(label):
     return list(gradients.of_map(one, bounds.valid_map(one, FITS)))
 
 
-def test_the_rational_map_is_differentiable_both_ways():
+def test_the_rational_map_is_differentiable_both_ways_and_the_printed_one_has_no_slope_above_its_fold():
     cells = of_map("albedo-rational")
     assert {one.quantity for one in cells} == DERIVATIVES
     assert not any(one.failures.any() for one in cells)
-
-
-def test_the_printed_map_has_no_slope_above_its_fold():
     regions = [region for cells in of_map("liang, published") for region in regions_of(cells)]
     red = [one for one in regions if one.verdict.is_red]
     assert {one.advice for one in red} == {gradients.INSIDE}

@@ -69,7 +69,7 @@ def test_table_is_the_exact_profile_to_rounding():
     assert profile_quality(table.law, laws.judged_albedos(2)).rel.max() < 1e-5
 
 
-def test_counts_what_the_answer_needs_once_for_each_point_or_material():
+def test_counts_what_the_answer_needs_once_for_each_point_or_material_or_step_of_a_loop():
     def function(x, alpha):
         jnp.tanh(x)  # not needed
         nodes = jnp.log(jnp.arange(1.0, 4.0)) + alpha
@@ -79,9 +79,6 @@ def test_counts_what_the_answer_needs_once_for_each_point_or_material():
     assert found.point == Counter(exp=1, cos=3)
     assert found.material == Counter(sqrt=1, log=3)
     assert found.transcendental == 4
-
-
-def test_counts_each_step_of_a_loop():
     found = count(lambda x, alpha: jax.lax.fori_loop(0, 5, lambda _, y: jnp.sqrt(jnp.log(y + alpha)), x))
     assert (found.point, found.transcendental) == (Counter(log=5, sqrt=5), 5)
     with pytest.raises(ValueError, match="no loop of unknown length"):
