@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -109,7 +109,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
                 if seed == 0:
                     compiling[name] = max(compiling.get(name, 0.0), seconds)
                     continue
-                fitted, limit = (with_constants(start, each.constants) for each in (result, limits[name]))
+                fitted, limit = (replace(start, **each.constants) for each in (result, limits[name]))
                 away, done = standardised(result, limits[name]), result.result == "converged"
                 trial = Trial(seconds, light, *change(fitted, limit), away, done)
                 trials.setdefault((name, photons), []).append(trial)
@@ -155,11 +155,6 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
 
 def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
     return dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
-def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
-    """Return the law with these constants replaced."""
-    return law.with_vector(tuple(constants), list(constants.values()))
 
 
 def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:

@@ -299,11 +299,6 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
             _add(nested, inner, counts)
 
 
-def described(functions: Counter[str]) -> str:
-    """Return functions as text, for example "2 exp, log"; a dash where there is none."""
-    return ", ".join(f"{number} {name}" if number > 1 else name for name, number in sorted(functions.items())) or "–"
-
-
 # Of one call. A law that computes more functions a point than these takes fewer points, or is not timed at all.
 MANY, TOO_MANY = 30, 5000
 MATERIAL = 0.8  # the albedo of the timed material
