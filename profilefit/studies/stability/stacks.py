@@ -70,7 +70,6 @@ ENDS: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
      (0.9929, -0.002392, 0.9386, 1.221, 0.01733, 0.1353, 8.647e-05, 1.249, 3.278)),
     (1.0, 0.5, (0.025, 0.014, 0.016), (0.9994, -8.088e-05, 1.056, 1.436, 4.647e-05, 0.01146, 0.8121, 1.659, 0.8803)),
 )  # fmt: skip
-BORROWER = (0.99, 0.5)  # albedos of a law that has the constants of others
 # Light scattered once: index, cosines, optical depth of the first layer, g, albedo below, cosine of the azimuth.
 INDICES = (1.0, 1.4, 2.0)
 COSINES = (1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0)
@@ -157,7 +156,7 @@ def end(first: float, below: float, errors: Sequence[float], constants: Sequence
 
 def borrower() -> StackCase:
     """Return a law whose albedos were changed after its constants, those of the first of `ENDS`, were fitted."""
-    one = end(*BORROWER, *ENDS[0][2:])
+    one = end(0.99, 0.5, *ENDS[0][2:])
     return replace(one, label=f"{one.label}, constants of {ENDS[0][0]:g} on {ENDS[0][1]:g}", own=False)
 
 
