@@ -21,7 +21,7 @@ from tests.physics.choose.conftest import DIFFUSE, MFP
 WITHIN = Within()
 
 
-def test_nothing_leaves_the_whole_step(light, case):
+def test_nothing_leaves_the_whole_step_and_each_part_is_named(light, case):
     """What Lambert misses is the light from beyond the edge: here by hand, of the brightest channel."""
     found = error(NOTHING, case, light, WITHIN)
     x = case.places(0, WITHIN)
@@ -30,6 +30,11 @@ def test_nothing_leaves_the_whole_step(light, case):
     assert found.channel == 0
     assert found.noise == found.curvature == 0.0
     assert found.total == pytest.approx(found.model, rel=0.02)
+    # Large pixels and curves are named.
+    far = error(Option("separable", 17), replace(case, pixel=4.0), light, WITHIN)
+    assert far.pixel > far.model
+    bent = error(Option("separable", 33), replace(case, radius=2.0), light, WITHIN)
+    assert bent.curvature > bent.model
 
 
 @pytest.mark.slow
@@ -57,13 +62,6 @@ def test_light_under_a_surface_is_exact(case):
     assert ReferenceLight(setting).alpha(1.0) == 1.0  # no surface that refracts is white
     with pytest.raises(InputError, match=r"index must be a refractive index in \[1, 1.6\], got 1.61"):
         ReferenceLight(Setting(n=1.61))
-
-
-def test_large_pixels_and_curves_are_named(light, case):
-    far = error(Option("separable", 17), replace(case, pixel=4.0), light, WITHIN)
-    assert far.pixel > far.model
-    bent = error(Option("separable", 33), replace(case, radius=2.0), light, WITHIN)
-    assert bent.curvature > bent.model
 
 
 def test_places():

@@ -115,15 +115,12 @@ def test_neighbours_of_one_class_are_one_region():
     assert regions_of(small_cells([fine, Verdict.OUTSIDE, Verdict.BEYOND])) == []
 
 
-def test_a_region_has_its_worst_cell_and_says_why_it_is_not_judged():
+def test_a_region_has_its_worst_cell_its_advice_and_why_it_is_not_judged():
     (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3, error=np.array([[0.2, 0.5, 0.3]])))
     assert (region.place, region.error, region.where) == ("α 0.5; l 2", 0.5, "α 0.5; all l")
     (region,) = regions_of(small_cells([Verdict.NOT_JUDGED] * 3, unjudged="no text"))
     assert (region.verdict, region.advice) == (Verdict.NOT_JUDGED, "no text")
     assert not region.is_failure
-
-
-def test_every_arithmetic_has_its_advice():
     assert set(cells.ADVICE) == set(cells.ARITHMETICS)
     (region,) = regions_of(small_cells([Verdict.INACCURATE] * 3))
     assert region.advice == cells.ADVICE[cells.TEXT16]
