@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import ArgumentGrid, Cells, Verdict, axis, judged, regions_of, relative
+from profilefit.studies.stability.cells import ArgumentGrid, Cells, Verdict, axis, regions_of, relative
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
@@ -41,37 +41,35 @@ def test_numbers_as_a_person_writes_them_and_a_span_says_all_where_it_is_all():
     [
         ({"value": 1.0, "reference": 1.0 + 1e-4}, Verdict.RIGHT),
         ({"value": 1.0, "reference": 1.01}, Verdict.INACCURATE),
-        ({"value": 1.0, "reference": 1.01, "inside": False}, Verdict.OUTSIDE),
+        ({"value": 1.0, "reference": 1.01, "judge": False}, Verdict.OUTSIDE),
         ({"value": -1.0, "reference": 1.0}, Verdict.NEGATIVE),
         ({"value": np.nan, "reference": 1.0}, Verdict.NOT_FINITE),
-        ({"value": np.nan, "reference": np.nan, "inside": False}, Verdict.NOT_FINITE),
+        ({"value": np.nan, "reference": np.nan, "judge": False}, Verdict.NOT_FINITE),
         ({"value": np.inf, "reference": 1.0}, Verdict.NOT_FINITE),
         ({"value": np.inf, "reference": np.inf}, Verdict.RIGHT),
-        ({"value": np.inf, "reference": 1e39, "dtype": np.float32}, Verdict.BEYOND),
-        ({"value": 0.0, "reference": 1e-40, "dtype": np.float32}, Verdict.BEYOND),
-        ({"value": 1.0, "reference": 1e-40, "dtype": np.float32}, Verdict.INACCURATE),
+        ({"value": np.inf, "reference": 1e39, "arithmetic": cells.FLOAT32}, Verdict.BEYOND),
+        ({"value": 0.0, "reference": 1e-40, "arithmetic": cells.FLOAT32}, Verdict.BEYOND),
+        ({"value": 1.0, "reference": 1e-40, "arithmetic": cells.FLOAT32}, Verdict.INACCURATE),
         ({"value": 0.0, "reference": 1e-20, "dim": True}, Verdict.BEYOND),
         ({"value": 0.0, "reference": 1e-20}, Verdict.INACCURATE),
         ({"value": 1.0, "reference": 1.0, "wrong_way": True}, Verdict.NOT_MONOTONE),
         ({"value": 7.0, "reference": np.nan}, Verdict.NOT_JUDGED),
-        ({"value": 7.0, "reference": np.nan, "inside": False}, Verdict.OUTSIDE),
+        ({"value": 7.0, "reference": np.nan, "judge": False}, Verdict.OUTSIDE),
         ({"value": -7.0, "reference": np.nan}, Verdict.NEGATIVE),
         ({"value": 7.0, "reference": np.nan, "wrong_way": True}, Verdict.NOT_MONOTONE),
     ],
 )
 def test_class_of_a_cell(given, expected):
-    of = {"dtype": np.float64, "inside": True, "dim": False, "wrong_way": False, **given}
-    dtype = of.pop("dtype")
-    of = {name: np.array([one]) for name, one in of.items()}
-    error = relative(of["value"], of["reference"])
-    assert judged(**of, error=error, bound=1e-3, dtype=dtype)[0] == expected
+    of = {name: np.array([one]) for name, one in given.items() if name != "arithmetic"}
+    error, arithmetic = relative(of["value"], of["reference"]), given.get("arithmetic", cells.FLOAT64)
+    assert Cells("f", True, "cdf", arithmetic, (axis("x", [1.0]),), **of, error=error, bound=1e-3).codes[0] == expected
 
 
 @pytest.mark.parametrize("bound", [np.inf, np.nan])
 def test_without_a_bound_nothing_is_right(bound):
-    one = np.ones(2)
-    codes = judged(one, one, 0.0 * one, bound, np.array([True, False]), np.float64)
-    np.testing.assert_array_equal(codes, [Verdict.NOT_JUDGED, Verdict.OUTSIDE])
+    one, judge = np.ones(2), np.array([True, False])
+    tensor = Cells("f", True, "cdf", cells.FLOAT64, (axis("x", one),), one, one, 0.0 * one, bound, judge=judge)
+    np.testing.assert_array_equal(tensor.codes, [Verdict.NOT_JUDGED, Verdict.OUTSIDE])
     # A figure shows the largest class over all lengths: what is not judged beside what is right.
     assert max(Verdict.RIGHT, Verdict.OUTSIDE, Verdict.BEYOND, Verdict.NOT_JUDGED) == Verdict.NOT_JUDGED
     assert not Verdict.NOT_JUDGED.is_red
@@ -83,7 +81,8 @@ def test_failures_are_the_red_classes_inside():
     at = axis("x", np.arange(codes.size))
     for inside in (True, False):
         tensor = Cells("f", True, "cdf", cells.FLOAT64, (at,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
-        np.testing.assert_array_equal(tensor.failures, [inside and each.is_red for each in Verdict])
+        failures = {region.verdict for region in regions_of(tensor) if region.is_failure}
+        assert failures == {each for each in Verdict if inside and each.is_red}
 
 
 def test_steps_count_beyond_rounding_only():
