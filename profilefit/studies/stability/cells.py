@@ -238,6 +238,7 @@ class Cells:
     subject    label of the law, map or function; own whether it is one of this project's own, held to have no red cell
     quantity   what is computed; arithmetic in which numbers, by what text
     value, reference, error  are broadcast to the axes; `error` is compared with `bound`, NaN where nothing is known
+    bound      in half at least what keeping a number costs
     inside     where the law says that it holds
     codes      `Verdict` of each cell, by default as value, reference and error say: not judged without a reference,
                where the error is NaN or the bound infinite
@@ -268,6 +269,8 @@ class Cells:
         shape = tuple(one.values.size for one in self.axes)
         for name in ("value", "reference", "error", "inside"):
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), shape))
+        if DTYPES[self.arithmetic] is np.float16:
+            object.__setattr__(self, "bound", max(self.bound, HALF_BOUND))
         if self.codes is None:
             object.__setattr__(self, "codes", self._judged(np.broadcast_to(judge, shape), dim, wrong_way))
 

@@ -63,15 +63,10 @@ def advice_of(named: LoadedLaw, arithmetic: str) -> str:
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of one law's errors by quantity, and where it holds."""
+    """Bounds of one law's errors by quantity, where they are known, and where it holds."""
 
     of: dict[str, float]
     valid: bounds.Validity
-
-    def bound(self, quantity: str, dtype: type) -> float:
-        """Return a tenth of the model's own error; in half not less than what keeping a number costs."""
-        own = self.of.get(quantity, np.inf)
-        return max(own, cells.HALF_BOUND) if dtype is np.float16 else own
 
 
 def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
@@ -104,7 +99,7 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
         places = (at.alpha, at.xi if name == cells.SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
         value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
-        inside, bound = holds.get(name, profiled) & at.accepted, limits.bound(name, at.dtype)
+        inside, bound = holds.get(name, profiled) & at.accepted, limits.of.get(name, np.inf)
         if name == cells.SAMPLE:
             error = reference.misplaced(value)
         else:

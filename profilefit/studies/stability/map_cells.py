@@ -41,12 +41,10 @@ def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     for (name, measure), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
-            dtype = cells.DTYPES[arithmetic]
-            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", dtype)
+            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", cells.DTYPES[arithmetic])
             value = _value(text.law, name, arithmetic, at)
             reference = _text_value(text.law, cells.EXTENDED, name, at.values)
-            own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
-            yield _cells(text, name, arithmetic, at, value, reference, limit=own, span=span)
+            yield _cells(text, name, arithmetic, at, value, reference, limit=limit, span=span)
     yield from _kept_in_half(text, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
