@@ -239,7 +239,7 @@ class Cells:
     quantity   what is computed; arithmetic in which numbers, by what text
     value, reference, error  are broadcast to the axes; `error` is compared with `bound`, NaN where nothing is known
     bound      in half at least what keeping a number costs
-    inside     where the law says that it holds
+    inside     where the law says that it holds; in half, which is measured only, nowhere
     codes      `Verdict` of each cell, by default as value, reference and error say: not judged without a reference,
                where the error is NaN or the bound infinite
     unjudged   why, where cells are not judged;  advice  what helps where they are red, by default `ADVICE`'s
@@ -267,10 +267,11 @@ class Cells:
 
     def __post_init__(self, judge: Mask | bool, dim: Mask | bool, wrong_way: Mask | None) -> None:
         shape = tuple(one.values.size for one in self.axes)
-        for name in ("value", "reference", "error", "inside"):
-            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), shape))
         if DTYPES[self.arithmetic] is np.float16:
             object.__setattr__(self, "bound", max(self.bound, HALF_BOUND))
+            object.__setattr__(self, "inside", False)
+        for name in ("value", "reference", "error", "inside"):
+            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), shape))
         if self.codes is None:
             object.__setattr__(self, "codes", self._judged(np.broadcast_to(judge, shape), dim, wrong_way))
 

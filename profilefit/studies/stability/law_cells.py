@@ -105,8 +105,7 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
         else:
             error = absolute(value, exactly) if name == cells.CDF else relative(value, exactly)
         yield _judged(
-            *(named, name, arithmetic, places, value, exactly, error, bound, inside & (arithmetic in cells.HELD)),
-            judge=inside,
+            *(named, name, arithmetic, places, value, exactly, error, bound, inside),
             dim=reference.dim(name, exactly),
             wrong_way=_wrong_way(name, value, reference),
             unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,

@@ -61,11 +61,10 @@ def _cells(
     """Return the cells of one direction, of value, reference and error, by default |value - reference|."""
     value, reference = values[:2]
     error = values[2] if len(values) > 2 else absolute(value, reference)
-    inside, held, dtype = span.holds(at.values), arithmetic in cells.HELD, cells.DTYPES[arithmetic]
-    return Cells(
-        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside & held,
-        judge=inside, wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
-    )  # fmt: skip
+    inside, falls = span.holds(at.values), steps_down(value, 0, cells.DTYPES[arithmetic], 1.0)
+    given = map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside
+    advice = OF_MAPS if arithmetic in cells.HELD else ""
+    return Cells(*given, judge=inside, wrong_way=falls, unjudged=UNSTATED, advice=advice)
 
 
 def map_label(named: LoadedLaw) -> str:
