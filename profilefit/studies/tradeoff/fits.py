@@ -33,10 +33,11 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
+from profilefit.studies.tradeoff.laws import judged_albedos
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
-ALPHAS = 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 12) ** 2
+ALPHAS = judged_albedos(12)
 EDGES = np.linspace(0.0, 20.0, 101)  # of what is fitted, even, as in the paper [mfp]
 RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]
 TRIMMED, EPSILON = "r R_d", 0.005  # (6), as in the recipe liang-as-published
