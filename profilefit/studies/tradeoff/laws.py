@@ -207,25 +207,21 @@ class TabulatedRadii:
 
     setting: Setting = exact.SEARCHLIGHT
 
-    def curves(self, alpha: float) -> Curves:
-        """Return the cubics of one albedo."""
-        return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
+    def curves(self, alpha: ArrayLike) -> Curves:
+        """Return the cubics of albedos."""
+        return exact_table(self.setting).curves(np.ravel(exact.reflectance(alpha, self.setting)))
 
     def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Return R_d [1/length^2], looked up in float32: its rounding is nearly all of the error."""
         length = np.asarray(mfp, float)
         x = np.asarray(r, float) / length
-        return self._each(lambda curves, x: looked_up(curves, jnp.asarray(x, jnp.float32)), x, alpha) / length**2
+        each = zip(map(self.curves, np.ravel(alpha)), jnp.asarray(np.atleast_2d(x), jnp.float32), strict=True)
+        return np.stack([looked_up(*one) for one in each]).astype(float).reshape(x.shape) / length**2
 
     def cdf(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Return the share of the energy within radii [-]."""
         x = np.asarray(r, float) / np.asarray(mfp, float)
-        return self._each(lambda curves, x: curves.share(x[None])[0], x, alpha)
-
-    def _each(self, answer: Callable[[Curves, Floats], Any], x: Floats, alpha: ArrayLike) -> Floats:
-        if np.ndim(alpha) == 0:
-            return np.asarray(answer(self.curves(float(np.asarray(alpha))), x), float)
-        return np.stack([self._each(answer, row, one) for row, one in zip(x, np.ravel(alpha), strict=True)])
+        return self.curves(alpha).share(np.atleast_2d(x)).reshape(x.shape)
 
 
 def looked_up(curves: Curves, x: Array) -> Array:
