@@ -91,7 +91,7 @@ Way = Callable[[Profiles, int], FittedConstants]
 
 def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     """Fit every run in every way, and compare with the fits to the exact profiles."""
-    start = catalogue.load("liang", "corrected")
+    start: Any = catalogue.load("liang", "corrected")
     ways = _ways(start, sizes.max_chain)
     limits = {name: way(Profiles.from_exact(ALPHAS, EDGES), 0) for name, way in ways.items() if name != EMCEE}
     limits[EMCEE] = limits[ALL_AT_ONCE]
