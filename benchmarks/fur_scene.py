@@ -62,7 +62,7 @@ def gamma() -> Rows:
     with opened() as context:
         for fine in FINER:
             with scene.reference_render(
-                context, tradeoff.fur_request().changed(technique={"supersampling": fine})
+                context, tradeoff.example("fur").changed(technique={"supersampling": fine})
             ) as drawn:
                 white, judge = drawn.judge.exposure, drawn.judge
                 encoded = scene.averaged(srgb_codes(white * drawn.fine), fine)
@@ -81,7 +81,7 @@ def lobes() -> Rows:
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
     """Draw the example's truth and the five ways, three beside three, and error over time toward six angles."""
-    with scene.reference_render(context, tradeoff.fur_request()) as drawn:
+    with scene.reference_render(context, tradeoff.example("fur")) as drawn:
         judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in WAYS)]
         larger = [np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
     rows = [np.concatenate(row, axis=1) for row in (larger[:3], larger[3:])]

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -28,9 +29,13 @@ from profilefit.studies.tradeoff.laws import (
     ContenderResult,
     FunctionCounts,
     contenders,
-    described,
     measured,
 )
+
+
+def described(functions: Counter[str]) -> str:
+    """Return functions as text, for example "2 exp, log"; a dash where there is none."""
+    return ", ".join(f"{number} {name}" if number > 1 else name for name, number in sorted(functions.items())) or "–"
 
 
 def as_cells(row: ContenderResult) -> tuple[str, ...]:

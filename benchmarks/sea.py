@@ -201,7 +201,7 @@ def over_pixels(drawn: SeaRender) -> Rows:
 
 def kinds() -> Rows:
     """Judge the example by each kind and number of samples, then by other maps of light; and name the device."""
-    with opened() as context, reference_render(context, tradeoff.sea_request(), PATHS) as found:
+    with opened() as context, reference_render(context, tradeoff.example("sea"), PATHS) as found:
         points = tradeoff.view(found).points
         rows: Rows = [(one.method, one.label, one.error.value, one.cost.low) for one in points]
         return [*rows, *over_pixels(found), *over_maps(found), (renderer(context), "", "", "")]
@@ -209,7 +209,7 @@ def kinds() -> Rows:
 
 def waters() -> Rows:
     """Judge the example in water that scatters less and more."""
-    of, rows = tradeoff.sea_request(), []
+    of, rows = tradeoff.example("sea"), []
     with opened() as context:
         for factor in FACTORS:
             red, green, blue = (factor * one for one in of.water.b)
@@ -273,7 +273,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the scene, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
-        with opened() as context, reference_render(context, tradeoff.sea_request(), PATHS) as found:
+        with opened() as context, reference_render(context, tradeoff.example("sea"), PATHS) as found:
             picture(found, given.pictures / "render-sea.png")
             cost_figure(tradeoff.view(found), renderer(context), given.pictures / "render-sea-cost.png")
         return

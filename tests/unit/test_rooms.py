@@ -95,10 +95,9 @@ def part(package: str, module: str) -> str:
 
 def upward(graph: Imports, package: str, order: Sequence[str]) -> list[str]:
     """The imports inside a package that point against its order."""
-    inside = {module for module in graph if module == package or module.startswith(f"{package}.")}
-    edges = [(module, target) for module in sorted(inside) for target in sorted(graph[module] & inside)]
-    ends = [(order.index(part(package, module)), order.index(part(package, target))) for module, target in edges]
-    return [f"{edge[0]} imports {edge[1]}" for edge, end in zip(edges, ends, strict=True) if end[1] > end[0]]
+    place = {module: order.index(part(package, module)) for module in graph if f"{module}.".startswith(f"{package}.")}
+    edges = [(module, target) for module in sorted(place) for target in sorted(graph[module] & place.keys())]
+    return [f"{module} imports {target}" for module, target in edges if place[target] > place[module]]
 
 
 def inner_imports(path: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -68,12 +69,9 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
     stack = exact.solve(medium, illumination, NODES)
     setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
     whole = stack.reflectance
-    most = float(exact.reflectance(1.0 - WHITE, setting))
-    if not 0 < whole < most:
-        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {whole:.3f}")
-    alpha = float(brentq(lambda a: float(exact.reflectance(a, setting)) - whole, 0.0, 1.0 - WHITE))
+    alpha = albedo_of(whole, lambda alpha: float(exact.reflectance(alpha, setting)))
     unit = max(layer.mfp for layer in medium.layers if layer.mu_t > 0)
-    edges = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
+    edges = ring_edges()
     cdfs = (unit, stack.cdf(unit * edges)), (1.0, exact.cdf(edges, alpha, setting=setting))
     of_stack, of_one = (
         RingShares.of(length * edges, np.diff(np.append(cdf, 1.0)), np.zeros(edges.size)) for length, cdf in cdfs
@@ -82,6 +80,22 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
     d = places(mfp, within)
     error = float(np.sqrt(np.mean((of_stack.beyond(d) - of_one.beyond(d / mfp)) ** 2)))
     return OneHalfSpace(alpha, mfp, whole * error, whole)
+
+
+def albedo_of(whole: float, reflectance: Callable[[float], float]) -> float:
+    """Return the albedo at which a half space reflects as much as a stack; InputError where none does.
+
+    whole  A of the stack [-];  reflectance  alpha -> A of the half space [-]
+    """
+    most = reflectance(1.0 - WHITE)
+    if not 0 < whole < most:
+        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {whole:.3f}")
+    return float(brentq(lambda alpha: reflectance(alpha) - whole, 0.0, 1.0 - WHITE))
+
+
+def ring_edges(shortest: float = 1.0, longest: float = 1.0) -> Floats:
+    """Return edges from 0 of the rings that light is summed over, for mean free paths of these lengths [length]."""
+    return np.append(0.0, np.geomspace(NEAREST * shortest, FARTHEST * longest, RINGS))
 
 
 def places(mfp: float, within: float) -> Floats:

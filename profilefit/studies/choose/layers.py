@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from mcml_sim import Estimate, Grid, Medium, Setting, simulate, simulate_orders
 from mcml_sim.media.arrays import Floats
@@ -82,24 +81,18 @@ def one_layer(
     lengths = [1.0 / mu for mu in reduced if mu > 0]
     if not lengths:
         raise InputError(f"layers must scatter or absorb somewhere, got {len(reduced)} that are clear")
-    ends, rings = (half_space.NEAREST, half_space.FARTHEST), half_space.RINGS
-    edges = np.append(0.0, np.geomspace(ends[0] * min(lengths), ends[1] * max(lengths), rings))
+    edges, scaled = half_space.ring_edges(min(lengths), max(lengths)), half_space.ring_edges()
     tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress, illumination=illumination)
     reflectance = float(tally.diffuse_reflectance.value)
-    scaled = np.append(0.0, np.geomspace(*ends, rings))
     setting = Setting(illumination, n)
     white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=setting, progress=progress)
-    palest = 1.0 - half_space.WHITE
-    most = float(white.reflectance(palest).value)
-    if not 0 < reflectance < most:
-        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
-    alpha = float(brentq(lambda a: float(white.reflectance(a).value) - reflectance, 0.0, palest))
+    alpha = half_space.albedo_of(reflectance, lambda alpha: float(white.reflectance(alpha).value))
     of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
     mfp = half_space.nearest_length(of_stack, of_one, within.mfp)
     error, standard_error = _difference(of_stack, of_one, mfp, within)
-    once = alike_error(stack)
-    return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number, once)
+    errors = reflectance * error, reflectance * standard_error
+    return OneLayer(reflectance, alpha, mfp, n, *errors, number, alike_error(stack))
 
 
 def of_each_colour(

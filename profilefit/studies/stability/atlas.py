@@ -120,7 +120,7 @@ def _of_law(named: LoadedLaw, is_named: bool, folder: Records, quick: bool) -> I
 def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Iterator[Cells]:
     text = map_cells.in_reduced(named)
     yield from map_cells.cells_of(named, folder)
-    yield from misuse.of_map(text)
+    yield from misuse.of_law(text)
     if named.label in DERIVED_MAPS and not quick:
         yield from gradients.of_map(text, bounds.valid_map(named, folder))
 

@@ -238,10 +238,14 @@ class Cells:
     subject    label of the law, map or function; own whether it is one of this project's own, held to have no red cell
     quantity   what is computed; arithmetic in which numbers, by what text
     value, reference, error  are broadcast to the axes; `error` is compared with `bound`, NaN where nothing is known
-    inside     where the law says that it holds;  codes  `Verdict` of each cell, by default as `judged` finds them
+    bound      in half at least what keeping a number costs
+    inside     where the law says that it holds; in half, which is measured only, nowhere
+    codes      `Verdict` of each cell, by default as value, reference and error say: not judged without a reference,
+               where the error is NaN or the bound infinite
     unjudged   why, where cells are not judged;  advice  what helps where they are red, by default `ADVICE`'s
     judge      where errors count, by default everywhere: cells elsewhere are outside
-    dim, wrong_way  as of `judged`
+    dim        where the reference is too small for the format to reach it, besides where it is itself too small
+    wrong_way  where a value went the wrong way from its neighbour
     """
 
     subject: str
@@ -263,59 +267,41 @@ class Cells:
 
     def __post_init__(self, judge: Mask | bool, dim: Mask | bool, wrong_way: Mask | None) -> None:
         shape = tuple(one.values.size for one in self.axes)
+        if DTYPES[self.arithmetic] is np.float16:
+            object.__setattr__(self, "bound", max(self.bound, HALF_BOUND))
+            object.__setattr__(self, "inside", False)
         for name in ("value", "reference", "error", "inside"):
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), shape))
         if self.codes is None:
-            given = self.value, self.reference, self.error, self.bound, np.broadcast_to(judge, shape)
-            object.__setattr__(self, "codes", judged(*given, DTYPES[self.arithmetic], dim, wrong_way))
+            object.__setattr__(self, "codes", self._judged(np.broadcast_to(judge, shape), dim, wrong_way))
 
     @property
     def verdicts(self) -> set[Verdict]:
         """Classes that occur."""
         return {Verdict(int(code)) for code in np.unique(self.codes)}
 
-    @property
-    def failures(self) -> Mask:
-        """Red cells where the law says that it holds."""
-        return np.asarray((self.codes >= Verdict.INACCURATE) & self.inside)
-
-
-def judged(
-    value: Floats,
-    reference: Floats,
-    error: Floats,
-    bound: float,
-    inside: Mask,
-    dtype: type,
-    dim: Mask | bool = False,
-    wrong_way: Mask | None = None,
-) -> NDArray[np.int8]:
-    """Return the class of every cell: not judged without a reference, where the error is NaN or the bound infinite.
-
-    value, reference, error  of one shape;  bound  largest error that counts as right;  dtype  format of `value`
-    inside     where the law says that it holds
-    dim        where the reference is too small for the format to reach it, besides where it is itself too small
-    wrong_way  where a value went the wrong way from its neighbour
-    """
-    limits, lost = np.finfo(dtype), np.broadcast_to(dim, value.shape)
-    codes = np.full(value.shape, Verdict.RIGHT, np.int8)
-    size = np.abs(reference)
-    large, small = size > float(limits.max), ((size < float(limits.tiny)) & (size > 0)) | dim
-    with np.errstate(invalid="ignore", over="ignore"):
-        codes[inside & (np.isnan(error) | ~np.isfinite(bound))] = Verdict.NOT_JUDGED
-        codes[~inside] = Verdict.OUTSIDE
-        exceeds = error > bound
-        codes[inside & exceeds & ~large & ~small] = Verdict.INACCURATE
-        absurd = np.abs(value) > NEARLY * np.maximum(size, float(limits.tiny))
-        faint = inside & small & ~large
-        codes[faint] = Verdict.BEYOND
-        codes[faint & absurd & exceeds & ~lost] = Verdict.INACCURATE
-        codes[inside & large & np.isfinite(reference)] = Verdict.BEYOND
-        if wrong_way is not None:
-            codes[inside & wrong_way & ~small] = Verdict.NOT_MONOTONE
-        codes[value < 0] = Verdict.NEGATIVE
-        codes[np.isnan(value) | (np.isinf(value) & ~large & ~lost & ~np.isinf(reference) & inside)] = Verdict.NOT_FINITE
-    return codes
+    def _judged(self, judge: Mask, dim: Mask | bool, wrong_way: Mask | None) -> NDArray[np.int8]:
+        """Return the class of every cell."""
+        value, reference, limits = self.value, self.reference, np.finfo(DTYPES[self.arithmetic])
+        codes, lost = np.full(value.shape, Verdict.RIGHT, np.int8), np.broadcast_to(dim, value.shape)
+        size = np.abs(reference)
+        large, small = size > float(limits.max), ((size < float(limits.tiny)) & (size > 0)) | dim
+        with np.errstate(invalid="ignore", over="ignore"):
+            codes[judge & (np.isnan(self.error) | ~np.isfinite(self.bound))] = Verdict.NOT_JUDGED
+            codes[~judge] = Verdict.OUTSIDE
+            exceeds = self.error > self.bound
+            codes[judge & exceeds & ~large & ~small] = Verdict.INACCURATE
+            absurd = np.abs(value) > NEARLY * np.maximum(size, float(limits.tiny))
+            faint = judge & small & ~large
+            codes[faint] = Verdict.BEYOND
+            codes[faint & absurd & exceeds & ~lost] = Verdict.INACCURATE
+            codes[judge & large & np.isfinite(reference)] = Verdict.BEYOND
+            if wrong_way is not None:
+                codes[judge & wrong_way & ~small] = Verdict.NOT_MONOTONE
+            codes[value < 0] = Verdict.NEGATIVE
+            infinite = np.isinf(value) & ~large & ~lost & ~np.isinf(reference) & judge
+            codes[np.isnan(value) | infinite] = Verdict.NOT_FINITE
+        return codes
 
 
 def steps_down(value: Floats, along: int, dtype: type, scale: Floats | float = 0.0) -> Mask:
@@ -408,7 +394,16 @@ def _region(cells: Cells, part: Mask, verdict: Verdict) -> Region:
     )  # fmt: skip
 
 
+def functions_of(law: Any) -> dict[str, Callable[..., Any]]:
+    """Return the functions in Python of a map or of a profile law, by quantity."""
+    if isinstance(law, AlbedoLaw):
+        return {ALPHA_OF: law.alpha, REFLECTANCE_OF: law.reflectance}
+    return {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
+
+
 NAME = "law"
+# Functions of texts that have another name than their quantity.
+CALLED = {PROFILE: "profile", ALPHA_OF: "alpha", REFLECTANCE_OF: "map_reflectance"}
 # 64 bits of mantissa and 15 of exponent on x86: float64's own rounding and overflow are seen from outside. Where it is
 # no more than float64, what float64 does wrong to its last digits goes unseen.
 EXTENDED = np.longdouble
@@ -442,10 +437,10 @@ class RoundedText:
         exec(compile(law.replace("import numpy as np\n", "", 1), f"{NAME}.py", "exec"), self._names)
 
     def call(self, function: str, *arguments: Any) -> Any:
-        """Call a function of the text, by its name less the prefix, with arrays that are rounded to the type first."""
+        """Call a quantity's or another function, by its name less the prefix, with arrays that are rounded first."""
         given = [one.astype(self.dtype) if isinstance(one, np.ndarray) else one for one in arguments]
         with np.errstate(all="ignore"):  # what is no number is what is looked for
-            return self._names[f"{NAME}_{function}"](*given)
+            return self._names[f"{NAME}_{CALLED.get(function, function)}"](*given)
 
     def replace(self, function: str, other: Callable[..., Any]) -> None:
         """Replace a function of the text, by that name less the prefix, with another."""

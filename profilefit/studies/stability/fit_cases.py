@@ -17,7 +17,7 @@ import jax
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
-from profilefit.fitting.estimate import NO_LIMITS, ResidualFunction, Rings, judged
+from profilefit.fitting.estimate import ResidualFunction, Rings, judged, rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.fitting.staged import fit_per_albedo
@@ -118,12 +118,7 @@ def trimmed_fits(start: Liang) -> Iterator[FitCase]:
 
 def even_rings(alpha: tuple[float, ...], last: float) -> Rings:
     """Return exact rings of equal width from 0 to last [mfp] at each albedo."""
-    profiles = Profiles.from_exact(alpha, np.linspace(0.0, last, RINGS + 1))
-    ones = np.ones_like(profiles.energy)
-    return Rings(
-        profiles.alpha, profiles.r_edges, profiles.energy, profiles.beyond, ones, np.ones(ALBEDOS),
-        np.asarray(NO_LIMITS, float), np.zeros(0),
-    )  # fmt: skip
+    return rings_of(Profiles.from_exact(alpha, np.linspace(0.0, last, RINGS + 1)))
 
 
 def merged_rings(rings: Rings, count: int) -> Rings:

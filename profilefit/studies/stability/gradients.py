@@ -6,7 +6,7 @@ the root of 1 - alpha, and xi = 1.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -17,10 +17,10 @@ import numpy as np
 from jax import Array
 
 from mcml_sim.media.arrays import Floats
-from profilefit.laws.base import Range
+from profilefit.laws.base import AlbedoLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import Axes, Cells, Mask, axis
+from profilefit.studies.stability.cells import Axes, Cells, Mask, axis, functions_of
 from profilefit.studies.stability.map_cells import map_label
 
 Triple = tuple[Floats, Floats, Floats]
@@ -38,15 +38,6 @@ LEAST = 1e-6
 SURE = {"r": Range(1e-3, 30.0), "ξ": Range(0.005, 0.99), "α": Range(1e-3, 0.9985), "A": Range(1e-3, 0.97)}
 INSIDE = "differentiate inside, alpha < 1, r > 0 and xi > 0, or by sqrt(1 - alpha), in which A is smooth"
 UNSURE = "differences are rounding there: only whether the derivative is a number is looked at"
-Function = Callable[[Any, Array, Array, Array], Array]
-FUNCTIONS: dict[str, Function] = {
-    cells.PROFILE: lambda law, r, alpha, mfp: law.profile(r, alpha, mfp),
-    cells.CDF: lambda law, r, alpha, mfp: law.cdf(r, alpha, mfp),
-    cells.SAMPLE: lambda law, xi, alpha, mfp: law.sampler.sample(xi, alpha, mfp),
-    cells.PDF: lambda law, r, alpha, mfp: law.sampler.pdf(r, alpha, mfp),
-    cells.ALPHA_OF: lambda law, a, _, __: law.alpha(a),
-    cells.REFLECTANCE_OF: lambda law, alpha, _, __: law.reflectance(alpha),
-}
 
 
 def of_law(named: LoadedLaw, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
@@ -58,7 +49,7 @@ def of_law(named: LoadedLaw, names: tuple[str, ...], holds: Range) -> Iterator[C
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
         sure = valid & SURE[symbol].holds(u) & SURE["α"].holds(a)
-        derivatives = _derivatives(FUNCTIONS[name], named.law, u, a, symbol, named.law.constant_names() != ())
+        derivatives = _derivatives(name, named.law, u, a, symbol, named.law.constant_names() != ())
         for by, triple in derivatives.items():
             yield _cells(named, named.label, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
 
@@ -69,7 +60,7 @@ def of_map(named: LoadedLaw, spans: tuple[Range, Range]) -> Iterator[Cells]:
     for (name, symbol, values), span in zip(ways, spans, strict=True):
         at = axis(symbol, values)
         u = at.values
-        derivatives = _derivatives(FUNCTIONS[name], named.law, u, np.full_like(u, 0.5), symbol, True)
+        derivatives = _derivatives(name, named.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
         sure = valid & SURE[symbol].holds(u)
         for by in (symbol, "constants"):
@@ -90,13 +81,13 @@ def _cells(named: LoadedLaw, label: str, quantity: str, axes: Axes, triple: Trip
     return replace(Cells(*given, judge=valid, unjudged=UNSURE, advice=INSIDE), value=value)
 
 
-def _derivatives(function: Function, law: Any, u: Floats, a: Floats, symbol: str, constants: bool) -> dict[str, Triple]:
+def _derivatives(quantity: str, law: Any, u: Floats, a: Floats, symbol: str, constants: bool) -> dict[str, Triple]:
     """Return derivative, difference, and value over argument by argument, at each (u, a) and l = 1."""
     steps = {symbol: STEP * (u if symbol == "r" else np.minimum(u, 1.0 - u)), "α": STEP * np.minimum(a, 1.0 - a)}
     with jax.enable_x64(True):
         own = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float64), law)
         arguments = map(jnp.asarray, (u, a, steps[symbol], steps["α"]))
-        value, gradients, differences = jax.tree.map(np.asarray, _computed(function, WEIGHTS, own, *arguments))
+        value, gradients, differences = jax.tree.map(np.asarray, _computed(quantity, WEIGHTS, own, *arguments))
     with np.errstate(all="ignore"):
         over = {symbol: np.abs(value / u), "α": np.abs(value / np.minimum(a, 1.0 - a)), "l": np.abs(value)}
     names = [symbol] if symbol == "α" else [symbol, "α", "l"]
@@ -107,7 +98,7 @@ def _derivatives(function: Function, law: Any, u: Floats, a: Floats, symbol: str
 
 
 @eqx.filter_jit
-def _computed(function: Function, weights: Weights, law: Any, u: Array, a: Array, du: Array, da: Array):
+def _computed(quantity: str, weights: Weights, law: Any, u: Array, a: Array, du: Array, da: Array):
     """Return values, derivatives by u, alpha, l and along the constants themselves, and these by differences.
 
     `weights` are given and not the module's own: a program that is kept must not outlive them.
@@ -116,7 +107,8 @@ def _computed(function: Function, weights: Weights, law: Any, u: Array, a: Array
     one = jnp.ones_like(u)
 
     def scaled(u, a, mfp, factor):
-        return function(jax.tree.unflatten(form, [factor * leaf for leaf in leaves]), u, a, mfp)
+        of = jax.tree.unflatten(form, [factor * leaf for leaf in leaves])
+        return functions_of(of)[quantity](*((u,) if isinstance(of, AlbedoLaw) else (u, a, mfp)))
 
     whole = jax.vmap(scaled)
     gradients = jax.vmap(jax.grad(scaled, argnums=(0, 1, 2, 3)))(u, a, one, one)

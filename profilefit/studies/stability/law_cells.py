@@ -63,15 +63,10 @@ def advice_of(named: LoadedLaw, arithmetic: str) -> str:
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of one law's errors by quantity, and where it holds."""
+    """Bounds of one law's errors by quantity, where they are known, and where it holds."""
 
     of: dict[str, float]
     valid: bounds.Validity
-
-    def bound(self, quantity: str, dtype: type) -> float:
-        """Return a tenth of the model's own error; in half not less than what keeping a number costs."""
-        own = self.of.get(quantity, np.inf)
-        return max(own, cells.HALF_BOUND) if dtype is np.float16 else own
 
 
 def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
@@ -104,14 +99,13 @@ def computed(named: LoadedLaw, limits: Limits, arithmetic: str, at: ArgumentGrid
         places = (at.alpha, at.xi if name == cells.SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
         value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
-        inside, bound = holds.get(name, profiled) & at.accepted, limits.bound(name, at.dtype)
+        inside, bound = holds.get(name, profiled) & at.accepted, limits.of.get(name, np.inf)
         if name == cells.SAMPLE:
             error = reference.misplaced(value)
         else:
             error = absolute(value, exactly) if name == cells.CDF else relative(value, exactly)
         yield _judged(
-            *(named, name, arithmetic, places, value, exactly, error, bound, inside & (arithmetic in cells.HELD)),
-            judge=inside,
+            *(named, name, arithmetic, places, value, exactly, error, bound, inside),
             dim=reference.dim(name, exactly),
             wrong_way=_wrong_way(name, value, reference),
             unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
@@ -148,7 +142,7 @@ def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> dict[str, Flo
         text = RoundedText(law, np.float16 if arithmetic == cells.TEXT16 else np.float32)
         if arithmetic == cells.STORED16:
             alpha = _stored_albedo(text, alpha)
-        calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
+        calls = zip(cells.QUANTITIES, (r, r, xi, r), strict=True)
         values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
         if arithmetic == cells.STORED16:
             with np.errstate(over="ignore"):

@@ -28,8 +28,7 @@ FACTOR = 1.5  # of what a record states
 # Against the exact half space: of A, and of sqrt(1 - alpha), in which every law of alpha is smooth.
 MODEL_BOUND = 0.02
 ROOT_STORED = "A(√(1−α))"
-# Measure of a map in records, and the function of its shader source.
-WAYS = {cells.ALPHA_OF: ("delta_alpha", "alpha"), cells.REFLECTANCE_OF: ("delta_A", "map_reflectance")}
+WAYS = {cells.ALPHA_OF: "delta_alpha", cells.REFLECTANCE_OF: "delta_A"}  # measures in records
 OF_MAPS = (
     "use the rational map, which rises to alpha(1) = 1 and misses A by 3e-6; others need A clamped below their fold"
 )
@@ -39,15 +38,13 @@ UNSTATED = "no record states the error of this direction"
 def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
     text, model, spans = in_reduced(named), bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
-    for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
+    for (name, measure), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
-            dtype = cells.DTYPES[arithmetic]
-            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", dtype)
+            at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", cells.DTYPES[arithmetic])
             value = _value(text.law, name, arithmetic, at)
             reference = _text_value(text.law, cells.EXTENDED, name, at.values)
-            own = max(limit, cells.HALF_BOUND) if dtype is np.float16 else limit
-            yield _cells(text, name, arithmetic, at, value, reference, limit=own, span=span)
+            yield _cells(text, name, arithmetic, at, value, reference, limit=limit, span=span)
     yield from _kept_in_half(text, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
@@ -64,11 +61,10 @@ def _cells(
     """Return the cells of one direction, of value, reference and error, by default |value - reference|."""
     value, reference = values[:2]
     error = values[2] if len(values) > 2 else absolute(value, reference)
-    inside, held, dtype = span.holds(at.values), arithmetic in cells.HELD, cells.DTYPES[arithmetic]
-    return Cells(
-        map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside & held,
-        judge=inside, wrong_way=steps_down(value, 0, dtype, 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
-    )  # fmt: skip
+    inside, falls = span.holds(at.values), steps_down(value, 0, cells.DTYPES[arithmetic], 1.0)
+    given = map_label(named), named.law.entry.own, name, arithmetic, (at,), value, reference, error, limit, inside
+    advice = OF_MAPS if arithmetic in cells.HELD else ""
+    return Cells(*given, judge=inside, wrong_way=falls, unjudged=UNSTATED, advice=advice)
 
 
 def map_label(named: LoadedLaw) -> str:
@@ -84,11 +80,11 @@ def _value(law: AlbedoLaw, name: str, arithmetic: str, at: ArgumentAxis) -> Floa
         law = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law)
         given = jnp.asarray(given, jnp.float32)
     with np.errstate(all="ignore"):
-        return np.asarray(law.alpha(given) if name == cells.ALPHA_OF else law.reflectance(given), float)
+        return np.asarray(cells.functions_of(law)[name](given), float)
 
 
 def _text_value(law: AlbedoLaw, dtype: type, name: str, given: Any) -> Floats:
-    return np.asarray(RoundedText(law, dtype).call(WAYS[name][1], given), float)
+    return np.asarray(RoundedText(law, dtype).call(name, given), float)
 
 
 def _kept_in_half(named: LoadedLaw, span: Range) -> Iterator[Cells]:
@@ -111,7 +107,7 @@ def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: boun
     law = named.law.in_reduced()
     with np.errstate(all="ignore"):
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
-    stated = model.get(WAYS[cells.REFLECTANCE_OF][0]) or np.nan
+    stated = model.get(WAYS[cells.REFLECTANCE_OF]) or np.nan
     bound = min(MODEL_BOUND, FACTOR * stated) if named.law.entry.own else MODEL_BOUND  # ours as their records
     of_alpha, of_colour = (alpha, there, reflectance.values), (reflectance, back, alpha.values)
     yield _cells(named, cells.REFLECTANCE_OF, cells.MODEL, *of_alpha, limit=bound, span=albedos)

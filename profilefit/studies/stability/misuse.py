@@ -10,10 +10,10 @@ import numpy as np
 from mcml_sim import exact
 from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.studies.stability import cells
-from profilefit.studies.stability.cells import Cells, RoundedText, Verdict
+from profilefit.studies.stability.cells import Cells, RoundedText, Verdict, functions_of
 from profilefit.studies.stability.map_cells import map_label
 
 NAN, INF = float("nan"), float("inf")
@@ -35,20 +35,14 @@ CHECK = "check alpha in [0, 1], l > 0 and r >= 0 once a material, as the law in 
 
 
 def of_law(named: LoadedLaw) -> Iterator[Cells]:
-    """Yield each function of a profile law, in Python and by its shader source."""
-    law: ProfileLaw = named.law
-    text = RoundedText(law, np.float32)
-    functions = (law.profile, law.cdf, law.sampler.sample, law.sampler.pdf)
-    for name, function in zip(cells.QUANTITIES, functions, strict=True):
-        yield _refused(named.label, law.entry.own, name, function)
-        yield _clamped(named.label, law.entry.own, name, cases_of(name), text)
-
-
-def of_map(named: LoadedLaw) -> Iterator[Cells]:
-    """Yield both directions of a map."""
-    law: AlbedoLaw = named.law
-    for name, function in ((cells.ALPHA_OF, law.alpha), (cells.REFLECTANCE_OF, law.reflectance)):
-        yield _refused(map_label(named), law.entry.own, name, function)
+    """Yield each function of a profile law, in Python and by its shader source, or both directions of a map."""
+    law, own = named.law, named.law.entry.own
+    text = None if isinstance(law, AlbedoLaw) else RoundedText(law, np.float32)
+    label = map_label(named) if text is None else named.label
+    for name, function in functions_of(law).items():
+        yield _refused(label, own, name, function)
+        if text is not None:
+            yield _clamped(label, own, name, cases_of(name), text)
 
 
 def of_exact() -> Iterator[Cells]:
@@ -105,9 +99,8 @@ def refusals(subject: str, own: bool, name: str, cases: list[Case], call: Call) 
 
 def _clamped(subject: str, own: bool, name: str, cases: list[Case], text: RoundedText) -> Cells:
     """Return cells of a text, which cannot refuse: it owes a number, but for NaN, which comes back as such."""
-    function = "profile" if name == cells.PROFILE else name
     given = [np.array(list(_given(name, key, value).values()))[:, None] for _, key, value in cases]
-    results = np.array([float(text.call(function, *each)[0]) for each in given])
+    results = np.array([float(text.call(name, *each)[0]) for each in given])
     is_fine = np.isfinite(results) | np.isnan([value for *_, value in cases]) & np.isnan(results)
     codes = np.where(is_fine, Verdict.OUTSIDE, Verdict.NOT_FINITE).astype(np.int8)
     return _cells(subject, own, name, cells.TEXT32, cases, codes, results)

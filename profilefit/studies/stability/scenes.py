@@ -14,7 +14,7 @@ from typing import Any
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
+from scipy.special import ndtr
 
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.fur.law import shadow, shell_shadow, strand_text
@@ -294,7 +294,7 @@ def of_stretch(context: moderngl.Context) -> Cells:
                 for j, edge in np.ndindex(len(WIDTHS), 2):
                     along = place[..., edge].astype(float)
                     light = _blurred(atlas, (along > 0).astype(float), WIDTHS[j])
-                    exactly = _edge(along, WIDTHS[j])
+                    exactly = ndtr(along / WIDTHS[j])  # an edge of light, blurred by a Gaussian
                     here = np.argwhere((place[..., 3] > 0.5) & (np.abs(along) < 0.25 * ROWS))
                     at = tuple(here[int(np.argmax(np.abs(light - exactly)[tuple(here.T)]))])
                     value[i, j, edge], reference[i, j, edge] = light[at], exactly[at]
@@ -320,15 +320,10 @@ def of_view(context: moderngl.Context) -> Cells:
             stage.upload(buffers)
             mean = stage.scatter(gather_of(kernel, (1.0,) * 3), 1.0, Sampling(SAMPLES))[..., 0].mean(axis=0)
             at = [int(np.argmin(np.abs(across - place * SIGMA))) for place in PLACES]
-            value[i], reference[i] = mean[at], _edge(across[at], SIGMA)
+            value[i], reference[i] = mean[at], ndtr(across[at] / SIGMA)
     axes = axis("angle", ANGLES, "degrees"), axis("from the edge", PLACES, "σ")
     given = value, reference, absolute(value, reference), BOUND
     return Cells("screen seen aslant", True, "light, blurred", cells.TEXT32, axes, *given, advice=COARSE)
-
-
-def _edge(along: Floats, sigma: float) -> Floats:
-    """Return an edge of light blurred by a Gaussian, at distances from it."""
-    return 0.5 + 0.5 * erf(along / (np.sqrt(2.0) * sigma))
 
 
 def _part(mesh: Mesh) -> Part:

@@ -37,7 +37,6 @@ OF_LAWS = (
 OF_BORROWER = "fit the constants to these layers: stack_law, or profilefit regenerate STACK.toml"
 OF_ONCE = "keep g at -0.5 or above; nothing known scatters farther back"
 BOTH = (FLOAT64, TEXT32)
-CALLED = {PROFILE: "profile", CDF: "cdf", TOTAL: "total", SAMPLE: "sample", PDF: "pdf"}
 UNDRAWN = (PROFILE, CDF, TOTAL)  # of recorded laws in float64: samplers of each of their settings compile for seconds
 THICKNESS = (0.0, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6)  # [mfp of the first layer]
 RADIUS = (1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 300.0, 1e3)
@@ -71,7 +70,6 @@ ENDS: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
      (0.9929, -0.002392, 0.9386, 1.221, 0.01733, 0.1353, 8.647e-05, 1.249, 3.278)),
     (1.0, 0.5, (0.025, 0.014, 0.016), (0.9994, -8.088e-05, 1.056, 1.436, 4.647e-05, 0.01146, 0.8121, 1.659, 0.8803)),
 )  # fmt: skip
-BORROWER = (0.99, 0.5)  # albedos of a law that has the constants of others
 # Light scattered once: index, cosines, optical depth of the first layer, g, albedo below, cosine of the azimuth.
 INDICES = (1.0, 1.4, 2.0)
 COSINES = (1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0)
@@ -158,7 +156,7 @@ def end(first: float, below: float, errors: Sequence[float], constants: Sequence
 
 def borrower() -> StackCase:
     """Return a law whose albedos were changed after its constants, those of the first of `ENDS`, were fitted."""
-    one = end(*BORROWER, *ENDS[0][2:])
+    one = end(0.99, 0.5, *ENDS[0][2:])
     return replace(one, label=f"{one.label}, constants of {ENDS[0][0]:g} on {ENDS[0][1]:g}", own=False)
 
 
@@ -188,7 +186,7 @@ def _largest(law: StackLaw, d: Floats | float, r: Floats) -> Floats:
     return largest
 
 
-def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
+def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = (*UNDRAWN, SAMPLE, PDF)) -> Iterator[Cells]:
     """Yield quantities over thickness and radius or uniform number."""
     dtype, law, unit, channel = cells.DTYPES[arithmetic], case.law, case.law.top.mfp, np.zeros(1)
 
@@ -197,15 +195,13 @@ def of_law(case: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED
 
     d, r, xi = rounded(THICKNESS, unit)[:, None], rounded(RADIUS, unit), rounded(SHARE)
     text = case.text(np.float32) if arithmetic == TEXT32 else None
-    python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
+    python = {**cells.functions_of(law), TOTAL: law.total}
     whole, within = (np.asarray(case.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
     for name in names:
-        given = () if name == TOTAL else (xi if name == SAMPLE else r,)
-        reference = np.asarray(case.reference.call(CALLED[name], *given, channel, d), float)
-        if text is not None:
-            value = np.asarray(text.call(CALLED[name], *given, channel, d), float)
-        else:
-            value = np.asarray(law.total(d) if name == TOTAL else python[name](*given, d))
+        called, given = ("total", ()) if name == TOTAL else (name, (xi if name == SAMPLE else r,))
+        reference = np.asarray(case.reference.call(called, *given, channel, d), float)
+        value = python[name](*given, d) if text is None else text.call(called, *given, channel, d)
+        value = np.asarray(value, float)
         if name == TOTAL:  # whose ends are known
             ends = np.select([d == 0, d == d[-1]], [law.below.whole(), law.top.whole()], reference)
             value, reference = value[:, 0], ends[:, 0]

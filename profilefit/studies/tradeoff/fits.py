@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -33,10 +33,11 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
+from profilefit.studies.tradeoff.laws import judged_albedos
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
-ALPHAS = 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 12) ** 2
+ALPHAS = judged_albedos(12)
 EDGES = np.linspace(0.0, 20.0, 101)  # of what is fitted, even, as in the paper [mfp]
 RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]
 TRIMMED, EPSILON = "r R_d", 0.005  # (6), as in the recipe liang-as-published
@@ -90,7 +91,7 @@ Way = Callable[[Profiles, int], FittedConstants]
 
 def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     """Fit every run in every way, and compare with the fits to the exact profiles."""
-    start = catalogue.load("liang", "corrected")
+    start: Any = catalogue.load("liang", "corrected")
     ways = _ways(start, sizes.max_chain)
     limits = {name: way(Profiles.from_exact(ALPHAS, EDGES), 0) for name, way in ways.items() if name != EMCEE}
     limits[EMCEE] = limits[ALL_AT_ONCE]
@@ -109,7 +110,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
                 if seed == 0:
                     compiling[name] = max(compiling.get(name, 0.0), seconds)
                     continue
-                fitted, limit = (with_constants(start, each.constants) for each in (result, limits[name]))
+                fitted, limit = (replace(start, **each.constants) for each in (result, limits[name]))
                 away, done = standardised(result, limits[name]), result.result == "converged"
                 trial = Trial(seconds, light, *change(fitted, limit), away, done)
                 trials.setdefault((name, photons), []).append(trial)
@@ -155,11 +156,6 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
 
 def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
     return dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
-def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
-    """Return the law with these constants replaced."""
-    return law.with_vector(tuple(constants), list(constants.values()))
 
 
 def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:

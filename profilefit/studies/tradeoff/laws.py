@@ -9,13 +9,12 @@ nothing was fitted: the mean over them, and the worst. Transcendental functions 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -29,13 +28,11 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.fitting.quality import profile_quality
-from profilefit.laws import burley
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.burley import Burley, BurleyDiffuseMfp
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.burley import XIE, Burley, BurleyDiffuseMfp
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
-from profilefit.laws.rational import Normalisation
 from profilefit.laws.two_parts import TwoPartHazard
 from profilefit.recipes import catalogue
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, STEP, Curves, exact_table
@@ -76,127 +73,51 @@ SPECS: tuple[LawSpec, ...] = (
 )
 
 
-class Fast(burley.NormalizedDiffusion):
-    """Normalized diffusion as a shader has it: one exponential, its cube, and no guard at x = 0."""
-
-    setting: Setting = eqx.field(static=True)
-    albedo: Normalisation = eqx.field(static=True)
-
-    def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        rate = self.falloff_rate(alpha)
-        e = jnp.exp(x * (rate * (-1.0 / 3.0)))
-        return self.albedo.reflectance(alpha) * rate / (8.0 * jnp.pi) * (e + e * e * e) / x
-
-    @property
-    def sampler(self) -> burley.BurleySampler:
-        return FastBurleySampler(self)
-
-    def setup(self, alpha: Array) -> tuple[Array, Array]:
-        """Return what depends on alpha only."""
-        return self.albedo.reflectance(alpha), self.falloff_rate(alpha)
-
-
-class FastBurley(Fast, Burley):
-    """Fast normalized diffusion in units of the mean free path."""
-
-
-class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
-    """Fast normalized diffusion in units of the diffuse mean free path."""
-
-
-class FastBurleySampler(burley.BurleySampler):
-    """Golubev's inverse with its cube root as e^{ln(G) / 3}: on XLA's CPU jnp.cbrt takes ten times as long."""
-
-    law: Fast
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        u = 1.0 - xi
-        root = jnp.exp(jnp.log(1.0 + 4.0 * u * (2.0 * u + jnp.sqrt(1.0 + 4.0 * u * u))) * (1.0 / 3.0))
-        return 3.0 / self.law.falloff_rate(alpha) * jnp.log((1.0 + 1.0 / root + root) / (4.0 * u))
-
-    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        return self.law.scaled_profile(x, alpha) * (2.0 * jnp.pi) * x / self.law.albedo.reflectance(alpha)
-
-
-class FastApproximateSampler(burley.BurleyApproximateSampler):
-    """Xie's inverse with ln(1 - xi): on XLA's CPU jnp.log1p takes five times as long."""
-
-    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        return ((2.0 - self.c) * xi - 2.0) * jnp.log(1.0 - xi) / self.law.falloff_rate(alpha)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contender:
     """Law with one of its samplers.
 
+    sampler  None for a table, which has radii only
     setup    what depends on alpha only, where the law separates it
-    guarded  the sampler in the law's own form, where the fast one has no guards: errors are of this
     another  whether it is another sampler of the law of the contender before
+    fast     by part, forms without guards that are faster than the law's: they are timed, and the law's are judged
     """
 
     name: str
     law: ProfileLaw
-    sampler: Sampler
+    sampler: Any
     setup: Callable[[Array], Any] | None = None
-    guarded: Sampler | None = None
     another: bool = False
-
-    @property
-    def judged(self) -> Sampler:
-        """Sampler whose errors are judged."""
-        return self.guarded or self.sampler
+    fast: Mapping[str, Function] = field(default_factory=dict)
 
     @property
     def constants(self) -> tuple[int, int]:
         """Numbers of fitted constants of the profile, and of the sampler alone; those of A(alpha) do not count."""
+        if self.sampler is None:
+            return 0, 0
         of_profile = len(self.law.seen_by("energy"))
         return of_profile, len(self.law.constant_names()) - of_profile
 
     def profile(self, x: Array, alpha: Array) -> Array:
-        return self.law.scaled_profile(x, alpha)
+        function = self.fast.get("profile") or self.law.scaled_profile
+        return function(x, alpha)
 
     def sample(self, xi: Array, alpha: Array) -> Array:
-        return self.sampler.scaled_sample(xi, alpha)
+        function = self.fast.get("sample") or self.sampler.scaled_sample
+        return function(xi, alpha)
 
     def both(self, xi: Array, alpha: Array) -> tuple[Array, Array]:
         """Return a radius, and the profile there."""
+        if "both" in self.fast:
+            return self.fast["both"](xi, alpha)
         x = self.sample(xi, alpha)
         return x, self.profile(x, alpha)
 
     @property
     def parts(self) -> dict[str, Function]:
         """Functions to be timed, by name: the profile of a law once, whatever its samplers."""
-        drawn: dict[str, Function] = {"sample": self.sample, "both": self.both}
+        drawn: dict[str, Function] = {} if self.sampler is None else {"sample": self.sample, "both": self.both}
         return drawn if self.another else {"profile": self.profile, **drawn}
-
-
-class QuantileContender(Contender):
-    """Fitted inverse, which knows its density where it has drawn; from a radius alone a loop must find it."""
-
-    law: Quantile
-
-    def both(self, xi: Array, alpha: Array) -> tuple[Array, Array]:
-        left = jnp.maximum(1.0 - xi, jnp.finfo(xi.dtype).tiny)
-        x, slope = radius(-jnp.log(left), self.law.curve(alpha))
-        return x, self.law.albedo.reflectance(alpha) * left / (2.0 * jnp.pi * x * slope)
-
-
-@dataclass(frozen=True)
-class TableContender(Contender):
-    """Table of one material, whatever the albedo, without a sampler."""
-
-    curves: Any = None
-
-    @property
-    def constants(self) -> tuple[int, int]:
-        return 0, 0
-
-    def profile(self, x: Array, alpha: Array) -> Array:
-        return looked_up(self.curves, x)
-
-    @property
-    def parts(self) -> dict[str, Function]:
-        return {"profile": self.profile}
 
 
 def contenders(folder: Path | None = None, specs: Sequence[LawSpec] | None = None) -> tuple[list[Contender], list[str]]:
@@ -219,12 +140,11 @@ def contenders(folder: Path | None = None, specs: Sequence[LawSpec] | None = Non
 def with_samplers(label: str, law: ProfileLaw) -> Iterator[Contender]:
     """Yield a law with each sampler that costs another time."""
     if isinstance(law, Burley | BurleyDiffuseMfp):
-        kind: Any = FastBurley if isinstance(law, Burley) else FastBurleyDiffuseMfp
-        fast = kind(law.setting, law.albedo, **law.constants())
-        yield Contender(label, fast, fast.sampler, fast.setup, law.sampler)
+        (profile, exactly, xie), setup = _fast_burley(law), partial(_burley_setup, law)
+        yield Contender(label, law, law.sampler, setup, fast={"profile": profile, "sample": exactly})
         if label == YARDSTICK:
-            sampler = FastApproximateSampler(fast, burley.XIE)
-            yield Contender(f"{label}, Xie's sampler", fast, sampler, fast.setup, law.samplers["xie"], another=True)
+            given = law, law.samplers["xie"], setup
+            yield Contender(f"{label}, Xie's sampler", *given, another=True, fast={"profile": profile, "sample": xie})
     elif isinstance(law, Hazard | TwoPartHazard):
         of_alpha = law.shape if isinstance(law, Hazard) else law.parts
         yield Contender(label, law, law.sampler, of_alpha)
@@ -232,9 +152,43 @@ def with_samplers(label: str, law: ProfileLaw) -> Iterator[Contender]:
             if other != law.sampler:
                 yield Contender(f"{label}, {steps}", law, other, of_alpha, another=True)
     elif isinstance(law, Quantile):
-        yield QuantileContender(label, law, law.sampler, law.curve)
+        yield Contender(label, law, law.sampler, law.curve, fast={"both": partial(_quantile_both, law)})
     else:
         yield Contender(label, law, law.sampler, partial(_liang_setup, law) if isinstance(law, Liang) else None)
+
+
+def _fast_burley(law: Burley | BurleyDiffuseMfp) -> tuple[Function, Function, Function]:
+    """Return R_d with one exponential and its cube, without a guard at x = 0; Golubev's inverse, and Xie's.
+
+    The inverses have e^{ln(G) / 3} for a cube root and ln(1 - xi): on XLA's CPU jnp.cbrt takes ten times as long, and
+    jnp.log1p five times.
+    """
+
+    def profile(x: Array, alpha: Array) -> Array:
+        rate = law.falloff_rate(alpha)
+        e = jnp.exp(x * (rate * (-1.0 / 3.0)))
+        return law.albedo.reflectance(alpha) * rate / (8.0 * jnp.pi) * (e + e * e * e) / x
+
+    def exactly(xi: Array, alpha: Array) -> Array:
+        u = 1.0 - xi
+        root = jnp.exp(jnp.log(1.0 + 4.0 * u * (2.0 * u + jnp.sqrt(1.0 + 4.0 * u * u))) * (1.0 / 3.0))
+        return 3.0 / law.falloff_rate(alpha) * jnp.log((1.0 + 1.0 / root + root) / (4.0 * u))
+
+    def xie(xi: Array, alpha: Array) -> Array:
+        return ((2.0 - XIE) * xi - 2.0) * jnp.log(1.0 - xi) / law.falloff_rate(alpha)
+
+    return profile, exactly, xie
+
+
+def _burley_setup(law: Burley | BurleyDiffuseMfp, alpha: Array) -> tuple[Array, Array]:
+    return law.albedo.reflectance(alpha), law.falloff_rate(alpha)
+
+
+def _quantile_both(law: Quantile, xi: Array, alpha: Array) -> tuple[Array, Array]:
+    """Return a radius of a fitted inverse, and R_d by the density that it has there: from x alone a loop finds it."""
+    left = jnp.maximum(1.0 - xi, jnp.finfo(xi.dtype).tiny)
+    x, slope = radius(-jnp.log(left), law.curve(alpha))
+    return x, law.albedo.reflectance(alpha) * left / (2.0 * jnp.pi * x * slope)
 
 
 def _liang_setup(law: Liang, alpha: Array) -> tuple[Array, ...]:
@@ -253,25 +207,21 @@ class TabulatedRadii:
 
     setting: Setting = exact.SEARCHLIGHT
 
-    def curves(self, alpha: float) -> Curves:
-        """Return the cubics of one albedo."""
-        return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
+    def curves(self, alpha: ArrayLike) -> Curves:
+        """Return the cubics of albedos."""
+        return exact_table(self.setting).curves(np.ravel(exact.reflectance(alpha, self.setting)))
 
     def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Return R_d [1/length^2], looked up in float32: its rounding is nearly all of the error."""
         length = np.asarray(mfp, float)
         x = np.asarray(r, float) / length
-        return self._each(lambda curves, x: looked_up(curves, jnp.asarray(x, jnp.float32)), x, alpha) / length**2
+        each = zip(map(self.curves, np.ravel(alpha)), jnp.asarray(np.atleast_2d(x), jnp.float32), strict=True)
+        return np.stack([looked_up(*one) for one in each]).astype(float).reshape(x.shape) / length**2
 
     def cdf(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Return the share of the energy within radii [-]."""
         x = np.asarray(r, float) / np.asarray(mfp, float)
-        return self._each(lambda curves, x: curves.share(x[None])[0], x, alpha)
-
-    def _each(self, answer: Callable[[Curves, Floats], Any], x: Floats, alpha: ArrayLike) -> Floats:
-        if np.ndim(alpha) == 0:
-            return np.asarray(answer(self.curves(float(np.asarray(alpha))), x), float)
-        return np.stack([self._each(answer, row, one) for row, one in zip(x, np.ravel(alpha), strict=True)])
+        return self.curves(alpha).share(np.atleast_2d(x)).reshape(x.shape)
 
 
 def looked_up(curves: Curves, x: Array) -> Array:
@@ -285,10 +235,11 @@ def looked_up(curves: Curves, x: Array) -> Array:
     return float(curves.reflectance[0]) * jnp.exp(cubic - float(curves.kappa[0]) * near)
 
 
-def table_contender() -> TableContender:
+def table_contender() -> Contender:
     """Return the table as a contender; its error is that at every albedo, its time that of one material."""
     law: Any = TabulatedRadii()
-    return TableContender(TABLE, law, law, curves=law.curves(MATERIAL))
+    curves = law.curves(MATERIAL)
+    return Contender(TABLE, law, None, fast={"profile": lambda x, _: looked_up(curves, x)})
 
 
 # All that a processor has no instruction for, or a slow one; products, quotients and whole powers are not counted.
@@ -342,11 +293,6 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
         inner = times * (equation.params["length"] if name == "scan" else 1)
         for nested in core.jaxprs_in_params(equation.params):
             _add(nested, inner, counts)
-
-
-def described(functions: Counter[str]) -> str:
-    """Return functions as text, for example "2 exp, log"; a dash where there is none."""
-    return ", ".join(f"{number} {name}" if number > 1 else name for name, number in sorted(functions.items())) or "–"
 
 
 # Of one call. A law that computes more functions a point than these takes fewer points, or is not timed at all.
@@ -415,7 +361,7 @@ def judged_albedos(number: int) -> Floats:
 
 def counts(contender: Contender) -> dict[str, FunctionCounts]:
     """Count the functions of each part of a contender."""
-    functions = {**contender.parts, **({"profile": contender.profile} if contender.another else {})}
+    functions = {"profile": contender.profile, **contender.parts}
     return {part: count(functions[part]) for part in PARTS if part in functions}
 
 

@@ -134,7 +134,7 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
 
 def ways_of(contender: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
     """Return a sampler weighed by its own density; and by its law's, where that is another."""
-    sampler = contender.judged
+    sampler = contender.sampler
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
     found = [WeighedSampler(contender.name, contender, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)]

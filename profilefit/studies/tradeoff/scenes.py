@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,15 +18,15 @@ import numpy as np
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.phase import HenyeyGreenstein
 from profilefit.recipes.folder import shipped
+from profilefit.scenes import SCENES
 from profilefit.scenes.fur import scene as fur_scene
 from profilefit.scenes.fur.chart import over_layers, wide_patch
-from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.sea import scene as sea_scene
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices
 from profilefit.scenes.sea.haze import KINDS
-from profilefit.scenes.sea.scene import SeaRender, SeaRequest
+from profilefit.scenes.sea.scene import SeaRender
 from profilefit.scenes.sea.truth import caustic_photons, misfit
 from profilefit.scenes.sea.waves import Waves, random_sea
 from profilefit.scenes.stage.picture import ChartPoint
@@ -69,7 +71,7 @@ FUR, QUICK_FUR = FurSizes(), FurSizes((0.0, 45.0, 75.0), (8, 16, 48), 96, 3)
 def measure_sea(sizes: SeaSizes = SEA, track: Track = silent) -> TradeoffPart:
     """Return the example's view, caustic maps before and beyond the first fold, and shafts."""
     with opened() as context:
-        with sea_scene.reference_render(context, sea_request(), sizes.paths) as found:
+        with sea_scene.reference_render(context, example("sea"), sizes.paths) as found:
             drawn = (view(found, sizes), *maps(context, sizes, track))
         notes = (f"drawn by {renderer(context)}",)
     return TradeoffPart("sea", "Under the sea", (*drawn, shafts(sizes)), notes)
@@ -84,16 +86,11 @@ def measure_fur(sizes: FurSizes = FUR, track: Track = silent) -> TradeoffPart:
     return TradeoffPart("fur", "Fur in layers", tuple(panels), notes)
 
 
-def sea_request() -> SeaRequest:
-    """Return the shipped example."""
-    path = shipped("examples") / "sea.toml"
-    return sea_scene.read(str(path), read_toml(path))
-
-
-def fur_request() -> FurRequest:
-    """Return the shipped example."""
-    path = shipped("examples") / "fur.toml"
-    return fur_scene.read(str(path), read_toml(path))
+def example(name: str) -> Any:
+    """Return the request of a scene's shipped example."""
+    home, file = SCENES[name]
+    path = shipped("examples") / file
+    return import_module(home).read(str(path), read_toml(path))
 
 
 def _points(panel: str, found: Iterable[ChartPoint], fact: str) -> tuple[Point, ...]:
@@ -173,7 +170,7 @@ def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FUR) -> P
 
 def picture(context: moderngl.Context, sizes: FurSizes = FUR) -> Panel:
     """Return the example's ball, its light against rays to every strand."""
-    with fur_scene.reference_render(context, fur_request()) as drawn:
+    with fur_scene.reference_render(context, example("fur")) as drawn:
         found = [one for way in WAYS for one in drawn.points(way, sizes.layers, sizes.turns)]
     cost, error = "time of both passes [ms]", "root mean square error / mean [-]"
     return Panel("ball", "examples/fur.toml, layers", cost, error, _points("ball", found, "layers"), joined=True)

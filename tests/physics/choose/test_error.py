@@ -21,7 +21,7 @@ from tests.physics.choose.conftest import DIFFUSE, MFP
 WITHIN = Within()
 
 
-def test_nothing_leaves_the_whole_step(light, case):
+def test_nothing_leaves_the_whole_step_and_each_part_is_named(light, case):
     """What Lambert misses is the light from beyond the edge: here by hand, of the brightest channel."""
     found = error(NOTHING, case, light, WITHIN)
     x = case.places(0, WITHIN)
@@ -30,6 +30,11 @@ def test_nothing_leaves_the_whole_step(light, case):
     assert found.channel == 0
     assert found.noise == found.curvature == 0.0
     assert found.total == pytest.approx(found.model, rel=0.02)
+    # Large pixels and curves are named.
+    far = error(Option("separable", 17), replace(case, pixel=4.0), light, WITHIN)
+    assert far.pixel > far.model
+    bent = error(Option("separable", 33), replace(case, radius=2.0), light, WITHIN)
+    assert bent.curvature > bent.model
 
 
 @pytest.mark.slow
@@ -57,13 +62,6 @@ def test_light_under_a_surface_is_exact(case):
     assert ReferenceLight(setting).alpha(1.0) == 1.0  # no surface that refracts is white
     with pytest.raises(InputError, match=r"index must be a refractive index in \[1, 1.6\], got 1.61"):
         ReferenceLight(Setting(n=1.61))
-
-
-def test_large_pixels_and_curves_are_named(light, case):
-    far = error(Option("separable", 17), replace(case, pixel=4.0), light, WITHIN)
-    assert far.pixel > far.model
-    bent = error(Option("separable", 33), replace(case, radius=2.0), light, WITHIN)
-    assert bent.curvature > bent.model
 
 
 def test_places():
@@ -201,7 +199,8 @@ def over_the_cylinder(law, place, radius):
     return strips[arc > 0].sum() / strips.sum()
 
 
-def test_plane_is_the_integral(hazard, share):
+def test_plane_is_the_integral_and_has_its_quartile(hazard, share):
+    assert share(np.array(share.quartile)) == pytest.approx(0.25, abs=1e-9)
     expected = step_response(PLACES, ALBEDO, law=hazard)
     for mfp in (1.0, 3.0):
         np.testing.assert_allclose(response(share, mfp * PLACES, mfp, np.inf), expected, atol=2e-5)
@@ -237,7 +236,3 @@ def test_average_is_the_mean_over_the_pixel(share, radius):
     found = module.averaged(share, middles, pixel, 1.0, radius)
     np.testing.assert_allclose(found, expected, atol=1e-5)
     assert abs(response(share, middles[:1], 1.0, radius) - expected[0])[0] > 1e-3
-
-
-def test_quartile(share):
-    assert share(np.array(share.quartile)) == pytest.approx(0.25, abs=1e-9)

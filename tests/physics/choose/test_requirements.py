@@ -94,6 +94,7 @@ def test_defaults(written):
     assert math.isinf(scene.radius)
     assert (scene.pixel, scene.resolution) == ((0.5, 0.5), (80, 60))
     assert (scene.unit, scene.budget.ms, scene.layers) == ("mm", None, None)
+    assert read(written("reflectance = 0.6", "reflectance = 0.95")).reflectance[0] == (0.95, 0.95)
     scene = read(written("", "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"))  # they have colours
     assert [medium.layers[0].mu_a for medium in scene.layers.media] == [1.0, 2.0, 3.0]
 
@@ -116,6 +117,8 @@ def test_an_older_file_is_told_what_to_write(tmp_path):
 
 BAD_PIXEL = r"\[choose\] pixel must be a number > 0 and >= 1e-09 and <= 1e\+09, or two of them, the smaller first, got "
 GPU = 'gpu = "ps5"'
+# A colour that a surface of n = 1.4 does not let out.
+REFRACTED, PALE = (f"n = 1.0\n[material.red]\nreflectance = {a}" for a in (0.6, 0.95))
 WRONG = [
     (GPU, "pixel = 0", BAD_PIXEL + "0"),
     (GPU, "pixel = [2, 1]", BAD_PIXEL + r"\[2, 1\]"),
@@ -129,20 +132,18 @@ WRONG = [
     (GPU, "resolution = [1]", r"\[choose\] resolution must be two whole numbers .* got \[1\]"),
     (GPU, "coverage = 2", r"\[choose\] coverage must be a number > 0 and <= 1, got 2"),
     (GPU, "mfp = -1", r"\[choose\] mfp must be a number > 0 and <= 100, got -1"),
-    (GPU, 'mfp = "4"', r"\[choose\] mfp must be a number > 0 and <= 100, got '4'"),
-    (GPU, "mfp = true", r"\[choose\] mfp must be a number > 0 and <= 100, got True"),
     (GPU, "mfp = 101", r"\[choose\] mfp must be a number > 0 and <= 100, got 101"),
     (GPU, "gpu = 'voodoo'", r"\[choose\] gpu must be one of switch, .* got 'voodoo'"),
     (GPU, "gpu = ['voodoo']", r"\[choose\] gpu must be one of switch, .* got \['voodoo'\]"),
     ("reflectance = 0.4", "reflectance = 1.4", r"\[material.green\] reflectance must be .* and <= 1, or .*, got 1.4"),
     ("reflectance = 0.4", "", r"\[material.green\] reflectance must be .* got nothing"),
+    (REFRACTED, PALE.replace("1.0", "1.4"), r"\[material.red\] reflectance must be .* and <= 0.923, or .*, got 0.95"),
     ("mfp = 0.5", 'mfp = "0.5"', r"\[material.blue\] mfp must be .* got '0.5'"),
     ("mfp = 0.5", "mfp = 0.5\ncolour = 1", r"\[material.blue\] keys must be of reflectance, mfp, got 'colour'"),
     ("mfp = 0.5", "mfp = 1e-300", r"\[material.blue\] mfp must be a number > 0 and >= 1e-09"),
     ("tolerance = 0.01", "illumination = 'sun'", r"\[technique\] illumination must be one of searchlight, diff"),
     ("n = 1.0", "n = 1.7", r"toml: n must be a refractive index in \[1, 1.6\], got 1.7"),
     ("n = 1.0", 'n = 1.0\nunit = "cm"', r"toml: unit must be one of mm, got 'cm'"),
-    ("n = 1.0", 'n = 1.0\nunit = "\\u001b[31m"', r"unit must be one of mm, got '\\x1b\[31m'"),
     ("tolerance = 0.01", "tolerance = 2", r"\[technique\] tolerance must be a number > 0 and <= 1, got 2"),
     ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
     ('"skin"', '"sea"', "scene must be one of skin, layers, got 'sea'"),
@@ -150,22 +151,11 @@ WRONG = [
     ('"skin"', "[1]", r"scene must be one of skin, layers, heart, sea, fur, got \[1\]"),
     ("", "[extra]", "keys must be of title, unit, .* got 'extra'"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a finite number, got nothing"),
-    ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0.* got -1"),
-    ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
-    ("", "[[layers]]\nn = 1\nmu_a = [1, 2]\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .* or three .* got \[1, 2\]"),
-    ("", f"[[layers]]\nn = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'n' \(at line"),
-    ("", "[[layers]]\nn = 1\nmu_a = '1'\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .*, got '1'"),
     ("n = 1.0", "n = 1.0\nlayers = []", r"toml: layers must be tables \[\[layers\]\], got \[\]"),
     ("[choose]", "[choose", "is not TOML: "),
     (GPU, f"pixel = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'pixel' \(at line"),
-    (GPU, f"pixel = 0x1{'0' * 5000}", r"\[choose\] pixel must be .*, got one of more than 4300 digits"),
-    (GPU, f"pixel = {'9' * 5000}", r"a whole number of 5000 digits, of 300 at most, of 'pixel' \(at line"),
-    (GPU, "pixel = 1e400", r"is not TOML: the number 1e400, beyond floating point, of 'pixel' \(at line"),
     (GPU, "pixel = 1e300", BAD_PIXEL + r"1e\+300"),
-    (GPU, f"pixel = 1\n{'a.' * 100_000}b = 1", "is not TOML: tables or lists nested more than 32 deep"),
-    (GPU, f"pixel = {'[' * 100_000}", "is not TOML: tables or lists nested more than 32 deep"),
     (GPU, f"pixel = {[1] * 1000}", r"\[choose\] pixel must be .*, got \[1, 1.*\.\.\.$"),
-    (GPU, f'pixel = "{"x" * 1000}"', r"\[choose\] pixel must be .*, got 'x+\.\.\.$"),
 ]
 
 
@@ -178,17 +168,3 @@ def test_mistakes_are_one_line(written, old, new, message):
         read(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
-
-
-def test_a_colour_that_the_surface_does_not_let_out_is_refused(written):
-    """0.95 can be seen where nothing refracts, 0.92 at n = 1.4."""
-    path = written("reflectance = 0.6", "reflectance = 0.95")
-    assert read(path).reflectance[0] == (0.95, 0.95)
-    path.write_text(path.read_text(encoding="utf-8").replace("n = 1.0", "n = 1.4"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"\[material.red\] reflectance must be .* and <= 0.923, or .*, got 0.95"):
-        read(path)
-
-
-def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"absent.toml: expected a file that can be read, got: No such file"):
-        read(tmp_path / "absent.toml")

@@ -48,26 +48,20 @@ def bumps(eye: float, lamp: float, **technique):
 
 
 @pytest.mark.slow
-def test_no_atlas_where_all_is_seen(context):
+def test_no_atlas_where_all_is_seen_and_one_where_lit_walls_are_hidden(context):
     found = atlas_need(context, bumps(0.0, 30.0))
     assert found.hidden < 1e-5
     # Pixels of a third of a millimetre are coarse; by the file's own tolerance.
     assert (found.is_broken, found.verdict) == (True, "no atlas")
     assert not atlas_need(context, bumps(0.0, 30.0, tolerance=0.05)).is_broken
-
-
-@pytest.mark.slow
-def test_an_atlas_where_lit_walls_are_hidden(context):
     found = atlas_need(context, bumps(55.0, -55.0))
     assert found.error > found.hidden > 0.05
     assert found.verdict == "atlas"
 
 
-@pytest.mark.parametrize(
-    ("error", "hidden", "verdict"), [(0.03, 0.02, "atlas"), (0.03, 0.004, "no atlas"), (0.019, 0.018, "no atlas")]
-)
-def test_an_atlas_for_what_is_hidden_only(error, hidden, verdict):
-    assert scenes.AtlasNeed(error, hidden, 0.02).verdict == verdict
+def test_an_atlas_for_what_is_hidden_only():
+    for error, hidden, verdict in ((0.03, 0.02, "atlas"), (0.03, 0.004, "no atlas"), (0.019, 0.018, "no atlas")):
+        assert scenes.AtlasNeed(error, hidden, 0.02).verdict == verdict
 
 
 @pytest.mark.parametrize("kind", ["orthographic", "perspective"])
@@ -129,12 +123,8 @@ def test_steps_by_the_steepest_ray():
     assert (steep.light_steps, steep.view_steps) == (8, 16)
 
 
-@pytest.mark.parametrize(("steep", "steps"), [(0.0, 0), (0.99, 0), (1.0, 8), (2.99, 8), (3.0, 16), (100.0, 16)])
-def test_steps_at_the_limits(steep, steps):
-    assert scenes.steps_for(steep) == steps
-
-
-def test_the_tolerance_is_met_when_it_is_reached():
+def test_limits_and_the_tolerance_are_met_when_they_are_reached():
+    assert [scenes.steps_for(steep) for steep in (0.0, 0.99, 1.0, 2.99, 3.0, 100.0)] == [0, 0, 8, 8, 16, 16]
     haze = {SINGLE: 0.2, SCALED: 0.1}
     assert scenes.SeaNeed(haze, 0.0, 0.0, 0.0).terms == SCALED
     assert scenes.SeaNeed(haze, 0.0, 0.0, 0.0, tolerance=0.2).terms == SINGLE

@@ -78,7 +78,6 @@ def test_a_constant_that_float32_has_wrong_is_found(monkeypatch, quantity, const
     off = replace(one, law=replace(one.law, **{constant: 1.01 * getattr(one.law, constant)}))
     monkeypatch.setattr(stacks.StackCase, "reference", off.text(EXTENDED))
     (cells,) = stacks.of_law(one, TEXT32, (quantity,))
-    assert np.any(cells.failures)
     assert any(each.is_failure for each in reds(cells))
 
 

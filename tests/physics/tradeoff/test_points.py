@@ -1,6 +1,7 @@
 """The front, by hand and against a plain twin; turns, rates and pinning; fitted laws and their limit without noise."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,10 +35,7 @@ def test_front_of_what_is_known_without_error():
     assert [points[i].cost.value for i in front(points)] == [0.5, 1, 2, 3, 3]
     assert standings(points) == [FRONT, FRONT, FRONT, BEATEN, FRONT, FRONT, TIED]
     assert standings([]) == []
-
-
-def test_front_is_what_the_plain_definition_says():
-    """Distinct numbers without error: on the front is what no other is below in both."""
+    # Of distinct numbers, on the front is what no other is below in both.
     values = np.random.default_rng(1).random((60, 2))
     plain = [not any(np.all(other < one) for other in values) for one in values]
     assert [standing == FRONT for standing in standings([point(*one) for one in values])] == plain
@@ -117,7 +115,7 @@ def test_change_is_that_of_the_energies():
     """a and b a hundredth larger, and c as it was: so is every ring's energy."""
     law = catalogue.load("liang", "corrected")
     assert fits.change(law, law) == (0.0, 0.0)
-    larger = fits.with_constants(law, {name: 1.01 * getattr(law, name) for name in ("a1", "a2", "b0")})
+    larger = replace(law, **{name: 1.01 * getattr(law, name) for name in ("a1", "a2", "b0")})
     energy, counts = fits.judged()
     share = np.diff(fits.energy_within(law), axis=1)[counts] / energy[counts]
     rms, worst = fits.change(larger, law)

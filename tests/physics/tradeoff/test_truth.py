@@ -13,16 +13,12 @@ from profilefit.studies.tradeoff.truth import MATCHED
 
 
 @pytest.mark.slow
-def test_reference_is_the_exact_profile():
+def test_reference_is_the_exact_profile_and_errors_are_those_of_the_rings_that_count():
     within = exact.cdf(truth.EDGES, truth.ALPHAS[:, None]) * np.asarray(exact.reflectance(truth.ALPHAS))[:, None]
     np.testing.assert_allclose(MATCHED.reference[MATCHED.judged], np.diff(within, axis=1)[MATCHED.judged], rtol=1e-9)
     assert MATCHED.judged.any(axis=1).all()
     assert not MATCHED.judged[:, 0].any()  # the disc within 0.01 mfp
     assert not MATCHED.judged[0, -1]  # beyond 99.5 % of the energy at alpha 0.2
-
-
-@pytest.mark.slow
-def test_errors_are_those_of_the_rings_that_count():
     energy = MATCHED.reference.copy()
     assert MATCHED.errors(energy) == (0.0, 0.0)
     row, ring = np.argwhere(MATCHED.judged)[3]
