@@ -29,7 +29,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 
@@ -148,9 +147,8 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
     """Estimate the process behind the residuals of a fit to profiles, and its effect on the constants."""
     size = len(fit.free)
     if not fit.solution.converged:
-        why, none, unknown = f"no fit: {fit.result}", np.zeros(0), np.full((size, size), np.nan)
-        nan = float("nan")
-        return Discrepancy(nan, nan, nan, nan, nan, nan, why, unknown, none, none, np.zeros((size, 0, 0)))
+        none, unknown = np.zeros(0), np.full((size, size), np.nan)
+        return Discrepancy(*[np.nan] * 6, f"no fit: {fit.result}", unknown, none, none, np.zeros((size, 0, 0)))
     return of_residuals(residuals(fit, profiles))
 
 
@@ -287,25 +285,22 @@ def _scales(x: Floats) -> Floats:
 @filter_jit
 def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
     def energy(vector):
-        return _energy(problem.objective, law.with_vector(problem.free, vector), rings)
+        moved = law.with_vector(problem.free, vector).under(rings.surface)
+        edges, alpha = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha)
+        if problem.objective in OF_MAPS:
+            return moved.reflectance(unreduced(alpha[:, None], moved.setting.g))
+        if problem.objective == "radial":
+            r = 0.5 * (edges[1:] + edges[:-1])
+            a, b, c = moved.coefficients(alpha[:, None])
+            return 2.0 * jnp.pi * jnp.diff(edges) * (a * r + b) / (r + c)
+        if problem.objective in QUANTILES:
+            xi = 1.0 - jnp.geomspace(1.0, 1e-4, SHARES)
+            radii = moved.sampler.unclipped(xi, alpha[:, None])
+            inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
+            return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
+        return jnp.diff(moved.unscaled_energy(edges, alpha[:, None]), axis=-1)
 
     return energy(theta), jax.jacfwd(energy)(theta)
-
-
-def _energy(objective: str, law, rings: Rings) -> Array:
-    edges, alpha, law = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha), law.under(rings.surface)
-    if objective in OF_MAPS:
-        return law.reflectance(unreduced(alpha[:, None], law.setting.g))
-    if objective == "radial":
-        r = 0.5 * (edges[1:] + edges[:-1])
-        a, b, c = law.coefficients(alpha[:, None])
-        return 2.0 * jnp.pi * jnp.diff(edges) * (a * r + b) / (r + c)
-    if objective in QUANTILES:
-        xi = 1.0 - jnp.geomspace(1.0, 1e-4, SHARES)
-        radii = law.sampler.unclipped(xi, alpha[:, None])
-        inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
-        return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
-    return jnp.diff(law.unscaled_energy(edges, alpha[:, None]), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -396,13 +391,8 @@ class AtAlbedo:
         unit = unit_energy(self.known.objective, self.energy[None], np.array([self.alpha]), EDGES)[0]
         unit = np.where(self.energy > 0, unit, 0.0)
         relative = self.slope / np.where(unit > 0, unit, 1.0)[:, None]
-        u, s = np.log(self.middle), process.places(np.full(n, self.alpha), self.known.law.setting)
+        u, s = np.log(middles(EDGES)), process.places(np.full(n, self.alpha), self.known.law.setting)
         return process.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
-
-    @property
-    def middle(self) -> Floats:
-        """(n,) [mfp]."""
-        return middles(EDGES)
 
     def radius(self, share: float) -> tuple[float, float, float]:
         """Return the radius within which `share` of the energy leaves [mfp], and its two errors."""
@@ -438,8 +428,8 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
     model = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
-    at = np.log(radii)
-    relative = [np.interp(at, np.log(here.middle), np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
+    at, known_at = np.log(radii), np.log(middles(EDGES))
+    relative = [np.interp(at, known_at, np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
     return Quantity(value, np.abs(value) * relative[0], np.abs(value) * relative[1])
 
 

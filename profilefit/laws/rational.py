@@ -66,7 +66,6 @@ class Rational(Normalisation):
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:
-        """Return alpha / A [-], finite at alpha = 0 too."""
         s = jnp.sqrt(1.0 - alpha)
         return (1.0 + s) * (1.0 + s * (self.c + self.d * s)) / (1.0 + self.b * s)
 

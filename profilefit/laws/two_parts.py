@@ -282,7 +282,6 @@ class RefractingHazard(TwoPartHazard):
         return ("m00", "m10", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20")
 
     def coefficients(self) -> ShapeCoefficients:
-        """Return the constants of the shader source at the law's index."""
         here = self.here()
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength

@@ -10,6 +10,7 @@ from mcml_sim import Setting
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.staged import PerAlbedo, fit_coefficient_laws, fit_per_albedo, length_exponents, trimmed
 from profilefit.laws.published import SETS
+from tests.physics.fitting.test_estimate import spread
 
 ALPHAS = np.linspace(0.2, 0.98, 9)
 DR = 0.02
@@ -109,13 +110,6 @@ def test_length_exponents_are_minus_one_nought_and_one(liang, clean):
     np.testing.assert_allclose(list(length_exponents(tuple(points)).values()), [-1.0, 1.0, 0.0], atol=1e-12)
 
 
-def misfit(values, covariance):
-    """|z| of the scatter's chi^2 about its degrees of freedom: over 3.3 once in a thousand times."""
-    off = values - values.mean(axis=0)
-    freedom = (len(values) - 1) * values.shape[1]
-    return abs(np.sum(off @ np.linalg.inv(covariance) * off) - freedom) / np.sqrt(2 * freedom)
-
-
 @pytest.mark.slow
 def test_errors_of_the_stages_are_those_of_refitting(liang):
     """Independent noise in every ring: the scatter of a, b, c and of c's constants over 60 refits."""
@@ -134,8 +128,8 @@ def test_errors_of_the_stages_are_those_of_refitting(liang):
         scattered.append(points.values.ravel())
         constants.append(fit_coefficient_laws(points, liang, held=("a3",))["c"].solution.parameters)
     for wrong, seen in ((1.0, False), (1.2, True), (1 / 1.2, True)):
-        assert (misfit(np.array(scattered), wrong**2 * one.covariance) > 3.3) == seen
+        assert (spread(np.array(scattered), wrong**2 * one.covariance) < 1e-3) == seen
     law = fit_coefficient_laws(one, liang, held=("a3",))["c"]
-    assert misfit(np.array(constants), law.covariance) < 3.3
-    assert misfit(np.array(constants), 2 * law.covariance) > 3.3
+    assert spread(np.array(constants), law.covariance) > 1e-3
+    assert spread(np.array(constants), 2 * law.covariance) < 1e-3
     assert one.standard_error.shape == (9, 3)
