@@ -147,8 +147,9 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
     """Estimate the process behind the residuals of a fit to profiles, and its effect on the constants."""
     size = len(fit.free)
     if not fit.solution.converged:
-        none, unknown = np.zeros(0), np.full((size, size), np.nan)
-        return Discrepancy(*[np.nan] * 6, f"no fit: {fit.result}", unknown, none, none, np.zeros((size, 0, 0)))
+        why, none, unknown = f"no fit: {fit.result}", np.zeros(0), np.full((size, size), np.nan)
+        nan = float("nan")
+        return Discrepancy(nan, nan, nan, nan, nan, nan, why, unknown, none, none, np.zeros((size, 0, 0)))
     return of_residuals(residuals(fit, profiles))
 
 

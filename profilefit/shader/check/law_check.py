@@ -147,9 +147,8 @@ def check_law(
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
         right = exact or dense_grid.reference(loaded.law.in_reduced(), at)
-        profiled, drawn = (
-            np.broadcast_to(mask, at.shape) for mask in bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
-        )
+        both = bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
+        profiled, drawn = (np.broadcast_to(mask, at.shape) for mask in both)
         spreads, rounding = _rounding(loaded.law.in_reduced(), found, right, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
