@@ -151,9 +151,7 @@ def test_the_sampler_draws_its_own_density(law):
 
 
 @pytest.mark.slow
-def test_it_scales_has_derivatives_and_holds_in_single_precision(matched):
-    np.testing.assert_allclose(matched.profile(R, 0.8, 2.5), matched.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-10)
-    np.testing.assert_allclose(matched.cdf(R, 0.8, 2.5), matched.cdf(R / 2.5, 0.8), rtol=1e-10)
+def test_it_has_derivatives_and_holds_in_single_precision(matched):
     assert matched.sampler.pdf(0.0, 0.5) == pytest.approx(0.25 / matched.albedo.reflectance(0.5), rel=1e-3)
     with jax.enable_x64(True):
         by_alpha = jax.vmap(jax.grad(lambda a: matched.profile(0.5, a)))(jnp.linspace(0.01, 0.99, 9))

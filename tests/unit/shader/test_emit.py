@@ -15,7 +15,6 @@ from profilefit.shader import emit
 from tests.unit.shader.test_other_texts import functions
 
 BURLEY = profilefit.load("burley", "published")
-BEAM = profilefit.load("beam_diffusion")
 OTHER_MAP = replace(BURLEY, albedo=catalogue.albedo_law("chiang", "published"))
 DECLARED = re.compile(r"^const float (\w+) = (\S+);", re.MULTILINE)
 
@@ -79,7 +78,6 @@ HAS = r"law must be one that has a shader source \(liang"
             (PREFIX, partial(emit.law_text, BURLEY, name=name))
             for name in (" ", "my law", "2nd", "a__b", "a_", "gl_skin", "PF_skin", "LAW")
         ),
-        ("must have a closed form to become a shader, got beam_diffusion", partial(emit.law_text, BEAM)),
         (rf"{HAS}, burley.*hazard, quantile\), got Rational", partial(emit.law_text, BURLEY.albedo)),
         (rf"{HAS}, rational.*got Burley", partial(emit.map_text, BURLEY)),
         ("albedo of Burley must be a Rational map to become a shader, got Chiang", partial(emit.law_text, OTHER_MAP)),
