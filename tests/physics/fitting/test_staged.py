@@ -69,12 +69,10 @@ def test_the_trimming_keeps_rings_up_to_the_cut_by_strides_of_length(liang):
     energy = (2 * np.pi * np.exp(-r / 0.8) * 0.01)[None]  # r R_d = e^{-r/0.8}, low enough at 4.24
     none = np.zeros_like(energy)
     profiles = Profiles(np.array([0.5]), edges, energy, none, none + np.inf, np.zeros(1), "exact", Setting())
-    stops = {mfp: float(trimmed(profiles, "r R_d", 0.005, mfp)[1][0]) for mfp in (0.1, 1.0, 2.0)}
-    # 4.24 mfp are 0.424, 4.24 and 8.48 lengths, where strides are 0.05, 0.5 and 1: stops at 0.45, 4.5 and 9.
-    assert stops == pytest.approx({0.1: 4.5, 1.0: 4.5, 2.0: 4.5})
-    finer = float(trimmed(profiles, "r R_d", 0.005, 0.2)[1][0])  # 0.848 lengths, strides of 0.1: stops at 0.9
-    assert finer == pytest.approx(4.5)
-    assert float(trimmed(profiles, "r R_d", 0.005, 0.24)[1][0]) == pytest.approx(1.2 / 0.24)  # 1.02, strides of 0.2
+    # 4.24 mfp are 0.424, 0.848, 1.02, 4.24 and 8.48 lengths, where strides are 0.05, 0.1, 0.2, 0.5 and 1.
+    expected = {0.1: 0.45, 0.2: 0.9, 0.24: 1.2, 1.0: 4.5, 2.0: 9.0}
+    stops = {mfp: mfp * float(trimmed(profiles, "r R_d", 0.005, mfp)[1][0]) for mfp in expected}
+    assert stops == pytest.approx(expected)
 
 
 @pytest.mark.slow
@@ -91,20 +89,18 @@ def test_the_coefficient_laws_come_back(clean, liang):
     np.testing.assert_allclose(laws["a"].solution.parameters, liang.vector(("a1", "a2")), rtol=1e-4)
 
 
-def test_length_exponents_are_minus_one_nought_and_one(liang, clean):
+def test_length_exponents_are_minus_one_nought_and_one(clean):
     """Rings that scale with l see the same curve in units of l: a ~ 1/l, b ~ 1, c ~ l, to rounding."""
-    points = tuple(
-        PerAlbedo(ALPHAS, mfp, clean.values, None, clean.r_trim, clean.results, clean.rms) for mfp in (0.5, 1.0, 4.0)
-    )
-    found = length_exponents(points)
-    assert list(found) == ["a", "b", "c"]
-    np.testing.assert_allclose(list(found.values()), [-1.0, 0.0, 1.0], atol=1e-12)
+
+    def exponents(*powers):
+        values = {mfp: clean.values * mfp ** np.array(powers) for mfp in (0.5, 1.0, 4.0)}
+        rest = None, clean.r_trim, clean.results, clean.rms
+        return length_exponents(tuple(PerAlbedo(ALPHAS, mfp, one, *rest) for mfp, one in values.items()))
+
+    assert list(exponents(0, 0, 0)) == ["a", "b", "c"]
+    np.testing.assert_allclose(list(exponents(0, 0, 0).values()), [-1.0, 0.0, 1.0], atol=1e-12)
     # Negative control: c that stays where it is in length, and b that doubles with l.
-    points = []
-    for mfp in (0.5, 1.0, 4.0):
-        values = clean.values * np.array([1.0, mfp, 1.0 / mfp])
-        points.append(PerAlbedo(ALPHAS, mfp, values, None, clean.r_trim, clean.results, clean.rms))
-    np.testing.assert_allclose(list(length_exponents(tuple(points)).values()), [-1.0, 1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(list(exponents(0, 1, -1).values()), [-1.0, 1.0, 0.0], atol=1e-12)
 
 
 @pytest.mark.slow
