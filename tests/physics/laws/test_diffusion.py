@@ -262,8 +262,7 @@ def test_more_nodes_change_nothing_and_quality_is_a_tenth():
     coarse = BeamDiffusion(law.setting, law.albedo, 1)
     assert np.max(np.abs(coarse.cdf(r, alpha) - shares)) > 10.0 * np.max(np.abs(law.cdf(r, alpha) - shares))
     # Christensen and Burley judge it the best of the physically based profiles; a dipole is off by a half.
-    quality = profile_quality(BeamDiffusion(Setting()), [0.5, 0.95])
+    quality = profile_quality(law, [0.5, 0.95])
     assert np.all(quality.rel < 0.12)
     assert np.all(quality.ks < 0.04)
-    law = BeamDiffusion(Setting())
     assert law.profile(40.0, 0.99) == pytest.approx(exact.profile(40.0, 0.99), rel=0.03)
