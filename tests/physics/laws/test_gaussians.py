@@ -23,13 +23,9 @@ FOUR = {
 }
 
 
-@pytest.fixture(scope="module")
-def four(normalisation):
-    return law_class(4)(Setting(), normalisation, **FOUR)
-
-
-def test_parts_and_profile_by_hand_and_at_both_ends(four):
+def test_parts_and_profile_by_hand_and_at_both_ends(normalisation):
     """At alpha = 3/4 s = 1/2: ln v_1 = -4.18 - 2.98 + 0.56; one ratio is 1 + e^3.17; weights e^(1.09 + 0.02) : 1."""
+    four = law_class(4)(Setting(), normalisation, **FOUR)
     with jax.enable_x64(True):
         variances = np.asarray(four.variances(jnp.asarray(0.75)))
         weights = np.exp(four.log_weights(jnp.asarray(0.75)))
