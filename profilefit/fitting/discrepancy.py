@@ -451,14 +451,14 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 
 
-def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
-    """Return the root mean square of law/data - 1 of the radius of `share` [-], over the law's albedos that hold it."""
+def tail_error(known: LawWithErrors, profiles: Profiles) -> float:
+    """Return the root mean square of law/data - 1 of the radius of 99.5 % [-], over the law's albedos that hold it."""
     errors = []
     settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
     for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
-        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > share:
-            truth = float(np.interp(share, cdf, profiles.r_edges))
-            errors.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
+        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > ENERGY_WITHIN:
+            truth = float(np.interp(ENERGY_WITHIN, cdf, profiles.r_edges))
+            errors.append(AtAlbedo(known, float(alpha)).radius(ENERGY_WITHIN)[0] / truth - 1.0)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 

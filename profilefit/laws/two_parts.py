@@ -261,8 +261,7 @@ class RefractingHazard(TwoPartHazard):
 
     h lambda_1(0) = once_h y     a / lambda_1(0) = once_a0 + once_a1 y     b / lambda_1(0)^2 = (once_b0 + once_b1 y)^2
 
-    32 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 16. `albedo` is the
-    map to A (held fixed). Two exponentials and two logarithms a profile.
+    32 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 16.
     """
 
     __annotations__ |= dict.fromkeys(IN_RHO, "float")

@@ -282,9 +282,8 @@ def _map_counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_a
             bad = (np.isnan(value), np.isinf(value), value < 0, falls)
         return [mask & held for mask in bad], lambda index: f"{sign} {given[index]:.4g}"
 
-    return dense_grid.summed(
-        (faults(REFLECTANCE, alpha, of_reflectance, "A"), faults(ALPHA, reflectance, of_alpha, "α"))
-    )
+    both = faults(REFLECTANCE, alpha, of_reflectance, "A"), faults(ALPHA, reflectance, of_alpha, "α")
+    return dense_grid.summed(both)
 
 
 # What is kept in half, or computed in it.
