@@ -364,24 +364,18 @@ class AtAlbedo:
 
     known: LawWithErrors
     alpha: float
+    energy: Floats
+    slope: Floats
 
-    @cached_property
-    def _predicted(self) -> tuple[Floats, Floats]:
-        problem = ResidualFunction(self.known.objective, self.known.free)
-        total = float(self.known.reduced.albedo.reflectance(self.alpha))
-        alone, none = np.array([self.alpha]), np.zeros((1, EDGES.size - 1))
+    @classmethod
+    def of(cls, known: LawWithErrors, alpha: float) -> AtAlbedo:
+        """Evaluate a law at an albedo."""
+        total = float(known.reduced.albedo.reflectance(alpha))
+        alone, none = np.array([alpha]), np.zeros((1, EDGES.size - 1))
         rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
-        energy, slope = predicted(problem, self.known.reduced, rings)
+        energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
         lit = energy[0] > 0  # (7) ends where it falls below zero
-        return np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0)
-
-    @property
-    def energy(self) -> Floats:
-        return self._predicted[0]
-
-    @property
-    def slope(self) -> Floats:
-        return self._predicted[1]
+        return cls(known, alpha, np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0))
 
     @cached_property
     def covariance(self) -> Floats:
@@ -416,7 +410,7 @@ def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN)
     """Return the radius (k,) [mfp] within which `share` of the light leaves; beyond 99.5 % see `tail_error`."""
     if known.is_map or not 0 < share < 1:
         raise InputError(f"share must be in (0, 1), of a profile law, got {share!r} of {type(known.law).__name__}")
-    rows = [AtAlbedo(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]
+    rows = [AtAlbedo.of(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]
     return Quantity(*np.array(rows).T)
 
 
@@ -424,7 +418,7 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     """Return R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
     if known.is_map or known.objective in QUANTILES:
         raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
-    here, radii = AtAlbedo(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
+    here, radii = AtAlbedo.of(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
     value = np.asarray(known.reduced.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
@@ -458,7 +452,7 @@ def tail_error(known: LawWithErrors, profiles: Profiles) -> float:
     for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
         if setting == known.law.setting and alpha < 1.0 and cdf[-1] > ENERGY_WITHIN:
             truth = float(np.interp(ENERGY_WITHIN, cdf, profiles.r_edges))
-            errors.append(AtAlbedo(known, float(alpha)).radius(ENERGY_WITHIN)[0] / truth - 1.0)
+            errors.append(AtAlbedo.of(known, float(alpha)).radius(ENERGY_WITHIN)[0] / truth - 1.0)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 
