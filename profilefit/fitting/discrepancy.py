@@ -29,7 +29,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 
@@ -287,25 +286,22 @@ def _scales(x: Floats) -> Floats:
 @filter_jit
 def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
     def energy(vector):
-        return _energy(problem.objective, law.with_vector(problem.free, vector), rings)
+        moved = law.with_vector(problem.free, vector).under(rings.surface)
+        edges, alpha = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha)
+        if problem.objective in OF_MAPS:
+            return moved.reflectance(unreduced(alpha[:, None], moved.setting.g))
+        if problem.objective == "radial":
+            r = 0.5 * (edges[1:] + edges[:-1])
+            a, b, c = moved.coefficients(alpha[:, None])
+            return 2.0 * jnp.pi * jnp.diff(edges) * (a * r + b) / (r + c)
+        if problem.objective in QUANTILES:
+            xi = 1.0 - jnp.geomspace(1.0, 1e-4, SHARES)
+            radii = moved.sampler.unclipped(xi, alpha[:, None])
+            inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
+            return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
+        return jnp.diff(moved.unscaled_energy(edges, alpha[:, None]), axis=-1)
 
     return energy(theta), jax.jacfwd(energy)(theta)
-
-
-def _energy(objective: str, law, rings: Rings) -> Array:
-    edges, alpha, law = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha), law.under(rings.surface)
-    if objective in OF_MAPS:
-        return law.reflectance(unreduced(alpha[:, None], law.setting.g))
-    if objective == "radial":
-        r = 0.5 * (edges[1:] + edges[:-1])
-        a, b, c = law.coefficients(alpha[:, None])
-        return 2.0 * jnp.pi * jnp.diff(edges) * (a * r + b) / (r + c)
-    if objective in QUANTILES:
-        xi = 1.0 - jnp.geomspace(1.0, 1e-4, SHARES)
-        radii = law.sampler.unclipped(xi, alpha[:, None])
-        inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
-        return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
-    return jnp.diff(law.unscaled_energy(edges, alpha[:, None]), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -368,24 +364,18 @@ class AtAlbedo:
 
     known: LawWithErrors
     alpha: float
+    energy: Floats
+    slope: Floats
 
-    @cached_property
-    def _predicted(self) -> tuple[Floats, Floats]:
-        problem = ResidualFunction(self.known.objective, self.known.free)
-        total = float(self.known.reduced.albedo.reflectance(self.alpha))
-        alone, none = np.array([self.alpha]), np.zeros((1, EDGES.size - 1))
+    @classmethod
+    def of(cls, known: LawWithErrors, alpha: float) -> AtAlbedo:
+        """Evaluate a law at an albedo."""
+        total = float(known.reduced.albedo.reflectance(alpha))
+        alone, none = np.array([alpha]), np.zeros((1, EDGES.size - 1))
         rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
-        energy, slope = predicted(problem, self.known.reduced, rings)
+        energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
         lit = energy[0] > 0  # (7) ends where it falls below zero
-        return np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0)
-
-    @property
-    def energy(self) -> Floats:
-        return self._predicted[0]
-
-    @property
-    def slope(self) -> Floats:
-        return self._predicted[1]
+        return cls(known, alpha, np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0))
 
     @cached_property
     def covariance(self) -> Floats:
@@ -396,13 +386,8 @@ class AtAlbedo:
         unit = unit_energy(self.known.objective, self.energy[None], np.array([self.alpha]), EDGES)[0]
         unit = np.where(self.energy > 0, unit, 0.0)
         relative = self.slope / np.where(unit > 0, unit, 1.0)[:, None]
-        u, s = np.log(self.middle), process.places(np.full(n, self.alpha), self.known.law.setting)
+        u, s = np.log(middles(EDGES)), process.places(np.full(n, self.alpha), self.known.law.setting)
         return process.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
-
-    @property
-    def middle(self) -> Floats:
-        """(n,) [mfp]."""
-        return middles(EDGES)
 
     def radius(self, share: float) -> tuple[float, float, float]:
         """Return the radius within which `share` of the energy leaves [mfp], and its two errors."""
@@ -425,7 +410,7 @@ def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN)
     """Return the radius (k,) [mfp] within which `share` of the light leaves; beyond 99.5 % see `tail_error`."""
     if known.is_map or not 0 < share < 1:
         raise InputError(f"share must be in (0, 1), of a profile law, got {share!r} of {type(known.law).__name__}")
-    rows = [AtAlbedo(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]
+    rows = [AtAlbedo.of(known, float(a)).radius(share) for a in np.atleast_1d(alpha)]
     return Quantity(*np.array(rows).T)
 
 
@@ -433,13 +418,13 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     """Return R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
     if known.is_map or known.objective in QUANTILES:
         raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
-    here, radii = AtAlbedo(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
+    here, radii = AtAlbedo.of(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
     value = np.asarray(known.reduced.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
     model = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
-    at = np.log(radii)
-    relative = [np.interp(at, np.log(here.middle), np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
+    at, known_at = np.log(radii), np.log(middles(EDGES))
+    relative = [np.interp(at, known_at, np.where(here.energy > 0, part, np.nan)) for part in (noise, model)]
     return Quantity(value, np.abs(value) * relative[0], np.abs(value) * relative[1])
 
 
@@ -460,14 +445,14 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 
 
-def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
-    """Return the root mean square of law/data - 1 of the radius of `share` [-], over the law's albedos that hold it."""
+def tail_error(known: LawWithErrors, profiles: Profiles) -> float:
+    """Return the root mean square of law/data - 1 of the radius of 99.5 % [-], over the law's albedos that hold it."""
     errors = []
     settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
     for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
-        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > share:
-            truth = float(np.interp(share, cdf, profiles.r_edges))
-            errors.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
+        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > ENERGY_WITHIN:
+            truth = float(np.interp(ENERGY_WITHIN, cdf, profiles.r_edges))
+            errors.append(AtAlbedo.of(known, float(alpha)).radius(ENERGY_WITHIN)[0] / truth - 1.0)
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 

@@ -140,14 +140,14 @@ def scatter_chance(square: float, freedom: int, pooled: float) -> float:
     return float(stats.f.sf(square / freedom, freedom, pooled))
 
 
-def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float = np.inf, seed: int = 0) -> float:
+def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float) -> float:
     """Return the p-value of the score z^T S^-1 D S^-1 z under the covariance S = `own` of z."""
     there = np.linalg.solve(own, z)
     root = np.linalg.cholesky(own)
     inner = np.linalg.solve(root, np.linalg.solve(root, shape).T)
     weights = np.linalg.eigvalsh(0.5 * (inner + inner.T))
     weights = weights[weights > 1e-6 * weights.max()]
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(0)
     drawn = generator.chisquare(1.0, (DRAWS, weights.size)) @ weights
     if np.isfinite(pooled):
         drawn /= generator.chisquare(pooled, DRAWS) / pooled

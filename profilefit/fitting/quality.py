@@ -6,7 +6,6 @@ ks       max over r of |cdf_law - cdf_exact|
 l1       half the integral of |2 pi r (R_law - R_exact)| over r, over A: misplaced energy
 mse, r2  of R'_d = r R_d on an even grid over [0, r'_max], the range of the trimming (6) of Liang et al.; `_halves` of
          its first and second half, as in that paper's Table 1
-delta_A  max |A_law - A_exact|
 """
 
 from __future__ import annotations

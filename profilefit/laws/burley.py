@@ -63,20 +63,15 @@ class BurleyApproximateSampler(Sampler):
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         rate = self.law.falloff_rate(alpha)
-        tau = self._tau(rate * x)
+        target = jnp.minimum(rate * x, FARTHEST)
+        tau = target / self.c
+        for _ in range(NEWTON_STEPS):  # to (2 + k (1 - e^{-tau})) tau = target
+            tau = tau - ((self.c - (self.c - 2.0) * jnp.exp(-tau)) * tau - target) / self._slope(tau)
         return rate * jnp.exp(-tau) / self._slope(tau)
 
     def _slope(self, tau: Array) -> Array:
         """d(q x) / d tau."""
         return 2.0 + (self.c - 2.0) * (1.0 - (1.0 - tau) * jnp.exp(-tau))
-
-    def _tau(self, target: Array) -> Array:
-        """Return tau with (2 + k (1 - e^{-tau})) tau = target."""
-        target = jnp.minimum(target, FARTHEST)
-        tau = target / self.c
-        for _ in range(NEWTON_STEPS):
-            tau = tau - ((self.c - (self.c - 2.0) * jnp.exp(-tau)) * tau - target) / self._slope(tau)
-        return tau
 
 
 class NormalizedDiffusion(ProfileLaw):

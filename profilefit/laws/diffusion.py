@@ -371,7 +371,7 @@ class BeamDiffusion(DiffusionLaw):
 
     def _taken(self, x: Array, alpha: Array) -> Array:
         """Energy within x that kappa takes away [-]."""
-        nodes, weights = _gauss(RADIUS_NODES * self.halves // 2)
+        nodes, weights = np.polynomial.legendre.leggauss(RADIUS_NODES * self.halves // 2)
         u = jnp.asarray(0.5 * (nodes + 1.0), x.dtype)
         last = jnp.minimum(x, LAST_TAKEN)[..., None]
         r, dr = last * u**3, 1.5 * last * u**2 * jnp.asarray(weights, x.dtype)
@@ -379,14 +379,9 @@ class BeamDiffusion(DiffusionLaw):
         return jnp.sum(2.0 * jnp.pi * r * dr * lost, axis=-1)
 
 
-@lru_cache(maxsize=8)
-def _gauss(count: int) -> tuple[Floats, Floats]:
-    return np.polynomial.legendre.leggauss(count)
-
-
 def depths(x: Array, halves: int = 2) -> tuple[Array, Array]:
     """Depths of sources and their weights e^{-z} dz, along a last axis, for exits at radii x [mfp]."""
-    nodes, weights = _gauss(DEPTH_NODES * halves // 2)
+    nodes, weights = np.polynomial.legendre.leggauss(DEPTH_NODES * halves // 2)
     unit = jnp.clip(x, NEAREST_EXIT, 1.0)[..., None]
     half = 0.5 * jnp.arcsinh(DEEPEST / unit)
     v = half * (1.0 + jnp.asarray(nodes, x.dtype))

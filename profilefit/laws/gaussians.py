@@ -154,14 +154,12 @@ class Gaussians(GaussianSum):
         return {f"rise{i}": math.log1p(math.exp(own[f"v{i}"])) for i in range(2, self.count() + 1)}
 
     def variances(self, alpha) -> Array:
-        """v_i(alpha) [mfp^2], rising, along a last axis."""
         s = jnp.sqrt(1.0 - alpha)[..., None]
         ratios = [jax.nn.softplus(getattr(self, f"v{i}")) for i in range(2, self.count() + 1)]
         rising = jnp.cumsum(jnp.stack([jnp.asarray(self.v1, s.dtype), *(jnp.asarray(r, s.dtype) for r in ratios)]))
         return jnp.exp(rising + s * (self.f1 + s * self.f2))
 
     def log_weights(self, alpha) -> Array:
-        """Return ln w_i(alpha) [-] along a last axis."""
         s = jnp.sqrt(1.0 - alpha)
         pairs = [(getattr(self, f"w{i}0"), getattr(self, f"w{i}1")) for i in range(2, self.count() + 1)]
         logits = [jnp.zeros_like(s), *(level + slope * s for level, slope in pairs)]

@@ -108,11 +108,8 @@ def local(x: Array, shape: Shape) -> Local:
     numerator, denominator, above = 1.0 + x * (shape.a + x * shape.b), 1.0 + shape.c * x, 1.0 + q
     # One reciprocal for three quotients.
     inverse = 1.0 / (numerator * denominator * above)
-    rest, one_over_n, one_over_d = (
-        numerator * denominator * inverse,
-        denominator * above * inverse,
-        numerator * above * inverse,
-    )
+    rest, one_over_n = numerator * denominator * inverse, denominator * above * inverse
+    one_over_d = numerator * above * inverse
     early, spent = early_share(x, q, per_h, rest)
     up, down = (shape.a + 2.0 * shape.b * x) * one_over_n, shape.c * one_over_d
     return Local(
@@ -182,7 +179,6 @@ class HazardSampler(Sampler):
         return radius(xi, self.law.shape(alpha), self.steps)
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        """Density of this very map."""
         shape = self.law.shape(alpha)
         return map_density(x, shape, lambda t: radius_at(t, growth(t), shape, self.steps))
 

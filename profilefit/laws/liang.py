@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -49,27 +50,22 @@ class LiangSampler(Sampler):
     @eqx.filter_jit  # the halvings are loops, which would compile anew at each call
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = jnp.broadcast_arrays(x, alpha)
-        turn = self._turning_point(alpha)
-        eps = jnp.full_like(alpha, self.law.eps)
-        density = sum(
-            self._branch_density(x, alpha, low, high)
-            for low, high in ((jnp.zeros_like(alpha), turn), (turn, eps), (eps, jnp.ones_like(alpha)))
-        )
+        start, eps = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
+        turn = _halved(lambda xi: ~(self._slope(xi, alpha) < 0), start, eps)[0]  # where g is most negative
+        ends = start, turn, eps, jnp.ones_like(alpha)
+        density = sum(self._branch_density(x, alpha, low, high) for low, high in pairwise(ends))
         return jnp.where((x > 0) & (x < self.law.largest_radius(alpha)), density, 0.0)
 
     def _radius(self, xi, alpha) -> Array:
         return jnp.abs(self.unclipped(xi, alpha))
 
-    def _root(self, x, alpha, low, high) -> Array:
-        """Return xi in [low, high], where |g| is monotone, with |g(xi)| = x; an end of it where there is none."""
-        rising = self._radius(high, alpha) > self._radius(low, alpha)
-        left, right = _halved(lambda middle: (self._radius(middle, alpha) > x) == rising, low, high)
-        return 0.5 * (left + right)
-
     def _branch_density(self, x, alpha, low, high) -> Array:
-        ends = self._radius(low, alpha), self._radius(high, alpha)
-        reached = (x > jnp.minimum(*ends)) & (x < jnp.maximum(*ends))
-        slope = jnp.abs(self._slope(self._root(x, alpha, low, high), alpha))
+        """Return the density of radii x of xi in [low, high], where |g| is monotone; 0 where there are none."""
+        first, last = self._radius(low, alpha), self._radius(high, alpha)
+        reached = (x > jnp.minimum(first, last)) & (x < jnp.maximum(first, last))
+        rising = last > first
+        left, right = _halved(lambda xi: (self._radius(xi, alpha) > x) == rising, low, high)
+        slope = jnp.abs(self._slope(0.5 * (left + right), alpha))
         return jnp.where(reached, 1.0 / slope, 0.0)
 
     def _slope(self, xi, alpha) -> Array:
@@ -79,11 +75,6 @@ class LiangSampler(Sampler):
         k2 = law.h1 * alpha ** (law.h2 * alpha + law.h3)
         root, ln = jnp.sqrt(xi), jnp.log(1.0 + law.eps - xi)
         return (k1 + (k1 * xi - k2) / (2.0 * xi)) * root * ln - (k1 * xi - k2) * root / (1.0 + law.eps - xi)
-
-    def _turning_point(self, alpha) -> Array:
-        """Return the xi in (0, eps) where g is most negative."""
-        ends = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
-        return _halved(lambda middle: ~(self._slope(middle, alpha) < 0), *ends)[0]
 
 
 def _halved(is_beyond: Callable[[Array], Array], low: Array, high: Array) -> tuple[Array, Array]:

@@ -70,8 +70,6 @@ class VanDeHulst(AlbedoLaw):
     Near white s passes 0 just before A = 1, so that alpha = 1 - s^2 falls again, by 3e-11; clamping s at 0 mends it.
     The rational map, which is exact at both ends, has no such place.
 
-    p0, p1, q0, q1, q2  constants [-]
-
     Source: C. Kulla and A. Conty, Revisiting physically based shading at Imageworks, SIGGRAPH 2017 course, who invert
     H. C. van de Hulst, Multiple Light Scattering, 1980; also in F. Fong, M. Wrenninge, C. Kulla and R. Habel,
     Production Volume Rendering, SIGGRAPH 2017 course.
@@ -109,8 +107,6 @@ class Chiang(AlbedoLaw):
 
     alpha(1) is 1 - e^{e1 + e2 + e3} = 0.9989, so that nothing maps to albedos beyond; their A is 1. The inverse is the
     root in [0, 1] of the cubic, which falls there, by Newton's method cut to a bracket.
-
-    e1, e2, e3  constants [-]
 
     Source: M. J.-Y. Chiang, P. Kutz and B. Burley, Practical and controllable subsurface scattering for production path
     tracing, SIGGRAPH 2016 Talks, who fit it to Monte Carlo simulations.

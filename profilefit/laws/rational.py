@@ -34,8 +34,6 @@ class Rational(Normalisation):
 
     A(0) = 0 and A(1) = 1 whatever the constants, and dA/ds is finite at s = 0 as in the exact solution, where 1 - A is
     proportional to s. The inverse is the root in [0, 1] of (b + A d) s^2 + (1 - b + A c) s - (1 - A) = 0.
-
-    b, c, d  constants [-]
     """
 
     b: float
@@ -66,7 +64,6 @@ class Rational(Normalisation):
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:
-        """Return alpha / A [-], finite at alpha = 0 too."""
         s = jnp.sqrt(1.0 - alpha)
         return (1.0 + s) * (1.0 + s * (self.c + self.d * s)) / (1.0 + self.b * s)
 

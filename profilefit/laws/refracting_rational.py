@@ -138,8 +138,6 @@ class RefractingRational(FoldedRational):
     c = c0 + c1 q + c2 q^2 + c3 q^3 + c4 q^4     d likewise, up to d5 q^5     f = f0 + f1 q
 
     For n in (1, 1.6], under either light.
-
-    c0 ... c4, d0 ... d5, f0, f1  constants [-]
     """
 
     __annotations__ = {f"{name}{i}": "float" for name, count in COUNTS.items() for i in range(count)}

@@ -261,8 +261,7 @@ class RefractingHazard(TwoPartHazard):
 
     h lambda_1(0) = once_h y     a / lambda_1(0) = once_a0 + once_a1 y     b / lambda_1(0)^2 = (once_b0 + once_b1 y)^2
 
-    32 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 16. `albedo` is the
-    map to A (held fixed). Two exponentials and two logarithms a profile.
+    32 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 16.
     """
 
     __annotations__ |= dict.fromkeys(IN_RHO, "float")
@@ -282,7 +281,6 @@ class RefractingHazard(TwoPartHazard):
         return ("m00", "m10", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20")
 
     def coefficients(self) -> ShapeCoefficients:
-        """Return the constants of the shader source at the law's index."""
         here = self.here()
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength

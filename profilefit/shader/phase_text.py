@@ -30,7 +30,7 @@ def phase_text(phase: Phase, lang: str = "glsl", name: str = "phase", remarks: M
     return emit.filled(texts, name, constants, len(terms), lang, remarks or {})
 
 
-def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = None) -> str:
+def source(record: PhaseRecord, lang: str = "glsl", name: str | None = None) -> str:
     """Return the whole file of a record's best sum of terms, its moments held, in one of `law_file.LANGUAGES`.
 
     name  what the names in it begin with, by default the record's own with underscores; InputError where that is none
@@ -63,6 +63,3 @@ def _terms(phase: Phase) -> tuple[list[float], list[float]]:
     if len(pairs) > MOST_TERMS:
         raise InputError(f"phase must have at most {MOST_TERMS} terms to become a shader, got {len(pairs)}")
     return [float(weight) for weight, _ in pairs], [float(one.mean_cosine) for _, one in pairs]
-
-
-source = export_phase

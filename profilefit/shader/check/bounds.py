@@ -95,30 +95,28 @@ def model_of_map(loaded: LoadedLaw, folder: Folder) -> ModelError:
 def _stated(
     loaded: LoadedLaw, records: Records, laws: Callable[..., list[LoadedLaw]], measures: Sequence[str]
 ) -> ModelError:
-    own = loaded.name, loaded.setting
-    owner: LoadedLaw | None = loaded
-    if not loaded.records:
-        same = (law for law in laws(records, matched=False) if law.records and (law.name, law.setting) == own)
-        owner = next(same, None)
-    found = _recorded(owner.records if owner else (), measures, records, loaded.setting)
-    return ModelError(found, " + ".join(owner.records) if owner and found else "measured here")
+    """Return what the records of a law, or of the regenerated one of its name and setting, state at its setting.
 
-
-def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting) -> dict[str, float]:
-    """Return what records state at a setting: of another index or g than their own what they measured around it."""
+    Of another index or g than their own they state what they measured around it.
+    """
+    names: Sequence[str] = loaded.records
+    if not names:
+        own = loaded.name, loaded.setting
+        same = (law.records for law in laws(records, matched=False) if (law.name, law.setting) == own)
+        names = next(filter(None, same), ())
     found: dict[str, float] = {}
     for name in names:
         content = records.content(name)
         quality: dict[str, Any] = content.get("quality", {})
         try:
-            if setting == record_setting(content):
-                own = quality.get("regenerated", {})
-                found |= {measure: MEASURES[measure].worst(own[measure]) for measure in measures if measure in own}
+            if loaded.setting == record_setting(content):
+                known = quality.get("regenerated", {})
+                found |= {measure: MEASURES[measure].worst(known[measure]) for measure in measures if measure in known}
             else:
-                found |= _around(setting, quality["by_index"], measures)
+                found |= _around(loaded.setting, quality["by_index"], measures)
         except (KeyError, TypeError, ValueError):
             raise RecordError(f"record {name} is damaged: its quality has no numbers; regenerate it") from None
-    return found
+    return ModelError(found, " + ".join(names) if found else "measured here")
 
 
 def _around(setting: Setting, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:

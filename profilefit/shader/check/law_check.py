@@ -147,9 +147,8 @@ def check_law(
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
         right = exact or dense_grid.reference(loaded.law.in_reduced(), at)
-        profiled, drawn = (
-            np.broadcast_to(mask, at.shape) for mask in bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
-        )
+        both = bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
+        profiled, drawn = (np.broadcast_to(mask, at.shape) for mask in both)
         spreads, rounding = _rounding(loaded.law.in_reduced(), found, right, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
@@ -283,9 +282,8 @@ def _map_counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_a
             bad = (np.isnan(value), np.isinf(value), value < 0, falls)
         return [mask & held for mask in bad], lambda index: f"{sign} {given[index]:.4g}"
 
-    return dense_grid.summed(
-        (faults(REFLECTANCE, alpha, of_reflectance, "A"), faults(ALPHA, reflectance, of_alpha, "α"))
-    )
+    both = faults(REFLECTANCE, alpha, of_reflectance, "A"), faults(ALPHA, reflectance, of_alpha, "α")
+    return dense_grid.summed(both)
 
 
 # What is kept in half, or computed in it.

@@ -13,8 +13,8 @@ from mcml_sim.runs.input_runs import Compiling
 from profilefit.errors import InputError
 from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import fit
-from profilefit.fitting.profiles import Covariance, Profiles
 from tests.fixtures import Line, whitened
+from tests.physics.fitting.test_estimate import line_profiles
 
 pytestmark = pytest.mark.slow
 
@@ -26,11 +26,9 @@ def fitted_line(seed, law, free=None):
     """A fit to twelve noisy points whose photon noise is correlated, and nothing like their misfit."""
     rng = np.random.default_rng(seed)
     alpha = np.linspace(0.1, 0.9, 12)
-    energy = (0.2 + 0.6 * alpha + 0.02 * rng.standard_normal(12))[:, None]
+    reflectance = 0.2 + 0.6 * alpha + 0.02 * rng.standard_normal(12)
     factor = 0.01 * rng.standard_normal((1, 12, 12)) * np.linspace(0.2, 2.0, 12)[:, None]
-    noise, light = (0 * energy, np.full_like(energy, np.inf)), (np.zeros(12), "test", Setting(), 1000)
-    profiles = Profiles(alpha, np.array([0.0, 1.0]), energy, *noise, *light, Covariance(factor, energy, 1000, 0.0))
-    return fit(profiles, law, "reflectance", free=free)
+    return fit(line_profiles(reflectance, alpha, factor), law, "reflectance", free=free)
 
 
 @pytest.fixture(scope="module")

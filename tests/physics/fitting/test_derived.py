@@ -43,7 +43,7 @@ def test_radius_is_the_law_s_own_and_statistical_errors_are_of_moved_constants(k
         derived.radius(known, 0.5, 1.5)
     with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
         derived.reflectance(known, 0.5)
-    assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
+    assert AtAlbedo.of(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
     # Central differences, a constant at a time.
     theta, alpha, r = known.law.vector(FREE), 0.8, np.array([0.1, 1.0, 4.0])
     slopes = {"radius": [], "profile": []}

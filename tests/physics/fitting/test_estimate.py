@@ -119,7 +119,6 @@ def test_a_linear_fit_is_linear_algebra_of_the_albedos_that_count(line):
     np.testing.assert_allclose(one.variance, misfit @ misfit / 10, rtol=1e-8)
     np.testing.assert_allclose(one.misfit, one.variance * np.linalg.inv(design.T @ design), rtol=1e-7)
     assert one.result == "converged"
-    alpha, reflectance, design = line
     counted = np.arange(12) % 3 > 0
     spoilt = np.where(counted, reflectance, 0.9)
     one = fit(line_profiles(spoilt, alpha), Line(Setting()), "reflectance", counted=counted)

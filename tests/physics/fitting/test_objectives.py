@@ -204,7 +204,6 @@ def test_relative_is_a_mean_square_error_and_resists_a_fall_next_to_white(burley
             return burley.unscaled_energy(x, 0.9 + 0 * alpha) * (1 + jnp.sqrt(1 - alpha))
 
     limits = np.array([0.0, 0.0, 7.0])
-    n = EDGES.size - 1
     rows = np.hstack(objectives.relative(Falling(), of_law(burley, limits=limits)))[:, 2 * n + 1 :]
     np.testing.assert_allclose(rows, 7 * (1 + objectives.LEAST_FALL) / np.sqrt(ALPHAS.size), rtol=1e-4)
     rises = np.hstack(objectives.relative(burley, of_law(burley, limits=limits)))[:, 2 * n + 1 :]

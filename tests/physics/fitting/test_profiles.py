@@ -94,16 +94,13 @@ def test_merged_rings_hold_the_same_energy_and_covariance(white_run, photons):
 def test_sandwich_and_draws_have_the_dense_closed_form(sidak):
     """(delta_ij sum_n (ab)^n H_in / N - E_i(a) E_j(b)) / (N - 1), every pair of rings and albedos written out."""
     one, dense = dense_covariance()
-    factor, energy, photons = one.factor, one.energy, one.photons
     gain = np.random.default_rng(11).standard_normal((4, 2, 3))
     expected = np.einsum("pai,aibj,qbj->pq", gain, dense, gain)
-    found = Covariance(factor, energy, photons, 0.0).sandwich(gain)
-    np.testing.assert_allclose(found, expected, rtol=1e-10)
+    np.testing.assert_allclose(one.sandwich(gain), expected, rtol=1e-10)
     # Negative control: without what is between rings it is another matrix.
-    within = np.einsum("pai,iak,ibk,qbi->pq", gain, factor, factor, gain)
+    within = np.einsum("pai,iak,ibk,qbi->pq", gain, one.factor, one.factor, gain)
     assert np.max(np.abs(within - expected)) > 1e-2 * np.max(np.abs(expected))
     # Ten thousand draws against the closed form, pair by pair (Wishart).
-    one, dense = dense_covariance()
     number, closed = 10_000, dense.reshape(6, 6)
     drawn = drawn_noise(one, number, seed=3).reshape(number, 6)
     error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))

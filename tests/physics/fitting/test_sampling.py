@@ -104,7 +104,6 @@ def test_light_beyond_an_edge_and_variance_are_plain_integrals(which, burley):
     assert edge_light(target, ALPHA, 0.7) == pytest.approx(light, abs=1e-7)  # a root at the edge
     assert edge_light(target, ALPHA, 1e-9) == pytest.approx(0.5, abs=1e-6)
     # int f^2 / pdf dr - 1, by another quadrature in another variable.
-    target = ExactTarget() if which == "exact" else LawTarget(burley)
     sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
     square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
     found = sampler_quality(sampler, ALPHA, target)

@@ -151,9 +151,7 @@ def test_the_sampler_draws_its_own_density(law):
 
 
 @pytest.mark.slow
-def test_it_scales_has_derivatives_and_holds_in_single_precision(matched):
-    np.testing.assert_allclose(matched.profile(R, 0.8, 2.5), matched.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-10)
-    np.testing.assert_allclose(matched.cdf(R, 0.8, 2.5), matched.cdf(R / 2.5, 0.8), rtol=1e-10)
+def test_it_has_derivatives_and_holds_in_single_precision(matched):
     assert matched.sampler.pdf(0.0, 0.5) == pytest.approx(0.25 / matched.albedo.reflectance(0.5), rel=1e-3)
     with jax.enable_x64(True):
         by_alpha = jax.vmap(jax.grad(lambda a: matched.profile(0.5, a)))(jnp.linspace(0.01, 0.99, 9))
@@ -327,9 +325,7 @@ def test_similarity_is_told_from_it_and_lengths_are_the_medium_s():
     np.testing.assert_allclose(law.albedo.alpha(law.albedo.reflectance(FEW)), FEW, rtol=1e-9)
     assert (own.text_constants(), own.text_numbers()) == (law.text_constants(), law.text_numbers())
     energy = np.trapezoid(2 * np.pi * WIDE**2 * law.profile(WIDE, 0.9), np.log(WIDE))
-    assert energy == pytest.approx(
-        law.albedo.reflectance(0.9), rel=0.05
-    )  # coarse, but no factor 1 - alpha g of an mfp is lost
+    assert energy == pytest.approx(law.albedo.reflectance(0.9), rel=0.05)  # coarse, but 1 - alpha g would be seen
     # A fit takes such a step back: one that stayed ended at 17 times the least cost, and was called converged.
     law = replace(load("hazard", setting=Setting(n=1.4, g=0.05)), once_h0=9.6, once_hg=-10.4)
     assert float(law.coefficients().once_h) < 0

@@ -1,6 +1,6 @@
 """Commands as processes of their own, a thousand of them in minutes: one process imports what they need, and forks.
 
-Run as a program, it reads requests from stdin, a JSON list [module, arguments, folder, seconds] a line, and answers
+Run as a program, it reads requests from stdin, a JSON list [module, arguments, folder] a line, and answers
 each with a line [status, stdout, stderr] when the process has ended; a status below 0 is the signal that ended it.
 """
 
@@ -13,7 +13,7 @@ import runpy
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ IMPORTED = (
     *("profilefit.report.tables.fit_tables", "profilefit.report.figures.fit_figures"),
 )
 STREAMS = ("stdout", "stderr")
+SECONDS = 200  # of processor time, at most
 
 
 class Ended(NamedTuple):
@@ -34,38 +35,28 @@ class Ended(NamedTuple):
     stderr: str
 
 
-class Commands:
-    """Runs commands as `python -m module arguments` would."""
-
-    def __init__(self, program: subprocess.Popen[str]) -> None:
-        self._program = program
-
-    def run(self, module: str, arguments: Sequence[str], folder: Path, seconds: float = 200.0) -> Ended:
-        """Run one in `folder` and wait; one that takes longer than `seconds` of processor time is ended by SIGXCPU."""
-        assert self._program.stdin is not None
-        assert self._program.stdout is not None
-        print(json.dumps([module, list(arguments), str(folder), seconds]), file=self._program.stdin, flush=True)
-        return Ended(*json.loads(self._program.stdout.readline()))
-
-
 @contextlib.contextmanager
-def commands(folder: Path) -> Iterator[Commands]:
-    """A program that runs them, until the end; its streams go into `folder`."""
+def commands(folder: Path) -> Iterator[Callable[[str, Sequence[str], Path], Ended]]:
+    """A program that runs them, until the end, as `python -m module arguments` would; its streams go into `folder`."""
     line = [sys.executable, str(Path(__file__).resolve()), str(folder)]
     with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as program:
+
+        def run(module: str, arguments: Sequence[str], where: Path) -> Ended:
+            print(json.dumps([module, list(arguments), str(where)]), file=program.stdin, flush=True)
+            return Ended(*json.loads(program.stdout.readline()))
+
         try:
-            yield Commands(program)
+            yield run
         finally:
-            assert program.stdin is not None
             program.stdin.close()
 
 
-def _become(module: str, arguments: list[str], folder: str, seconds: float, streams: list[Path]) -> None:
+def _become(module: str, arguments: list[str], folder: str, streams: list[Path]) -> None:
     """In the child: another folder, other streams, a bound on time, then the command."""
     import resource  # not where there is no fork
 
     os.chdir(folder)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
     for stream, path in enumerate(streams, start=1):
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -80,10 +71,10 @@ def _serve(folder: Path) -> None:
     for name in IMPORTED:
         __import__(name)
     for line in sys.stdin:
-        module, arguments, where, seconds = json.loads(line)
+        module, arguments, where = json.loads(line)
         child = os.fork()
         if child == 0:
-            _become(module, arguments, where, seconds, streams)
+            _become(module, arguments, where, streams)
             sys.exit(0)
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         told = [path.read_text(encoding="utf-8", errors="surrogateescape") for path in streams]

@@ -189,21 +189,6 @@ def require_none(faults: list[str]) -> None:
     assert not faults, f"{len(faults)} failures:\n" + "\n".join(faults[:SHOWN])
 
 
-def reading_faults(kind: str, seeds: range, folder: Path) -> tuple[list[str], list[int]]:
-    """What went wrong in reading files of a kind, and the seeds of those that all its readers accepted."""
-    ending, mutant, readers = KINDS[kind]
-    path, faults, accepted = folder / f"one{ending}", list[str](), list[int]()
-    for seed in seeds:
-        path.write_bytes(mutant(seed))
-        taken = 0
-        for read in readers:
-            with bounded(faults, f"{kind} {seed}"):
-                read(path)
-                taken += 1
-        accepted += [seed] if taken == len(readers) else []
-    return faults, accepted
-
-
 # Tokens as GLSL and HLSL see them, once lines are joined and comments gone.
 TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d(?:[eE][+-]|[\w.])*|[^\w\s]")
 LITERAL = re.compile(r"\.?\d.*")
@@ -404,9 +389,18 @@ def copied(seed: int, folder: Path) -> str | None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("count", [QUICK, *slow(ALL)], ids=["quick", "many"])
 def test_reading_refuses_or_takes_data(count, kind, elsewhere):
-    faults, accepted = reading_faults(kind, range(count), elsewhere)
+    ending, mutant, readers = KINDS[kind]
+    path, faults, accepted = elsewhere / f"one{ending}", list[str](), 0
+    for seed in range(count):
+        path.write_bytes(mutant(seed))
+        taken = 0
+        for read in readers:
+            with bounded(faults, f"{kind} {seed}"):
+                read(path)
+                taken += 1
+        accepted += taken == len(readers)
     require_none(faults)
-    assert count / 40 < len(accepted) < count  # neither all nor none, or nothing was tried
+    assert count / 40 < accepted < count  # neither all nor none, or nothing was tried
 
 
 @pytest.mark.slow
@@ -472,27 +466,20 @@ BESIDE = 2
 ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning", "site-packages")
 
 
-def process_faults(kind: str, count: int, folder: Path) -> list[str]:
-    """Run a command on so many mutated files, each in a folder of its own, a few side by side."""
-    seeds = list(_seeds(kind, count, folder))
-    with ThreadPoolExecutor(BESIDE) as pool:
-        found = pool.map(lambda part: _faults_of(kind, seeds[part::BESIDE], folder / f"part{part}"), range(BESIDE))
-        return [fault for faults in found for fault in faults]
-
-
 def _faults_of(kind: str, seeds: Sequence[int], folder: Path) -> list[str]:
+    """Run a command on mutated files, each in a folder of its own."""
     module, arguments, _ = AS_PROCESSES[kind]
     ending, mutant, _ = KINDS["record" if kind in ("export", "report") else kind]
     faults: list[str] = []
     folder.mkdir()
-    with processes.commands(folder) as program:
+    with processes.commands(folder) as run:
         for seed in seeds:
             here = folder / str(seed)
             here.mkdir()
             name = mutations.record(seed)[0] if ending == ".json" else "one"
             (here / f"{name}{ending}").write_bytes(mutant(seed))
             told = [{"NAME": name, "FILE": f"{name}{ending}"}.get(word, word) for word in arguments]
-            ended = program.run(module, told, here)
+            ended = run(module, told, here)
             faults += [f"{kind} {seed}: {text}" for text in _ended_wrong(ended, here, f"{name}{ending}")]
             shutil.rmtree(here)
     return faults
@@ -541,4 +528,8 @@ def _ended_wrong(ended: processes.Ended, folder: Path, given: str) -> Iterator[s
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", AS_PROCESSES)
 def test_as_processes(kind, elsewhere):
-    require_none(process_faults(kind, PROCESSES, elsewhere))
+    """A few side by side."""
+    seeds = list(_seeds(kind, PROCESSES, elsewhere))
+    with ThreadPoolExecutor(BESIDE) as pool:
+        found = pool.map(lambda part: _faults_of(kind, seeds[part::BESIDE], elsewhere / f"part{part}"), range(BESIDE))
+        require_none([fault for faults in found for fault in faults])

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -15,6 +16,8 @@ from profilefit.scenes.sea.source import blur_text, segment_text
 from profilefit.shader import emit
 from profilefit.shader.context import program
 from profilefit.shader.phase_text import phase_text
+from tests.fixtures import slow
+from tests.unit.shader import test_stack_text as stacks
 from tests.unit.shader.test_other_texts import BLURS, SEA, C
 
 FITS = catalogue.fits_folder()
@@ -35,7 +38,16 @@ OTHERS = {
     ),
     "phase": (lambda lang: phase_text(SEA, lang), "phase_pdf(u.x) + phase_sample(u.y)"),
 }
-ALL_TEXTS = (*LAWS, *OTHERS)
+STACK = " + ".join(
+    [
+        *(f"{{name}}_{one}(u.x, u.y, u.z)" for one in ("profile", "cdf", "sample", "pdf")),
+        *(f"{{name}}_{one}(u.x, {{name}}_shape(u.y, u.z))" for one in ("density", "cumulated", "radius_density")),
+        "{name}_radius(u.x, {name}_shape(u.y, u.z)) + {name}_reflectance({name}_shape(u.y, u.z))",
+        "{name}_total(u.y, u.z) + {name}_once_radiance(u.y, u.z, u.x, u.z, u.y)",
+    ]
+)
+NO_LAWS = OTHERS | {label: (partial(stacks.whole, label), STACK.format(name="stack")) for label in stacks.LAWS}
+every = pytest.mark.parametrize("name", [*LAWS, *OTHERS, *stacks.LABELS])
 HEADS = {"glsl": "#version 330\n", "glsl-es": "#version 300 es\nprecision highp float;\n"}
 VERTEX = "void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
 MAIN = "uniform vec3 u;\nout vec4 made;\nvoid main() {{ made = vec4({calls}); }}\n"
@@ -44,16 +56,16 @@ HLSL_COMPILER = "glslangValidator"  # Debian's glslang-tools
 
 
 def text(name, lang="glsl"):
-    if name in OTHERS:
-        return OTHERS[name][0](lang)
+    if name in NO_LAWS:
+        return NO_LAWS[name][0](lang)
     law = LAWS[name]
     return emit.map_text(law, lang) if isinstance(law, AlbedoLaw) else emit.law_text(law, lang)
 
 
 def calls(name):
     """Every function that the contract of the texts names."""
-    if name in OTHERS:
-        return OTHERS[name][1]
+    if name in NO_LAWS:
+        return NO_LAWS[name][1]
     if isinstance(LAWS[name], AlbedoLaw):
         return f"{name}_alpha(u.x) + {name}_map_reflectance(u.y)"
     lengths = [f"{name}_{one}(u.x, u.y, u.z)" for one in ("profile", "cdf", "sample", "pdf")]
@@ -63,7 +75,7 @@ def calls(name):
 
 
 @pytest.mark.parametrize("head", HEADS)
-@pytest.mark.parametrize("name", ALL_TEXTS)
+@every
 def test_glsl(context, name, head):
     fragment = HEADS[head] + 2 * text(name) + MAIN.format(calls=calls(name))
     program(context, name, fragment, HEADS[head] + VERTEX).release()
@@ -79,21 +91,28 @@ def test_glsl_takes_two_laws_and_each_twice_but_no_prefix_for_two(context, head)
         program(context, "mixed", HEADS[head] + other + both, vertex)
 
 
-def require_hlsl(folder, source, calls):
+@pytest.mark.parametrize("head", ["glsl", *slow("glsl-es")])
+def test_glsl_takes_two_stacks_and_each_twice_but_no_prefix_for_two(context, head):
+    vertex, two, three = HEADS[head] + VERTEX, "two layers", "three layers"
+    texts = stacks.whole(two, name="heart") + text("hazard") + stacks.whole(three, name="skin")
+    main = MAIN.format(calls=" + ".join([STACK.format(name="heart"), STACK.format(name="skin"), calls("hazard")]))
+    program(context, "twice", HEADS[head] + 2 * texts + main, vertex).release()
+    mixed = "".join(stacks.stack_text(stacks.LAWS[label]) for label in (two, three))
+    with pytest.raises(ShaderError, match=r"shader 'mixed' does not compile, .*stack is included already"):
+        program(context, "mixed", HEADS[head] + mixed + MAIN.format(calls="0.0"), vertex)
+
+
+@every
+def test_hlsl(tmp_path, name):
     """The text compiles, and all that is called; skipped where there is no compiler."""
     compiler = shutil.which(HLSL_COMPILER)
     if compiler is None:
         pytest.skip(f"{HLSL_COMPILER} is missing, which compiles HLSL; on Debian apt-get install glslang-tools")
-    file = folder / "made.hlsl"
-    file.write_text(source + HLSL_MAIN.format(calls=calls), encoding="utf-8")
-    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(folder / "made.spv"), str(file)]
+    file = tmp_path / "made.hlsl"
+    file.write_text(2 * text(name, "hlsl") + HLSL_MAIN.format(calls=calls(name)), encoding="utf-8")
+    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(tmp_path / "made.spv"), str(file)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout
-
-
-@pytest.mark.parametrize("name", ALL_TEXTS)
-def test_hlsl(tmp_path, name):
-    require_hlsl(tmp_path, 2 * text(name, "hlsl"), calls(name))
 
 
 @pytest.mark.parametrize("name", ["hazard", *OTHERS])

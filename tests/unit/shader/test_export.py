@@ -230,10 +230,3 @@ NO_FILES = {
 def test_what_no_file_can_be_is_refused_by_name(exporter, given):
     with pytest.raises(InputError, match=NO_FILES[given]):
         EXPORTERS.get(exporter, partial(export, HAZARD, FITS))(*given)
-
-
-def test_what_cannot_be_exported_is_named():
-    with pytest.raises(InputError, match=r"map or record, got 'hazzard'; did you mean hazard"):
-        find("hazzard", FITS)
-    with pytest.raises(InputError, match=r"record 'reproduction' holds no law of a fit that converged"):
-        find("reproduction", FITS)

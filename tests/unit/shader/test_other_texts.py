@@ -21,7 +21,8 @@ from profilefit.scenes.sea.source import blur_text, export_blur, segment_text
 from profilefit.scenes.sea.source import source as sea_source
 from profilefit.shader.check.shader_law import _Pass
 from profilefit.shader.law_file import LANGUAGES
-from profilefit.shader.phase_text import export_phase, phase_text
+from profilefit.shader.phase_text import phase_text
+from profilefit.shader.phase_text import source as phase_source
 from profilefit.studies.stability.cells import RoundedText
 
 DRAW = """#version 330
@@ -320,7 +321,7 @@ def test_degenerate_rays_on_opengl(context, r):
 
 
 EXPORTERS = {
-    "phase": partial(export_phase, RECORD),
+    "phase": partial(phase_source, RECORD),
     "segment": partial(sea_source, "sea-segment"),
     "blur": partial(export_blur, BLURS, C, DEPTH),
     "fur": partial(fur_source, "fur"),

@@ -1,4 +1,4 @@
-"""The text of a stack is its three laws: in float64 line by line, in float32 by OpenGL; and it compiles everywhere."""
+"""The text of a stack is its three laws: in float64 line by line, and in float32 by OpenGL."""
 
 import re
 from dataclasses import replace
@@ -9,16 +9,13 @@ import pytest
 
 import profilefit
 from mcml_sim import Layer, Medium, Setting
-from profilefit.errors import InputError, ShaderError
+from profilefit.errors import InputError
 from profilefit.laws.gaussians import MediumGaussians
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.shader_law import PROFILE, _Pass
-from profilefit.shader.context import program
-from profilefit.shader.emit import law_text
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 from tests.fixtures import slow
-from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 from tests.unit.shader.test_other_texts import functions, on_opengl
 
 NAMES = StackLaw.constant_names()
@@ -76,7 +73,8 @@ LAWS = {
 # Relative, of float32's R_d: ten operations' rounding; in skin's blue light the terms are up to ten times their sum.
 ROUNDING = {**dict.fromkeys(LAWS, 1.2e-5), "three layers": 2e-5}
 QUICK = ("two layers",)
-every = pytest.mark.parametrize("label", [*QUICK, *slow(*(one for one in LAWS if one not in QUICK))])
+LABELS = [*QUICK, *slow(*(one for one in LAWS if one not in QUICK))]
+every = pytest.mark.parametrize("label", LABELS)
 
 
 def twin_of(laws):
@@ -200,44 +198,10 @@ def test_every_number_stands_in_the_text_once_by_its_name():
     assert not re.search(r"//%|@|LAW_", text)
 
 
-ALL = " + ".join(
-    [
-        *(f"{{name}}_{one}(u.x, u.y, u.z)" for one in ("profile", "cdf", "sample", "pdf")),
-        *(f"{{name}}_{one}(u.x, {{name}}_shape(u.y, u.z))" for one in ("density", "cumulated", "radius_density")),
-        "{name}_radius(u.x, {name}_shape(u.y, u.z)) + {name}_reflectance({name}_shape(u.y, u.z))",
-        "{name}_total(u.y, u.z) + {name}_once_radiance(u.y, u.z, u.x, u.z, u.y)",
-    ]
-)
-
-
 def whole(label, lang="glsl", name="stack"):
     """Both texts of a stack."""
     count = 3 if label.startswith("three") else 2
     return stack_text(LAWS[label], lang, name) + single_text(media(count), lang, f"{name}_once")
-
-
-@pytest.mark.parametrize("head", HEADS)
-@every
-def test_glsl(context, label, head):
-    fragment = HEADS[head] + whole(label) + MAIN.format(calls=ALL.format(name="stack"))
-    program(context, label, fragment, HEADS[head] + VERTEX).release()
-
-
-@pytest.mark.parametrize("head", ["glsl", *slow("glsl-es")])
-def test_glsl_takes_two_stacks_and_each_twice_but_no_prefix_for_two(context, head):
-    vertex = HEADS[head] + VERTEX
-    heart, skin = whole("two layers", name="heart"), whole("three layers", name="skin")
-    hazard = law_text(profilefit.load("hazard"))
-    main = MAIN.format(calls=f"{ALL.format(name='heart')} + {ALL.format(name='skin')} + hazard_profile(u.x, u.y, u.z)")
-    program(context, "twice", HEADS[head] + heart + hazard + skin + heart + skin + main, vertex).release()
-    mixed = HEADS[head] + stack_text(LAWS["two layers"]) + stack_text(LAWS["three layers"]) + MAIN.format(calls="0.0")
-    with pytest.raises(ShaderError, match=r"shader 'mixed' does not compile, .*stack is included already"):
-        program(context, "mixed", mixed, vertex)
-
-
-@every
-def test_hlsl(tmp_path, label):
-    require_hlsl(tmp_path, 2 * whole(label, "hlsl"), ALL.format(name="stack"))
 
 
 # mu_a and mu_s (1 - g) [1/mm] of skin's layers in red, green and blue, and thickness [mm].

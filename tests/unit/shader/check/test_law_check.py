@@ -149,7 +149,7 @@ def test_names_choose_laws_and_maps():
         chosen([], "nothing", FITS)
     with pytest.raises(InputError, match="name the record itself"):
         chosen(["liang"], "liang.json", FITS)
-    with pytest.raises(RecordError, match="holds no law"):
+    with pytest.raises(RecordError, match="record 'reproduction' holds no law of a fit that converged"):
         chosen(["reproduction"], "regenerated", FITS)
 
 
