@@ -65,6 +65,11 @@ def measured_sets(content: Content) -> list[str]:
     return [name for name in SETS if name in content["quality"]]
 
 
+def judged_sets(content: Content) -> list[str]:
+    """Return those of `measured_sets` that are laws: regenerated constants of a failed fit are none."""
+    return [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
+
+
 def measures(content: Content, measure: str) -> bool:
     """Return whether a record knows this measure of its regenerated constants."""
     return measure in (content.get("quality") or {}).get("regenerated", {})
@@ -88,9 +93,10 @@ def by_index(content: Content) -> Mapping[str, list[float]]:
     return worst
 
 
-def regenerated_worst(content: Content, measure: str) -> float:
-    """Return the worst over alpha of the regenerated constants, and over n and g where a record spans them."""
-    values = [content["quality"]["regenerated"][measure], by_index(content).get(measure, [])]
+def worst(content: Content, which: str, measure: str) -> float:
+    """Return the worst over alpha of a set of constants, of regenerated ones over n and g where a record spans them."""
+    spanned = by_index(content).get(measure, []) if which == "regenerated" else []
+    values = [content["quality"][which][measure], spanned]
     return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 
 

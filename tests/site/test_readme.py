@@ -9,9 +9,9 @@ from benchmarks.claims import RUNS
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import record
 from profilefit.recipes.catalogue import profile_laws
-from profilefit.report import fill, sections
 from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.law_tables import ALBEDOS, markdown_laws, markdown_sections
+from profilefit.report.tables.markdown import fill, sections
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import methodcaller
@@ -38,7 +38,7 @@ from profilefit.report.figures import canvas as pen
 from profilefit.report.figures import paper_figures as paper
 from profilefit.report.figures.canvas import albedo_axis, canvas, legend_below, plain_log, save, styled
 from profilefit.report.kinds import published
-from profilefit.report.records import SETS, Content, Fitted, Source, converged, measures
+from profilefit.report.records import Content, Fitted, Source, converged, judged_sets, measures
 from profilefit.report.tables.cells import significant
 
 
@@ -227,17 +227,6 @@ COLOURS, MARKERS = (pen.BLUE, pen.VERMILION, pen.GREEN, pen.ORANGE, pen.PURPLE, 
 ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, of what is above [inch]
 
 
-@dataclass(frozen=True)
-class Line:
-    """One set of constants: its label, where it was measured, the measures by name; whether it has a g."""
-
-    label: str
-    alpha: list[float]
-    values: Content
-    printed: bool
-    forward: bool
-
-
 @styled
 def quality_figure(source: Source, out: Path, name: str = "quality", names: Iterable[str] | None = None) -> list[Path]:
     """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
@@ -250,14 +239,14 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
     for owner, content in contents.items():
         light, n, g = (content["setting"][key] for key in ("illumination", "n", "g"))
         groups[light if (n, g) == (1, 0) else "refracting"].append((owner, content))
-    shown = {kind: list(_lines(group)) for kind, group in groups.items() if group}
+    shown = {kind: _sets(group) for kind, group in groups.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
-    for row, (kind, lines) in zip(grid, shown.items(), strict=True):
+    for row, (kind, sets) in zip(grid, shown.items(), strict=True):
         for ax, one in zip(row, SHOWN, strict=True):
-            _panel(ax, one.name, lines)
+            _panel(ax, one.name, sets)
         row[0].set_ylabel(KINDS[kind])
-        if lines:  # none where every fit failed
+        if sets:  # none where every fit failed
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
     for ax, one in zip(grid[0], SHOWN, strict=True):
         ax.set_title(f"{one.formula} [{one.unit}]".replace("R_d", "R$_d$"))
@@ -266,37 +255,34 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
     return save(figure, out, name)
 
 
-def _panel(ax: Axes, key: str, lines: list[Line]) -> None:
-    for place, line in enumerate(lines):
+def _panel(ax: Axes, key: str, sets: Mapping[str, tuple[Content, str]]) -> None:
+    for place, (label, (content, which)) in enumerate(sets.items()):
         look: dict[str, Any] = {
             "color": COLOURS[place % len(COLOURS)],
             "marker": MARKERS[place % len(MARKERS)],
-            "linestyle": "--" if line.printed else "-",
+            "linestyle": "-" if which == "regenerated" else "--",
         }
-        ax.plot(line.alpha, line.values[key], label=line.label, markersize=3.0, **look)
+        quality = content["quality"]
+        ax.plot(quality["alpha"], quality[which][key], label=label, markersize=3.0, **look)
     albedo_axis(ax)
-    if any(line.forward for line in lines):
+    if any(content["setting"]["g"] for content, _ in sets.values()):
         ax.set_xlabel("single-scattering albedo α [-], reduced if g ≠ 0")
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)
 
 
-def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
-    """Yield each set once: printed constants are the same in every record of their law."""
-    drawn: set[str] = set()
+def _sets(contents: Iterable[tuple[str, Content]]) -> dict[str, tuple[Content, str]]:
+    """Return each set once, by its label: printed constants are the same in every record of their law."""
+    sets: dict[str, tuple[Content, str]] = {}
     for name, content in contents:
-        quality = content["quality"]
-        for which in (one for one in SETS if one in quality):
-            regenerated = which == "regenerated"
-            g = content["setting"]["g"]
-            label = (name if regenerated else f"{content['law']}, {which}") + (f", g = {g:g}" if g else "")
-            if label not in drawn and (converged(content) or not regenerated):
-                drawn.add(label)
-                yield Line(label, quality["alpha"], quality[which], not regenerated, bool(g))
+        g = content["setting"]["g"]
+        for which in judged_sets(content):
+            label = name if which == "regenerated" else f"{content['law']}, {which}"
+            sets.setdefault(label + (f", g = {g:g}" if g else ""), (content, which))
+    return sets
 
 
-MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon noise"}
 # Probability inside one and two standard deviations of a normal pair of constants: 1 - exp(-k^2 / 2).
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
@@ -306,13 +292,10 @@ LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
 @styled
-def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
-    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
-
-    kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
-    """
+def corner_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values."""
     fitted = source.needed(record_name)
-    samples = fitted.arrays[f"samples_{kind}"].astype(float)
+    samples = fitted.arrays["samples_misfit"].astype(float)
     names, held_back = fitted.content["covariance"]["names"], ""
     if len(names) > MOST:
         correlation = np.abs(np.corrcoef(samples, rowvar=False))
@@ -331,7 +314,7 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
             if value is not None and samples[:, column].min() <= value <= samples[:, column].max():
                 mark(grid, column, value, color=color, linestyle=style)
     _axes(grid, names)
-    title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
+    title = f"{record_name}: spread by the law's misfit taken for noise" + (f";\n{held_back}" if held_back else "")
     _caption(figure, samples, names, constants, title)
     return save(figure, out, name or f"corner-{record_name}")
 

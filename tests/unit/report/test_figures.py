@@ -12,10 +12,9 @@ import pytest
 from profilefit.errors import OutputError, RecordError
 from profilefit.fitting.discrepancy import LawWithErrors
 from profilefit.recipes import catalogue
-from profilefit.report import draw_all
 from profilefit.report.figures import record_figures
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import PAPER, corner_figure, energy_within, plans
+from profilefit.report.figures.record_figures import PAPER, corner_figure, draw_all, energy_within, plans
 from profilefit.report.records import DRAWS, Source, coefficients
 
 pytestmark = pytest.mark.slow
