@@ -46,18 +46,20 @@ from profilefit.report.tables.cells import significant
 class Plan:
     """One figure: its file's name, the records it cannot do without, those it shows if they are there, who draws it.
 
+    draw     returns it, under the settings of matplotlib that `drawn` makes
     missing  why it cannot be drawn although its records are there; empty if it can
     """
 
     name: str
     needs: tuple[str, ...]
     uses: tuple[str, ...]
-    draw: Callable[..., list[Path]]
+    draw: Callable[[Source], Figure]
     missing: str = ""
 
+    @styled
     def drawn(self, source: Source, out: Path) -> list[Path]:
         """Draw the figure into a folder, and return its files."""
-        return self.draw(source, out, name=self.name)
+        return save(self.draw(source), out, self.name)
 
 
 Track = Callable[[list[Plan]], Iterable[Plan]]
@@ -144,8 +146,7 @@ SHADES = "viridis"  # from dark to light with alpha
 HEIGHT = 3.2  # [inch]
 
 
-@styled
-def residual_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+def residual_figure(record_name: str, source: Source) -> Figure:
     """Draw a profile law's energy of a ring over that of the data, less 1 [-], with the data's standard errors.
 
     Of an inverse cdf: exact cdf(r(xi)) - xi [-]. Of a map: alpha or A, whichever was fitted, less that of the data [-].
@@ -174,7 +175,7 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
             ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     ax.axhline(0.0, color=pen.BLACK, linewidth=0.8)
-    return save(figure, out, name or f"residuals-{record_name}")
+    return figure
 
 
 def _of_map(ax: Axes, fitted: Fitted) -> None:
@@ -227,8 +228,7 @@ COLOURS, MARKERS = (pen.BLUE, pen.VERMILION, pen.GREEN, pen.ORANGE, pen.PURPLE, 
 ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, of what is above [inch]
 
 
-@styled
-def quality_figure(source: Source, out: Path, name: str = "quality", names: Iterable[str] | None = None) -> list[Path]:
+def quality_figure(source: Source, names: Iterable[str] | None = None) -> Figure:
     """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
 
     A row of panels for each light, one for all surfaces that refract. `names` are the records, all of them if None.
@@ -252,7 +252,7 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
         ax.set_title(f"{one.formula} [{one.unit}]".replace("R_d", "R$_d$"))
     for ax in grid[:-1].flat:
         ax.set_xlabel("")
-    return save(figure, out, name)
+    return figure
 
 
 def _panel(ax: Axes, key: str, sets: Mapping[str, tuple[Content, str]]) -> None:
@@ -291,8 +291,7 @@ MOST, KEPT = 18, 12  # constants of which a figure shows all: the panels of more
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
-@styled
-def corner_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+def corner_figure(record_name: str, source: Source) -> Figure:
     """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values."""
     fitted = source.needed(record_name)
     samples = fitted.arrays["samples_misfit"].astype(float)
@@ -316,7 +315,7 @@ def corner_figure(record_name: str, source: Source, out: Path, name: str = "") -
     _axes(grid, names)
     title = f"{record_name}: spread by the law's misfit taken for noise" + (f";\n{held_back}" if held_back else "")
     _caption(figure, samples, names, constants, title)
-    return save(figure, out, name or f"corner-{record_name}")
+    return figure
 
 
 def corner_grid(figure: Figure, samples: Floats, bins: int, **more: Any) -> NDArray[Any]:
@@ -403,8 +402,7 @@ def sums_of(folder: Path) -> dict[str, gaussians.SumRecord]:
     return {name: gaussians.load(path) for name, path in record.available(folder / SUMS).items()}
 
 
-@styled
-def sum_figure(source: Source, out: Path, name: str = OF_SUMS) -> list[Path]:
+def sum_figure(source: Source) -> Figure:
     """Draw rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
     sums = sums_of(source.folder)
     columns = min(len(sums), LONGEST)
@@ -419,7 +417,7 @@ def sum_figure(source: Source, out: Path, name: str = OF_SUMS) -> list[Path]:
     for ax in panels[0::columns]:
         ax.set_ylabel("mean relative error of R$_d$ [-]")
     legend_below(figure, panels[: len(sums)])
-    return save(figure, out, name)
+    return figure
 
 
 def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:

@@ -91,14 +91,14 @@ def _drawn(plan: plots.Plan, source: Source) -> str:
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
     title = CAPTIONS.get(plan.name) or CAPTIONS[plan.name.split("-")[0]]
-    return _drawing(plan.name, lambda out: plan.drawn(source, out), title)
+    return _drawing(plan, source, title)
 
 
-def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
-    """Return the figure `name` that `draw` writes into a folder."""
+def _drawing(plan: plots.Plan, source: Source, title: str) -> str:
+    """Return the figure of a plan, all of whose records are there."""
     with tempfile.TemporaryDirectory() as folder, only("svg"):
-        (file,) = draw(Path(folder))
-        return figure(inline(file.read_text(encoding="utf-8"), name, title), title)
+        (file,) = plan.drawn(source, Path(folder))
+        return figure(inline(file.read_text(encoding="utf-8"), plan.name, title), title)
 
 
 def whole_figure(source: Source, name: str) -> str:
@@ -237,7 +237,7 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
         return
     yield markup(table)
     if sums := plots.sums_of(source.folder):
-        yield _drawing(plots.OF_SUMS, lambda out: plots.sum_figure(source, out), plots.sum_caption(sums))
+        yield _drawing(plots.Plan(plots.OF_SUMS, (), (), plots.sum_figure), source, plots.sum_caption(sums))
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     yield from _pictures(evidence, OF_LAYERS)

@@ -5,6 +5,7 @@ import pytest
 
 from profilefit.report.figures import paper_figures as figures
 from profilefit.report.figures.canvas import canvas
+from profilefit.report.figures.record_figures import PAPER
 from profilefit.report.records import Source
 from tests.unit.report.test_figures import folder_with
 
@@ -38,5 +39,6 @@ def test_caption_says_where_the_printed_inverse_is_worst_and_lines_are_the_recor
 
 
 def test_it_is_drawn_without_the_records_that_it_only_uses(source, tmp_path):
-    files = figures.inversion_figure(source, tmp_path)
+    (plan,) = (plan for plan in PAPER if plan.name == "inversion-error")
+    files = plan.drawn(source, tmp_path)
     assert {file.name for file in files} == {"inversion-error.png", "inversion-error.svg"}

@@ -15,7 +15,7 @@ from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.kinds.stack import interfaces, read
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
-from profilefit.report.figures.record_figures import sum_caption, sum_figure, sums_of
+from profilefit.report.figures.record_figures import OF_SUMS, plans, sum_caption, sums_of
 from profilefit.report.kinds import TABLES, published, stack_tables, sum_tables
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source
@@ -171,12 +171,14 @@ def test_the_caption_has_the_numbers_of_the_records():
 
 @pytest.mark.slow
 def test_the_figure_is_whole(tmp_path):
-    files = sum_figure(Source(fits_folder()), tmp_path)
+    source = Source(fits_folder())
+    (plan,) = (plan for plan in plans(source) if plan.name == OF_SUMS)
+    files = plan.drawn(source, tmp_path)
     assert [file.name for file in files] == ["gaussians-of-stacks.png", "gaussians-of-stacks.svg"]
     require_whole(files)
     svg = files[1].read_text(encoding="utf-8")
     assert all(f">{name}</text>" in svg for name in FOUND)
-    again = sum_figure(Source(fits_folder()), tmp_path / "again")
+    again = plan.drawn(source, tmp_path / "again")
     assert again[1].read_bytes() == files[1].read_bytes()
 
 
