@@ -152,8 +152,9 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
         )
     yield from _goodness(result)
     for one in fit.rivals:  # other media that explain the data as well
+        told = _words(rival_values(fit, one), RIVALLED, fit.data.unit)
         yield (
-            f"ANOTHER MEDIUM FITS AS WELL: {_words(rival_values(fit, one), RIVALLED, fit.data.unit)}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
+            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
             "both: measure nearer to the beam, or the total reflectance, or the scale"
         )
     yield from _beam(result)
