@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from operator import methodcaller
 from pathlib import Path
 from textwrap import fill
@@ -422,31 +423,34 @@ def sum_figure(source: Source) -> Figure:
 
 def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
     """Return what the figure shows, and what six Gaussians cost by these records."""
-    of_six = {
-        (key, stack, light, channel): value
-        for stack, one in sums.items()
-        for light in ILLUMINATIONS
-        for key in ("rel", "alone")
-        for channel, value in zip(CHANNELS, one.content["sums"][light]["by_count"][DEFAULT - 1][key], strict=True)
-    }
-    rel, alone = ({place[1:]: v for place, v in of_six.items() if place[0] == key} for key in ("rel", "alone"))
+    rel: dict[tuple[str, str, str], float] = {}
+    alone = 0.0
+    for (stack, one), light in product(sums.items(), ILLUMINATIONS):
+        six = _of_six(one, light)
+        rel |= {(stack, light, channel): value for channel, value in zip(CHANNELS, six["rel"], strict=True)}
+        alone = max(alone, *six["alone"])
     worst = max(rel, key=rel.__getitem__)
     text = (
         "Sums of Gaussians of one set of variances in all colours: mean relative error of R_d, in rings even in ln r "
         "from 0.01 mean free paths to 99.5 % of the light. "
         f"Six are off by {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
-        f"{worst[2]}, {worst[1]}), by at most {_percent(max(alone.values()))} where each colour has its own variances."
+        f"{worst[2]}, {worst[1]}), by at most {_percent(alone)} where each colour has its own variances."
     )
     for one in sums.values():
-        if others := published(one).get(one.content["setting"]["illumination"]):
-            own = one.content["sums"][one.content["setting"]["illumination"]]["by_count"][DEFAULT - 1]
+        light = one.content["setting"]["illumination"]
+        if others := published(one).get(light):
             off = ", ".join(_percent(each["rel"]) for each in others)
             text += (
                 f" The six that d'Eon and Luebke published for a skin (GPU Gems 3, ch. 14) are off this one's light by "
                 f"{off} in red, green and blue; their cdf by at most {max(each['ks'] for each in others):.2g}, that of "
-                f"the six here by {max(own['ks']):.2g}."
+                f"the six here by {max(_of_six(one, light)['ks']):.2g}."
             )
     return text
+
+
+def _of_six(sums: gaussians.SumRecord, light: str) -> Content:
+    content: Content = sums.content["sums"][light]["by_count"][DEFAULT - 1]
+    return content
 
 
 def _percent(share: float) -> str:

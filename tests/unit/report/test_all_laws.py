@@ -109,8 +109,8 @@ def test_of_two_xi_that_draw_one_radius_the_one_meant_counts():
 
 def test_markdown_has_a_line_a_law(folder):
     laws = profile_laws(folder, ["burley-whole"])
-    [quality] = tables.for_each(lambda one: profile_quality(one.law, ALPHA), laws)
-    [[cells]] = parsed(tables.markdown_laws([(laws[0], quality)]))
+    [(law, quality)] = tables.for_each(lambda one: profile_quality(one.law, ALPHA), laws)
+    [[cells]] = parsed(tables.markdown_laws([(law, quality)]))
     home = tuple(cells[key] for key in ("law", "constants", "light", "n", "number"))
     assert home == ("burley", "burley-whole", "searchlight", "1", "4")
     assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)
