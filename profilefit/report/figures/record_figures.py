@@ -426,7 +426,7 @@ def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
     rel: dict[tuple[str, str, str], float] = {}
     alone = 0.0
     for (stack, one), light in product(sums.items(), ILLUMINATIONS):
-        six = _of_six(one, light)
+        six = one.content["sums"][light]["by_count"][DEFAULT - 1]
         rel |= {(stack, light, channel): value for channel, value in zip(CHANNELS, six["rel"], strict=True)}
         alone = max(alone, *six["alone"])
     worst = max(rel, key=rel.__getitem__)
@@ -439,18 +439,13 @@ def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
     for one in sums.values():
         light = one.content["setting"]["illumination"]
         if others := published(one).get(light):
-            off = ", ".join(_percent(each["rel"]) for each in others)
+            off, own = ", ".join(_percent(each["rel"]) for each in others), one.content["sums"][light]["by_count"]
             text += (
                 f" The six that d'Eon and Luebke published for a skin (GPU Gems 3, ch. 14) are off this one's light by "
                 f"{off} in red, green and blue; their cdf by at most {max(each['ks'] for each in others):.2g}, that of "
-                f"the six here by {max(_of_six(one, light)['ks']):.2g}."
+                f"the six here by {max(own[DEFAULT - 1]['ks']):.2g}."
             )
     return text
-
-
-def _of_six(sums: gaussians.SumRecord, light: str) -> Content:
-    content: Content = sums.content["sums"][light]["by_count"][DEFAULT - 1]
-    return content
 
 
 def _percent(share: float) -> str:
