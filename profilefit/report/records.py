@@ -17,7 +17,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
-from profilefit.laws.base import Constants, ProfileLaw
+from profilefit.laws.base import Constants
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
@@ -109,16 +109,12 @@ LEVEL = 0.95
 class Fitted:
     """One record with the law that its constants make.
 
-    content, arrays  of the record; law the regenerated one; converged whether its fit says so
+    content, arrays  of the record; law the regenerated one
     """
 
     content: dict[str, Any]
     arrays: dict[str, Floats]
     law: Any
-
-    @property
-    def converged(self) -> bool:
-        return converged(self.content)
 
     def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "misfit") -> tuple[Floats, Floats] | None:
         """Return the 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
@@ -126,7 +122,7 @@ class Fitted:
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
         """
         samples, names = self.arrays.get(f"samples_{kind}"), self.content.get("covariance", {}).get("names")
-        if samples is None or names is None or not self.converged:
+        if samples is None or names is None or not converged(self.content):
             return None
         some = samples[np.linspace(0, len(samples) - 1, min(DRAWS, len(samples))).astype(int)].astype(float)
         curves = evaluate(self.law.with_vector(tuple(names), some.T[:, :, None]))
@@ -161,11 +157,7 @@ class Source(Records):
     def usable(self, name: str) -> Fitted | None:
         """Return a record whose fit converged, or None: constants of a failed fit are no law to draw."""
         fitted = self.fitted(name)
-        return fitted if fitted is not None and fitted.converged else None
-
-    def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
-        """Return a profile law with printed constants, normalised as the records here are."""
-        return catalogue.load(law, constants, setting, self)
+        return fitted if fitted is not None and converged(fitted.content) else None
 
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -182,7 +174,7 @@ def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
 
 
 @cache
-def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
+def exact_profile(alpha: float, setting: Setting, low: float, high: float) -> tuple[Floats, Floats]:
     """Return radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
-    r = np.geomspace(low, high, count)
+    r = np.geomspace(low, high, 160)
     return r, np.asarray(exact.profile(r, alpha, setting=setting))

@@ -62,7 +62,7 @@ def _by_albedo(source: Source, record: str, figure: Figure, panel: Callable[...,
     axes = list(figure.subplots(2, 3, sharey=panel is _error_panel).flat)
     setting = data.law.setting
     laws = {
-        which: pen.DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
+        which: pen.DrawnLaw(label, catalogue.load(data.content["law"], which, setting, source), look)
         for which, (label, look) in PRINTED_LAWS.items()
     } | _recorded(source, RECORDED_LAWS)
     for ax, share in zip(axes, PANELS, strict=True):
@@ -136,7 +136,7 @@ def albedo_figure(source: Source) -> Figure:
     setting = data.law.setting
     printed = catalogue.albedo_law("liang", "published", setting, source.folder)
     curves = [pen.DrawnLaw("(8) as printed", printed, pen.PUBLISHED)]
-    if data.converged:
+    if converged(data.content):
         curves.append(pen.DrawnLaw("(8) regenerated", data.law, pen.WHOLE, data))
     rational = ("rational in √(1 − α)", {"color": pen.GREEN, "linestyle": "-."})
     curves += _recorded(source, {"albedo-rational": rational}).values()
@@ -249,7 +249,8 @@ def coefficient_figure(letter: str, source: Source) -> Figure:
 
 def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[pen.DrawnLaw]:
     equation = EQUATION[letter]
-    printed, corrected = (source.printed("liang", which, data.law.setting) for which in ("published", "corrected"))
+    sets = ("published", "corrected")
+    printed, corrected = (catalogue.load("liang", which, data.law.setting, source) for which in sets)
     lines = [pen.DrawnLaw(f"{equation} as printed", printed, pen.PUBLISHED)]
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
         label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
@@ -376,8 +377,8 @@ def _inverse_panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = pen.DrawnLaw("(19) as printed", source.printed("liang", "published", setting), pen.PUBLISHED)
-    curves = [printed, *_recorded(source, OF_INVERSES).values()]
+    printed = catalogue.load("liang", "published", setting, source)
+    curves = [pen.DrawnLaw("(19) as printed", printed, pen.PUBLISHED), *_recorded(source, OF_INVERSES).values()]
     # |g(xi)| of (19), before the clip (21) at r_max
     draw_curves(ax, xi, curves, lambda law: np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9))
     if (whole := source.usable("liang-whole")) is not None:
