@@ -10,7 +10,7 @@ import pytest
 
 from profilefit.report.figures import tradeoff_figure as figure
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.tradeoff_figure import Label, box_of, place_labels, renderer_of
+from profilefit.report.figures.tradeoff_figure import box_of, place_labels, renderer_of
 from profilefit.report.tables import tradeoff_tables
 from profilefit.studies.tradeoff import parts, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
@@ -34,7 +34,7 @@ def test_labels_keep_off_each_other_and_inside():
     for one in (chart, crowded):
         one.draw_without_rendering()
     chart.set_layout_engine("none")
-    labels = [Label(f"law number {i}", 1.0 + 0.01 * i, 0.1) for i in range(6)]
+    labels = [(f"law number {i}", 1.0 + 0.01 * i, 0.1) for i in range(6)]
     bar = box_of(axes, [(1.0, 0.1), (1.0, 0.5)], 2.0)
     assert place_labels(axes, labels, [bar]) == [0.0] * 6
     inside = axes.get_window_extent(renderer_of(axes))
@@ -42,7 +42,7 @@ def test_labels_keep_off_each_other_and_inside():
     for i, box in enumerate(boxes):
         assert inside.x0 <= box.x0 < box.x1 <= inside.x1
         assert not any(box.overlaps(other) for other in (bar, *boxes[:i]))
-    assert max(place_labels(small, [Label("a long name of a law", 1.0, 0.5)] * 8, [])) > 0.0
+    assert max(place_labels(small, [("a long name of a law", 1.0, 0.5)] * 8, [])) > 0.0
 
 
 def test_marks_say_where_points_stand():
