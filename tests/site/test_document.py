@@ -15,6 +15,7 @@ from profilefit.report.page import document
 from profilefit.report.page.document import PARTS, write_page
 from profilefit.report.page.sections import EvidenceFolder, promises, record_part
 from profilefit.report.records import Source
+from tests.unit.report.test_figures import folder_with
 
 SHIPPED = catalogue.fits_folder()
 DATA = Path(__file__).parent / "data"
@@ -34,11 +35,7 @@ CLIPPED = (DATA / "clipped.js").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("records")
-    for name in NAMES:
-        for suffix in (".json", ".npz"):
-            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
-    return folder
+    return folder_with(tmp_path_factory.mktemp("shipped"), *NAMES)
 
 
 @pytest.fixture(scope="module")

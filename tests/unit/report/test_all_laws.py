@@ -1,7 +1,6 @@
 """Every law that loads, once, under its own light; and the tables that say how good each is."""
 
 import json
-import shutil
 from dataclasses import fields
 
 import numpy as np
@@ -15,6 +14,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import albedo_laws, profile_laws, sampled_laws
 from profilefit.report.tables import law_tables as tables
 from profilefit.report.tables.law_tables import every_law, measured, measured_samplers
+from tests.unit.report.test_figures import folder_with
 from tests.unit.report.test_tables import parsed, rendered
 
 FITS = catalogue.fits_folder()
@@ -24,9 +24,7 @@ ALPHA = np.array([0.3, 0.9])
 @pytest.fixture
 def folder(tmp_path):
     """A folder with two records."""
-    for name in ("burley-whole", "albedo-rational"):
-        shutil.copy(FITS / f"{name}.json", tmp_path)
-    return tmp_path
+    return folder_with(tmp_path, "burley-whole", "albedo-rational")
 
 
 def printed(parts, width=100) -> list[str]:
