@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -65,17 +66,22 @@ def _by_albedo(source: Source, record: str, figure: Figure, panel: Callable[...,
         which: pen.DrawnLaw(label, catalogue.load(data.content["law"], which, setting, source), look)
         for which, (label, look) in PRINTED_LAWS.items()
     } | _recorded(source, RECORDED_LAWS)
-    for ax, share in zip(axes, PANELS, strict=True):
-        panel(ax, data, round(share * (data.arrays["alpha"].size - 1)), laws)
-    for ax in axes[3:]:
-        ax.set_xlabel("r [mfp]")
-    for ax in axes[::3]:
-        ax.set_ylabel(ylabel)
+    _panels(axes, data, partial(panel, data, laws), "r [mfp]", ylabel)
     legend_below(figure, axes)
     return figure
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
+def _panels(axes: list[Axes], data: Fitted, panel: Callable[[Axes, int], None], xlabel: str, ylabel: str) -> None:
+    """Draw six of a record's albedos, two rows of three panels, with labels at the left and below."""
+    for ax, share in zip(axes, PANELS, strict=True):
+        panel(ax, round(share * (data.arrays["alpha"].size - 1)))
+    for ax in axes[3:]:
+        ax.set_xlabel(xlabel)
+    for ax in axes[::3]:
+        ax.set_ylabel(ylabel)
+
+
+def _profile_panel(data: Fitted, laws: dict[str, pen.DrawnLaw], ax: Axes, row: int) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
@@ -107,7 +113,7 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     ax.errorbar(r[index], energy[row][index] * to_profile, error[row][index] * to_profile, label=PHOTONS, **pen.DATA)
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
+def _error_panel(data: Fitted, laws: dict[str, pen.DrawnLaw], ax: Axes, row: int) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
     r, truth = records.exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
@@ -345,12 +351,7 @@ def inverse_figure(source: Source) -> Figure:
     figure = canvas(8.2)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.1))
     axes = [figure.add_subplot(grid[i // 3, i % 3]) for i in range(6)]
-    for i, (ax, share) in enumerate(zip(axes, PANELS, strict=True)):
-        _inverse_panel(ax, source, data, round(share * (data.arrays["alpha"].size - 1)))
-        if i % 3 == 0:
-            ax.set_ylabel("radius |g(ξ)| [mfp]")
-        if i >= 3:
-            ax.set_xlabel("uniform number ξ [-]")
+    _panels(axes, data, partial(_inverse_panel, source, data), "uniform number ξ [-]", "radius |g(ξ)| [mfp]")
     wide = figure.add_subplot(grid[2, :])
     for record, (label, style) in OF_INVERSES.items():
         if record not in source.paths:
@@ -371,7 +372,7 @@ def inverse_figure(source: Source) -> Figure:
     return figure
 
 
-def _inverse_panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
+def _inverse_panel(source: Source, data: Fitted, ax: Axes, row: int) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     xi = np.concatenate([np.geomspace(1e-3, 0.05, 60), np.linspace(0.05, LAST_SHARE, 240)[1:]])
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
