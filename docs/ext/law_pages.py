@@ -21,7 +21,7 @@ from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, all_profiles
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SPANS, Folder, Records, record_name, record_setting
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import quality_figure
+from profilefit.report.figures.record_figures import Plan, quality_figure
 from profilefit.report.records import (
     SETS,
     TOTAL,
@@ -356,8 +356,8 @@ def drawn(page: Page, records: Path, out: Path) -> str | None:
     if not any("rel" in source.content(name)["quality"]["regenerated"] for name in page.records):
         return None
     with only("svg"):
-        quality_figure(source, out / FIGURES, name=f"quality-{page.name}")
-    return f"{FIGURES}/quality-{page.name}.svg"
+        (file,) = Plan(f"quality-{page.name}", (), (), quality_figure).drawn(source, out / FIGURES)
+    return f"{FIGURES}/{file.name}"
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -64,12 +64,8 @@ def check(
     if out is not None:
         require_apart(out, folder, "check.json")
     found = checked(those, folder, in_half, quiet)
-    whole = tables.content(found.laws, found.maps, found.costs, found.halves, found.device)
-    body = {"made": measurement_origin(typed(), folder), "of": scope(names, constants), **whole}
-    parts = tables.check_tables(found.laws, found.maps, found.device)
-    parts += tables.place_tables(found.laws) if names else []
-    parts += [tables.cost_table(found.costs, found.device)] if found.costs else []
-    parts += [tables.half_table(found.halves)] if found.halves else []
+    made = {"made": measurement_origin(typed(), folder), "of": scope(names, constants)}
+    body, parts = {**made, **tables.content(found)}, tables.check_tables(found, in_detail=bool(names))
     lacking: list[Any] = [found.lacking] if in_half and found.lacking else []
     note = "" if out is None else f"wrote {out / 'check.json'}"
     lines = [*lacking, *tables.verdict_lines(found.checks)]

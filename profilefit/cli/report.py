@@ -75,7 +75,6 @@ def report(
     from mcml_sim.runs.progress import tracked
     from profilefit.recipes.evidence import stale
     from profilefit.recipes.kinds import KINDS, no_records, records_of
-    from profilefit.report import every_law
     from profilefit.report.kinds import tables_of
     from profilefit.report.tables import law_tables
     from profilefit.report.tables.claims_table import claim_tables, read_claims
@@ -123,7 +122,7 @@ def report(
             body["claims"] = read_claims(evidence_folder(folder, evidence))[1]
         print_json(body)
     elif quality:
-        show(list(every_law(measured(), bool(names))), screen())
+        show(list(law_tables.every_law(measured(), bool(names))), screen())
     elif claims:
         made, rows = read_claims(evidence_folder(folder, evidence))
         show(claim_tables(rows), screen())
@@ -133,7 +132,7 @@ def report(
         _show(chosen if names else (), groups, folder)
     if figures_to is not None:
         from profilefit.recipes.workers import cores
-        from profilefit.report import draw_all
+        from profilefit.report.figures.record_figures import draw_all
 
         drawn, skipped = draw_all(folder, figures_to, names, lambda plans: bar(plans, "drawing", "figures"), cores())
         said.print(f"drew {len(drawn)} figures into {figures_to}", markup=False)
@@ -173,8 +172,8 @@ def _fill(path: Path, groups: Groups, folder: Path, quiet: bool) -> None:
     from mcml_sim.cli.screen import notes
     from mcml_sim.files.whole_file import read_whole, require_writable, write_whole
     from mcml_sim.runs.progress import working
-    from profilefit.report import fill
     from profilefit.report.kinds import tables_of
+    from profilefit.report.tables.markdown import fill
 
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")

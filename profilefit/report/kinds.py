@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,6 +35,7 @@ Sections = dict[str, Callable[[], str]]
 Paths = Mapping[str, Path]
 Row = tuple[str, ...]
 Rows = tuple[Row, list[Row]]  # headers, the first that of the record's name, and what is below
+RowsOf = Callable[[Mapping[str, Content]], Rows]
 
 
 def _value_and_errors(one: Content, known: Iterable[str]) -> Row:
@@ -43,6 +44,15 @@ def _value_and_errors(one: Content, known: Iterable[str]) -> Row:
 
 def _meaning(known: Mapping[str, str], meaning: Mapping[str, str]) -> str:
     return "; ".join(f"{word}: {meaning[word]}" for word in known.values())
+
+
+def _sections(load: Callable[[Path], Content], paths: Paths, **tables: RowsOf) -> Sections:
+    """Return tables of these records for Markdown, by the names of their marks (_ for -); none without records."""
+
+    def section(rows_of: RowsOf) -> str:
+        return markdown_table(*rows_of({name: load(path) for name, path in paths.items()}))
+
+    return {name.replace("_", "-"): partial(section, rows_of) for name, rows_of in tables.items()} if paths else {}
 
 
 # Stacks: their layers, the errors of their laws, and each one with all its constants.
@@ -139,16 +149,6 @@ def _stack_fits(content: Content) -> Rows:
     return ("stack", "channel", "interface", "result", "steps", "condition number", "starts as good"), rows
 
 
-def stack_sections(paths: Paths) -> Sections:
-    """Return the tables of these records of stacks for Markdown, by the names of their marks; none without records."""
-    tables = {"stack-errors": _stack_errors, "stack-constants": _stack_constants} if paths else {}
-
-    def section(rows_of: Callable[[Mapping[str, Content]], Rows]) -> str:
-        return markdown_table(*rows_of({name: stack.read(path) for name, path in paths.items()}))
-
-    return {name: partial(section, rows_of) for name, rows_of in tables.items()}
-
-
 # Sums of Gaussians of a stack: their errors over their number, and the constants of six of them.
 
 OF_NUMBER = (
@@ -185,19 +185,13 @@ def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
     ]
 
 
-def sum_sections(paths: Paths) -> Sections:
-    """Return the table of these records of sums for Markdown, by the name of its mark; none where there is none."""
-
-    def section() -> str:
-        rows: list[Row] = []
-        for name, path in paths.items():
-            sums = gaussians.load(path).content["sums"]
-            for light, by_count in ((light, sums[light]["by_count"]) for light in ILLUMINATIONS):
-                worst = (*(max(one["rel"]) for one in by_count), max(by_count[DEFAULT - 1]["alone"]))
-                rows.append((name, light, *map(significant, worst)))
-        return markdown_table(("stack", "light", *map(str, gaussians.COUNTS), f"{DEFAULT} each its own"), rows)
-
-    return {"stack-gaussians": section} if paths else {}
+def _sum_errors(sums: Mapping[str, Content]) -> Rows:
+    rows: list[Row] = []
+    for (name, content), light in product(sums.items(), ILLUMINATIONS):
+        by_count = content["sums"][light]["by_count"]
+        worst = (*(max(one["rel"]) for one in by_count), max(by_count[DEFAULT - 1]["alone"]))
+        rows.append((name, light, *map(significant, worst)))
+    return ("stack", "light", *map(str, gaussians.COUNTS), f"{DEFAULT} each its own"), rows
 
 
 def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
@@ -256,7 +250,7 @@ def premise_lines(content: Content) -> list[str]:
 
 def phase_table(folder: Path) -> RenderableType | None:
     """Return the records of phase functions that lie in a folder of records; None where there are none."""
-    contents = [phase.load(path).content for path in record.available(folder / PHASES).values()]
+    contents = [phase.read(path) for path in record.available(folder / PHASES).values()]
     if not contents:
         return None
     columns = {
@@ -268,26 +262,18 @@ def phase_table(folder: Path) -> RenderableType | None:
     return column_table("Phase functions", columns, f"{caption} where a form has numbers for it", ("table",))
 
 
-def phase_sections(folder: Path) -> Sections:
-    """Return the tables of the records of phase functions for Markdown, by the names of their marks."""
-    paths = record.available(folder / PHASES)
+def _phase_fits(phases: Mapping[str, Content]) -> Rows:
+    rows = [(name, *_measures(*one)) for name, content in phases.items() for one in _each(content)]
+    return ("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows
 
-    def contents() -> Iterable[tuple[str, Content]]:
-        return ((name, phase.load(path).content) for name, path in paths.items())
 
-    def fits() -> str:
-        rows = [(name, *_measures(*one)) for name, content in contents() for one in _each(content)]
-        return markdown_table(("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows)
-
-    def constants() -> str:
-        rows = [
-            (name, *place, *_value_and_errors(one, ()), significant(largest_error(one)))
-            for name, content in contents()
-            for place, one in _phase_constants(content)
-        ]
-        return markdown_table(("table", "form", "moments", "constant", "value", "error"), rows)
-
-    return {"phase-fits": fits, "phase-constants": constants} if paths else {}
+def _phase_errors(phases: Mapping[str, Content]) -> Rows:
+    rows = [
+        (name, *place, *_value_and_errors(one, ()), significant(largest_error(one)))
+        for name, content in phases.items()
+        for place, one in _phase_constants(content)
+    ]
+    return ("table", "form", "moments", "constant", "value", "error"), rows
 
 
 def _each(content: Content) -> list[tuple[str, str, Content]]:
@@ -340,10 +326,12 @@ TABLES: Mapping[str, KindTables] = {
         "records",
         lambda content, _: spaced([title_of(content), *stack_tables(content)]),
         lambda _, folder: stack_table(folder),
-        lambda paths, _: stack_sections(paths),
+        lambda paths, _: _sections(stack.read, paths, stack_errors=_stack_errors, stack_constants=_stack_constants),
     ),
     "gaussians": KindTables(
-        "gaussians", lambda _, path: sum_tables(gaussians.load(path)), sections=lambda paths, _: sum_sections(paths)
+        "gaussians",
+        lambda _, path: sum_tables(gaussians.load(path)),
+        sections=lambda paths, _: _sections(gaussians.read, paths, stack_gaussians=_sum_errors),
     ),
     "phase": KindTables(
         "phases",
@@ -352,7 +340,9 @@ TABLES: Mapping[str, KindTables] = {
             *map(Text, premise_lines(content)),
         ],
         lambda _, folder: phase_table(folder),
-        lambda _, folder: phase_sections(folder),
+        lambda _, folder: _sections(
+            phase.read, record.available(folder / PHASES), phase_fits=_phase_fits, phase_constants=_phase_errors
+        ),
     ),
 }
 

@@ -17,7 +17,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
-from profilefit.laws.base import Constants, ProfileLaw
+from profilefit.laws.base import Constants
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.record import SPANS, Records, record_setting
@@ -67,6 +67,11 @@ def measured_sets(content: Content) -> list[str]:
     return [name for name in SETS if name in content["quality"]]
 
 
+def judged_sets(content: Content) -> list[str]:
+    """Return those of `measured_sets` that are laws: regenerated constants of a failed fit are none."""
+    return [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
+
+
 def measures(content: Content, measure: str) -> bool:
     """Return whether a record knows this measure of its regenerated constants."""
     return measure in (content.get("quality") or {}).get("regenerated", {})
@@ -90,9 +95,10 @@ def by_index(content: Content) -> Mapping[str, list[float]]:
     return worst
 
 
-def regenerated_worst(content: Content, measure: str) -> float:
-    """Return the worst over alpha of the regenerated constants, and over n and g where a record spans them."""
-    values = [content["quality"]["regenerated"][measure], by_index(content).get(measure, [])]
+def worst(content: Content, which: str, measure: str) -> float:
+    """Return the worst over alpha of a set of constants, of regenerated ones over n and g where a record spans them."""
+    spanned = by_index(content).get(measure, []) if which == "regenerated" else []
+    values = [content["quality"][which][measure], spanned]
     return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 
 
@@ -105,16 +111,12 @@ LEVEL = 0.95
 class Fitted:
     """One record with the law that its constants make.
 
-    content, arrays  of the record; law the regenerated one; converged whether its fit says so
+    content, arrays  of the record; law the regenerated one
     """
 
     content: dict[str, Any]
     arrays: dict[str, Floats]
     law: Any
-
-    @property
-    def converged(self) -> bool:
-        return converged(self.content)
 
     @property
     def albedos(self) -> Floats:
@@ -129,7 +131,7 @@ class Fitted:
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
         """
         samples, names = self.arrays.get(f"samples_{kind}"), self.content.get("covariance", {}).get("names")
-        if samples is None or names is None or not self.converged:
+        if samples is None or names is None or not converged(self.content):
             return None
         some = samples[np.linspace(0, len(samples) - 1, min(DRAWS, len(samples))).astype(int)].astype(float)
         curves = evaluate(self.law.with_vector(tuple(names), some.T[:, :, None]))
@@ -164,11 +166,7 @@ class Source(Records):
     def usable(self, name: str) -> Fitted | None:
         """Return a record whose fit converged, or None: constants of a failed fit are no law to draw."""
         fitted = self.fitted(name)
-        return fitted if fitted is not None and fitted.converged else None
-
-    def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
-        """Return a profile law with printed constants, normalised as the records here are."""
-        return catalogue.load(law, constants, setting, self)
+        return fitted if fitted is not None and converged(fitted.content) else None
 
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -185,7 +183,7 @@ def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
 
 
 @cache
-def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
+def exact_profile(alpha: float, setting: Setting, low: float, high: float) -> tuple[Floats, Floats]:
     """Return radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
-    r = np.geomspace(low, high, count)
+    r = np.geomspace(low, high, 160)
     return r, np.asarray(exact.profile(r, alpha, setting=setting))

@@ -11,15 +11,16 @@ import pytest
 from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import catalogue, evidence
 from profilefit.report.explorer import fragment
+from profilefit.report.page import document
 from profilefit.report.page.document import PARTS, write_page
-from profilefit.report.page.sections import EvidenceFolder, failures, promises, record_part, shader, speed
+from profilefit.report.page.sections import EvidenceFolder, promises, record_part
 from profilefit.report.records import Source
+from tests.unit.report.test_figures import folder_with
 
 SHIPPED = catalogue.fits_folder()
 DATA = Path(__file__).parent / "data"
 GOLDEN = DATA / "tables.html"
 NAMES = ("albedo-liang", "burley-whole")
-SECTIONS = (failures, speed, shader)
 MEASURED = json.loads((DATA / "evidence" / "measured.json").read_text(encoding="utf-8"))
 BACKGROUND = "getComputedStyle(document.body).backgroundColor"
 SPOILED = (
@@ -34,11 +35,7 @@ CLIPPED = (DATA / "clipped.js").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("records")
-    for name in NAMES:
-        for suffix in (".json", ".npz"):
-            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
-    return folder
+    return folder_with(tmp_path_factory.mktemp("shipped"), *NAMES)
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +56,11 @@ def page(tmp_path_factory, records, measured):
         patch.setattr(fragment, "KNOTS", (1.4,))
         write_page(path, records, measured)
     return path
+
+
+def sections(folder, records):
+    """The sections of what the commands wrote into a folder."""
+    return [EvidenceFolder(folder, records).section(name, parts) for name, parts in document.MEASURED.items()]
 
 
 class Balance(html.parser.HTMLParser):
@@ -110,22 +112,18 @@ def test_it_says_what_was_measured_where_and_what_is_missing(page, records, meas
     assert [words for words in told if words not in text] == []
     assert "Not measured here" not in text
     assert "run it again" not in text
-    bare = "\n".join(text for part in SECTIONS for text in part(EvidenceFolder(tmp_path, records)))
+    bare = "\n".join(sections(tmp_path, records))
     assert [f"profilefit {name} --out evidence" in bare for name in MEASURED] == [True] * 3
     # Measured with the constants of other records, and told so.
     other = tmp_path / "other"
     shutil.copytree(records, other)
     (other / "albedo-liang.json").unlink()
-    old = "\n".join(text for part in SECTIONS for text in part(EvidenceFolder(measured, other)))
-    assert old.count("run it again") == 3
+    assert "\n".join(sections(measured, other)).count("run it again") == 3
 
 
 @pytest.mark.slow
 def test_what_the_commands_wrote_last_can_be_read():
-    found = EvidenceFolder(SHIPPED / "evidence", SHIPPED)
-    told = dict(
-        zip(("misprint of b0", "quantile", "hazard"), ("\n".join(part(found)) for part in SECTIONS), strict=True)
-    )
+    told = dict(zip(("misprint of b0", "quantile", "hazard"), sections(SHIPPED / "evidence", SHIPPED), strict=True))
     assert [name for name, text in told.items() if name not in text or "Not measured here" in text] == []
 
 

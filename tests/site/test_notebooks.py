@@ -26,7 +26,6 @@ SMOKE = FOLDER / "04-check-the-shader.ipynb"
 FIRST = 6  # cells of it, up to the first picture: a whole notebook takes half a minute
 
 STEMS = [path.stem for path in NOTEBOOKS]
-every = pytest.mark.parametrize("path", NOTEBOOKS, ids=STEMS)
 
 
 @pytest.fixture(autouse=True)
@@ -64,13 +63,6 @@ def pictures(notebook: NotebookNode) -> list[str]:
     return [one.data["image/png"] for one in outputs(notebook, "display_data") if "image/png" in one.data]
 
 
-def printed(stem: str) -> str:
-    """What the cells of a notebook print, plainly and as tables."""
-    notebook = executed(FOLDER / f"{stem}.ipynb")
-    tables = (one.data["text/plain"] for one in outputs(notebook, "display_data"))
-    return "\n".join([*(one.text for one in outputs(notebook, "stream")), *tables])
-
-
 def prints(stem: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Run a test, one of the slow ones, with what this notebook prints."""
     given = pytest.mark.parametrize("text", [stem], indirect=True)
@@ -79,7 +71,10 @@ def prints(stem: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
 @pytest.fixture
 def text(request: pytest.FixtureRequest) -> str:
-    return printed(request.param)
+    """What the cells of a notebook print, plainly and as tables."""
+    notebook = executed(FOLDER / f"{request.param}.ipynb")
+    tables = (one.data["text/plain"] for one in outputs(notebook, "display_data"))
+    return "\n".join([*(one.text for one in outputs(notebook, "stream")), *tables])
 
 
 def numbers(pattern: str, text: str) -> list[float]:
@@ -103,7 +98,7 @@ def test_nbstripout_finds_nothing_to_strip():
     command(sys.executable, "-m", "nbstripout", "--verify", *NOTEBOOKS)
 
 
-@every
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=STEMS)
 def test_notebooks_are_stripped_with_text_between_cells_links_that_lead_and_no_long_helper(path):
     notebook = nbformat.read(path, as_version=4)
     cells = notebook.cells

@@ -1,21 +1,31 @@
-"""What README and documentation claim is what the records say."""
+"""What README and documentation claim is what the records say; so do the pages of laws, one for each law and record."""
 
+import importlib
 import re
+import shlex
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
+import profilefit
 from benchmarks.claims import RUNS
+from mcml_sim import Setting
 from profilefit.fitting.quality import profile_quality
-from profilefit.recipes import record
+from profilefit.recipes import catalogue, record
 from profilefit.recipes.catalogue import profile_laws
-from profilefit.report import fill, sections
+from profilefit.report.records import largest_error
+from profilefit.report.tables.cells import to_error
 from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.law_tables import ALBEDOS, markdown_laws, markdown_sections
+from profilefit.report.tables.markdown import fill, sections
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]
-README = ROOT / "README.md"
+FITS, README = ROOT / "fits", ROOT / "README.md"
+sys.path.append(str(ROOT / "docs" / "ext"))
+law_pages = importlib.import_module("law_pages")
 # Where each table stands; `make records` fills these files.
 PLACES = {
     "short": README,
@@ -34,7 +44,7 @@ def text_of(path: Path) -> str:
 
 
 def shipped() -> dict[str, dict]:
-    return {name: record.read(path) for name, path in record.available(ROOT / "fits").items()}
+    return {name: record.read(path) for name, path in record.available(FITS).items()}
 
 
 def rows_of(name: str) -> list[list[str]]:
@@ -48,7 +58,7 @@ def test_every_table_is_the_records_own_and_stands_in_one_place_and_no_other():
     assert set(tables) == set(PLACES) - set(MEASURED)
     for name, table in tables.items():
         assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in text_of(PLACES[name]), f"{name}: run make records"
-    known = {*tables, *markdown_sections(ROOT / "fits")}
+    known = {*tables, *markdown_sections(FITS)}
     found = {(name, path) for path in WRITTEN for name in known if f"<!-- {name} -->" in text_of(path)}
     assert found == set(PLACES.items())
     # Filling again changes nothing, and a stale table is replaced.
@@ -84,7 +94,7 @@ def test_figures_in_prose_are_the_bounds_of_the_claims_they_link_to():
 
 
 def test_every_record_has_its_recipe_and_ended_well():
-    recipes = {path.stem for path in (ROOT / "fits").glob("*.toml")}
+    recipes = {path.stem for path in FITS.glob("*.toml")}
     records = shipped()
     assert set(records) == recipes
     fits = {name: content for name, content in records.items() if "fit" in content}
@@ -98,7 +108,7 @@ def test_every_record_has_its_recipe_and_ended_well():
 def test_measured_tables_name_every_law_and_two_are_measured_again():
     """All of them would take a minute."""
     rows = rows_of("laws")[2:]
-    laws = profile_laws(ROOT / "fits", matched=False)
+    laws = profile_laws(FITS, matched=False)
     assert {(r[0], r[1], r[2]) for r in rows} == {(o.name, o.constants or "none", o.setting.illumination) for o in laws}
     for one in [o for o in laws if o.label in ("burley, published", "liang-whole")]:
         line = markdown_laws([(one, profile_quality(one.law, ALBEDOS))]).splitlines()[2]
@@ -106,11 +116,69 @@ def test_measured_tables_name_every_law_and_two_are_measured_again():
 
 
 def test_the_table_of_claims_is_what_was_measured_last():
-    table = markdown_claims(ROOT / "fits/evidence")
+    table = markdown_claims(FITS / "evidence")
     assert fill(text_of(PLACES["claims"]), {"claims": table}) == text_of(PLACES["claims"]), "run make claims"
 
 
 def test_all_that_was_regenerated_passes_the_check_and_what_was_printed_by_liang_does_not():
-    laws, maps = chosen([], REGENERATED, ROOT / "fits")
+    laws, maps = chosen([], REGENERATED, FITS)
     listed = {row[0]: row[-1] for row in rows_of("check") if row[-1] in ("pass", "FAIL")}
     assert listed == {**dict.fromkeys([one.label for one in (*laws, *maps)], "pass"), "liang, published": "FAIL"}
+
+
+# Pages of laws
+
+
+@pytest.fixture(scope="module")
+def pages():
+    return law_pages.law_pages(FITS)
+
+
+def test_every_law_and_every_record_has_its_place(pages):
+    members = [one for page in pages for one in page.members]
+    records = {name for name, path in record.available(FITS).items() if "constants" in record.read(path)}
+    assert {name for one in members for name in one.records} == records
+    printed = {one.label for one in profile_laws(FITS) if not one.records}
+    assert printed <= {one.label for one in members}
+    index = law_pages.index_text(pages, FITS)
+    assert index.count("\n| [") == len(members)
+    assert all(f"\n{page.name}\n" in index for page in pages)
+
+
+def test_a_page_says_what_its_record_says(pages):
+    hazard = next(page for page in pages if page.name == "hazard")
+    text, content = law_pages.page_text(hazard, FITS), record.read(FITS / "hazard.json")
+    for name, constant in content["constants"].items():
+        shown = to_error(constant["regenerated"], largest_error(constant))
+        assert re.search(rf"^\| {name} +\| +{re.escape(shown)} ", text, re.MULTILINE)
+    told = [content["data_digest"], "profilefit regenerate hazard\n", 'load("hazard", setting=Setting("diffuse"']
+    told += ["profilefit export hazard-diffuse-refracting --lang glsl"]
+    told += [f"| worst | {max(content['quality']['regenerated']['rel']):.2g}"]
+    assert [one for one in told if one not in text] == []
+
+
+def test_a_page_changes_with_its_record(pages, tmp_path):
+    copied = shutil.copytree(FITS, tmp_path / "fits", ignore=shutil.ignore_patterns("figures", ".photons", "*.npz"))
+    path = copied / "quantile.json"
+    path.write_text(path.read_text(encoding="utf-8").replace('"converged"', '"did not converge"'), encoding="utf-8")
+    page = next(page for page in pages if page.name == "quantile")
+    assert "No constants: did not converge." in law_pages.page_text(page, copied)
+    assert "No constants: did not converge." not in law_pages.page_text(page, FITS)
+
+
+@pytest.mark.slow
+def test_what_a_page_tells_to_type_gives_that_law(pages):
+    """Every call of `load` and `albedo_law` on every page."""
+    for page in pages:
+        text = law_pages.page_text(page, FITS)
+        calls = re.findall(r"```python\n(.+)\n```", text)
+        assert len(calls) == len(page.members)
+        for call, one in zip(calls, page.members, strict=True):
+            here = call.replace('"fits/', f'"{FITS}/')
+            law = eval(here, {"profilefit": profilefit, "Setting": Setting})
+            assert law.constants() == one.law.constants(), call
+            assert law.setting == one.setting, call
+        for command in re.findall(r"^profilefit export (.+) --lang glsl$", text, re.MULTILINE):
+            name, *constants = shlex.split(command.replace("--constants ", ""))
+            law = catalogue.find(name, FITS, *constants).law
+            assert any(law.constants() == one.law.constants() for one in page.members), command

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
@@ -19,7 +20,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.report import records
 from profilefit.report.figures import canvas as pen
-from profilefit.report.figures.canvas import albedo_axis, canvas, draw_curves, legend_below, plain_log, save, styled
+from profilefit.report.figures.canvas import albedo_axis, canvas, draw_curves, legend_below, plain_log
 from profilefit.report.records import TOTAL, Content, Fitted, Source, coefficients, converged, total_error, z_score
 
 Points = tuple[Floats, ...]
@@ -45,39 +46,40 @@ def _recorded(source: Source, looks: dict[str, tuple[str, Any]]) -> dict[str, pe
     return {name: pen.DrawnLaw(looks[name][0], one.law, looks[name][1], one) for name, one in usable.items() if one}
 
 
-@styled
-def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> list[Path]:
+def profile_figure(source: Source) -> Figure:
     """Draw r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
-    return _by_albedo(source, out, name, "liang-as-published", canvas(6.6), _profile_panel, "r R$_d$ [1/mfp]")
+    return _by_albedo(source, "liang-as-published", canvas(6.6), _profile_panel, "r R$_d$ [1/mfp]")
 
 
-@styled
-def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list[Path]:
+def error_figure(source: Source) -> Figure:
     """Draw R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their noise."""
-    return _by_albedo(source, out, name, "liang-whole", canvas(6.4), _error_panel, "R$_d$ over exact R$_d$, less 1 [-]")
+    return _by_albedo(source, "liang-whole", canvas(6.4), _error_panel, "R$_d$ over exact R$_d$, less 1 [-]")
 
 
-def _by_albedo(
-    source: Source, out: Path, name: str, record: str, figure: Any, panel: Callable[..., None], ylabel: str
-) -> list[Path]:
+def _by_albedo(source: Source, record: str, figure: Figure, panel: Callable[..., None], ylabel: str) -> Figure:
     data = source.needed(record)
     axes = list(figure.subplots(2, 3, sharey=panel is _error_panel).flat)
     setting = data.law.setting
     laws = {
-        which: pen.DrawnLaw(label, source.printed(data.content["law"], which, setting), look)
+        which: pen.DrawnLaw(label, catalogue.load(data.content["law"], which, setting, source), look)
         for which, (label, look) in PRINTED_LAWS.items()
     } | _recorded(source, RECORDED_LAWS)
+    _panels(axes, data, partial(panel, data, laws), "r [mfp]", ylabel)
+    legend_below(figure, axes)
+    return figure
+
+
+def _panels(axes: list[Axes], data: Fitted, panel: Callable[[Axes, int], None], xlabel: str, ylabel: str) -> None:
+    """Draw six of a record's albedos, two rows of three panels, with labels at the left and below."""
     for ax, share in zip(axes, PANELS, strict=True):
-        panel(ax, data, round(share * (data.arrays["alpha"].size - 1)), laws)
+        panel(ax, round(share * (data.arrays["alpha"].size - 1)))
     for ax in axes[3:]:
-        ax.set_xlabel("r [mfp]")
+        ax.set_xlabel(xlabel)
     for ax in axes[::3]:
         ax.set_ylabel(ylabel)
-    legend_below(figure, axes)
-    return save(figure, out, name)
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
+def _profile_panel(data: Fitted, laws: dict[str, pen.DrawnLaw], ax: Axes, row: int) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
@@ -109,7 +111,7 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     ax.errorbar(r[index], energy[row][index] * to_profile, error[row][index] * to_profile, label=PHOTONS, **pen.DATA)
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]) -> None:
+def _error_panel(data: Fitted, laws: dict[str, pen.DrawnLaw], ax: Axes, row: int) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
     r, truth = records.exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
@@ -132,14 +134,13 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, pen.DrawnLaw]
     ax.set(xscale="log", xlim=(NEAREST, r[-1]), ylim=(-1.05, 1.05), title=f"α = {alpha:.3f}")
 
 
-@styled
-def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> list[Path]:
+def albedo_figure(source: Source) -> Figure:
     """Draw alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
     data = source.needed("albedo-liang")
     setting = data.law.setting
     printed = catalogue.albedo_law("liang", "published", setting, source.folder)
     curves = [pen.DrawnLaw("(8) as printed", printed, pen.PUBLISHED)]
-    if data.converged:
+    if converged(data.content):
         curves.append(pen.DrawnLaw("(8) regenerated", data.law, pen.WHOLE, data))
     rational = ("rational in √(1 − α)", {"color": pen.GREEN, "linestyle": "-."})
     curves += _recorded(source, {"albedo-rational": rational}).values()
@@ -164,7 +165,7 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     for ax in panels.values():
         ax.set_xlabel("total reflectance A [-]")
     legend_below(figure, list(panels.values()))
-    return save(figure, out, name)
+    return figure
 
 
 def _map_errors(error: Axes, ratio: Axes, points: Points, curves: list[pen.DrawnLaw], exact_map: Points) -> None:
@@ -209,8 +210,7 @@ OF_COEFFICIENTS = {
 RATIOS = (0.6, 1.4)  # shown of law over fitted point [-]
 
 
-@styled
-def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -> list[Path]:
+def coefficient_figure(letter: str, source: Source) -> Figure:
     """Draw one coefficient against alpha [-], the end near 1 enlarged, and the laws over the fitted points below."""
     data = source.needed("liang-as-published")
     lines, column = _coefficient_laws(letter, source, data), COEFFICIENTS.index(letter)
@@ -248,12 +248,13 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
         for ax in axes[0]:
             ax.axhline(0.0, color=pen.GREY, linestyle=":", label="a = 0: from here on (7) has no r$_{max}$")
     legend_below(figure, list(axes.flat))
-    return save(figure, out, name or f"liang-{EQUATION[letter][1:-1]}-{letter}")
+    return figure
 
 
 def _coefficient_laws(letter: str, source: Source, data: Fitted) -> list[pen.DrawnLaw]:
     equation = EQUATION[letter]
-    printed, corrected = (source.printed("liang", which, data.law.setting) for which in ("published", "corrected"))
+    sets = ("published", "corrected")
+    printed, corrected = (catalogue.load("liang", which, data.law.setting, source) for which in sets)
     lines = [pen.DrawnLaw(f"{equation} as printed", printed, pen.PUBLISHED)]
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
         label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
@@ -284,8 +285,7 @@ LINEAR, TICKS = 0.1, (-10, -1, -0.1, 0, 0.1, 1, 10)  # share of a constant up to
 FAR = 3.0  # standard errors
 
 
-@styled
-def constants_figure(source: Source, out: Path, name: str = "constants") -> list[Path]:
+def constants_figure(source: Source) -> Figure:
     """Draw (published - regenerated) / |regenerated| [-] of every printed constant, ± its total error, and z."""
     rows = _printed_constants(source)
     figure = canvas(ROW * len(rows) + FEET, layout=ConstrainedLayoutEngine(w_pad=0.1))
@@ -313,7 +313,7 @@ def constants_figure(source: Source, out: Path, name: str = "constants") -> list
         Line2D([], [], color=pen.GREY, linewidth=3.5, alpha=0.6, label=f"± {TOTAL}"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return save(figure, out, name)
+    return figure
 
 
 def has_printed(source: Source) -> tuple[str, ...]:
@@ -343,19 +343,13 @@ DOUBTED = (0.4, 0.6)  # where the paper's authors find their inverse weakest
 DOUBTED_BAND: Any = {"color": pen.BLACK, "alpha": 0.07, "linewidth": 0, "label": "α that the paper calls worst"}
 
 
-@styled
-def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") -> list[Path]:
+def inverse_figure(source: Source) -> Figure:
     """Draw r [mfp] against xi [-] at six albedos, and max |cdf(r(xi)) - xi| [-] against alpha [-]."""
     data = source.needed("liang-inverse-whole")
     figure = canvas(8.2)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.1))
     axes = [figure.add_subplot(grid[i // 3, i % 3]) for i in range(6)]
-    for i, (ax, share) in enumerate(zip(axes, PANELS, strict=True)):
-        _inverse_panel(ax, source, data, round(share * (data.arrays["alpha"].size - 1)))
-        if i % 3 == 0:
-            ax.set_ylabel("radius |g(ξ)| [mfp]")
-        if i >= 3:
-            ax.set_xlabel("uniform number ξ [-]")
+    _panels(axes, data, partial(_inverse_panel, source, data), "uniform number ξ [-]", "radius |g(ξ)| [mfp]")
     wide = figure.add_subplot(grid[2, :])
     for record, (label, style) in OF_INVERSES.items():
         if record not in source.paths:
@@ -373,17 +367,17 @@ def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") ->
     wide.set_ylabel("max |cdf(r(ξ)) − ξ| [-]")
     wide.set_ylim(bottom=0.0)
     legend_below(figure, [*axes, wide])
-    return save(figure, out, name)
+    return figure
 
 
-def _inverse_panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
+def _inverse_panel(source: Source, data: Fitted, ax: Axes, row: int) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     xi = np.concatenate([np.geomspace(1e-3, 0.05, 60), np.linspace(0.05, LAST_SHARE, 240)[1:]])
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=pen.BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = pen.DrawnLaw("(19) as printed", source.printed("liang", "published", setting), pen.PUBLISHED)
-    curves = [printed, *_recorded(source, OF_INVERSES).values()]
+    printed = catalogue.load("liang", "published", setting, source)
+    curves = [pen.DrawnLaw("(19) as printed", printed, pen.PUBLISHED), *_recorded(source, OF_INVERSES).values()]
     # |g(xi)| of (19), before the clip (21) at r_max
     draw_curves(ax, xi, curves, lambda law: np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9))
     if (whole := source.usable("liang-whole")) is not None:
@@ -412,8 +406,7 @@ LOOKS: dict[str, tuple[str, Any]] = {
 REQUIRED = 1e-3
 
 
-@styled
-def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -> list[Path]:
+def inversion_figure(source: Source) -> Figure:
     """Draw max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
     figure = canvas(4.6)
     axes = list(figure.subplots(1, 2, sharey=True))
@@ -429,7 +422,7 @@ def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -
     if caption := inversion_caption(source):
         figure.suptitle(caption, fontsize=9.0)
     legend_below(figure, axes)
-    return save(figure, out, name)
+    return figure
 
 
 def draw_inversion(ax: Axes, source: Source, record: str) -> None:

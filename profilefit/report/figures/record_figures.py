@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from operator import methodcaller
 from pathlib import Path
 from textwrap import fill
@@ -36,7 +37,7 @@ from profilefit.report.figures import canvas as pen
 from profilefit.report.figures import paper_figures as paper
 from profilefit.report.figures.canvas import albedo_axis, canvas, legend_below, plain_log, save, styled
 from profilefit.report.kinds import published
-from profilefit.report.records import SETS, Content, Fitted, Source, converged, measures
+from profilefit.report.records import Content, Fitted, Source, converged, judged_sets, measures
 from profilefit.report.tables.cells import significant
 
 
@@ -44,18 +45,20 @@ from profilefit.report.tables.cells import significant
 class Plan:
     """One figure: its file's name, the records it cannot do without, those it shows if they are there, who draws it.
 
+    draw     returns it, under the settings of matplotlib that `drawn` makes
     missing  why it cannot be drawn although its records are there; empty if it can
     """
 
     name: str
     needs: tuple[str, ...]
     uses: tuple[str, ...]
-    draw: Callable[..., list[Path]]
+    draw: Callable[[Source], Figure]
     missing: str = ""
 
+    @styled
     def drawn(self, source: Source, out: Path) -> list[Path]:
         """Draw the figure into a folder, and return its files."""
-        return self.draw(source, out, name=self.name)
+        return save(self.draw(source), out, self.name)
 
 
 Track = Callable[[list[Plan]], Iterable[Plan]]
@@ -142,8 +145,7 @@ SHADES = "viridis"  # from dark to light with alpha
 HEIGHT = 3.2  # [inch]
 
 
-@styled
-def residual_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+def residual_figure(record_name: str, source: Source) -> Figure:
     """Draw a profile law's energy of a ring over that of the data, less 1 [-], with the data's standard errors.
 
     Of an inverse cdf: exact cdf(r(xi)) - xi [-]. Of a map: alpha or A, whichever was fitted, less that of the data [-].
@@ -172,7 +174,7 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
             ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     ax.axhline(0.0, color=pen.BLACK, linewidth=0.8)
-    return save(figure, out, name or f"residuals-{record_name}")
+    return figure
 
 
 def _of_map(ax: Axes, fitted: Fitted) -> None:
@@ -225,19 +227,7 @@ COLOURS, MARKERS = (pen.BLUE, pen.VERMILION, pen.GREEN, pen.ORANGE, pen.PURPLE, 
 ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, of what is above [inch]
 
 
-@dataclass(frozen=True)
-class Line:
-    """One set of constants: its label, where it was measured, the measures by name; whether it has a g."""
-
-    label: str
-    alpha: list[float]
-    values: Content
-    printed: bool
-    forward: bool
-
-
-@styled
-def quality_figure(source: Source, out: Path, name: str = "quality", names: Iterable[str] | None = None) -> list[Path]:
+def quality_figure(source: Source, names: Iterable[str] | None = None) -> Figure:
     """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
 
     A row of panels for each light, one for all surfaces that refract. `names` are the records, all of them if None.
@@ -248,53 +238,50 @@ def quality_figure(source: Source, out: Path, name: str = "quality", names: Iter
     for owner, content in contents.items():
         light, n, g = (content["setting"][key] for key in ("illumination", "n", "g"))
         groups[light if (n, g) == (1, 0) else "refracting"].append((owner, content))
-    shown = {kind: list(_lines(group)) for kind, group in groups.items() if group}
+    shown = {kind: _sets(group) for kind, group in groups.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
-    for row, (kind, lines) in zip(grid, shown.items(), strict=True):
+    for row, (kind, sets) in zip(grid, shown.items(), strict=True):
         for ax, one in zip(row, SHOWN, strict=True):
-            _panel(ax, one.name, lines)
+            _panel(ax, one.name, sets)
         row[0].set_ylabel(KINDS[kind])
-        if lines:  # none where every fit failed
+        if sets:  # none where every fit failed
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
     for ax, one in zip(grid[0], SHOWN, strict=True):
         ax.set_title(f"{one.formula} [{one.unit}]".replace("R_d", "R$_d$"))
     for ax in grid[:-1].flat:
         ax.set_xlabel("")
-    return save(figure, out, name)
+    return figure
 
 
-def _panel(ax: Axes, key: str, lines: list[Line]) -> None:
-    for place, line in enumerate(lines):
+def _panel(ax: Axes, key: str, sets: Mapping[str, tuple[Content, str]]) -> None:
+    for place, (label, (content, which)) in enumerate(sets.items()):
         look: dict[str, Any] = {
             "color": COLOURS[place % len(COLOURS)],
             "marker": MARKERS[place % len(MARKERS)],
-            "linestyle": "--" if line.printed else "-",
+            "linestyle": "-" if which == "regenerated" else "--",
         }
-        ax.plot(line.alpha, line.values[key], label=line.label, markersize=3.0, **look)
+        quality = content["quality"]
+        ax.plot(quality["alpha"], quality[which][key], label=label, markersize=3.0, **look)
     albedo_axis(ax)
-    if any(line.forward for line in lines):
+    if any(content["setting"]["g"] for content, _ in sets.values()):
         ax.set_xlabel("single-scattering albedo α [-], reduced if g ≠ 0")
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)
 
 
-def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
-    """Yield each set once: printed constants are the same in every record of their law."""
-    drawn: set[str] = set()
+def _sets(contents: Iterable[tuple[str, Content]]) -> dict[str, tuple[Content, str]]:
+    """Return each set once, by its label: printed constants are the same in every record of their law."""
+    sets: dict[str, tuple[Content, str]] = {}
     for name, content in contents:
-        quality = content["quality"]
-        for which in (one for one in SETS if one in quality):
-            regenerated = which == "regenerated"
-            g = content["setting"]["g"]
-            label = (name if regenerated else f"{content['law']}, {which}") + (f", g = {g:g}" if g else "")
-            if label not in drawn and (converged(content) or not regenerated):
-                drawn.add(label)
-                yield Line(label, quality["alpha"], quality[which], not regenerated, bool(g))
+        g = content["setting"]["g"]
+        for which in judged_sets(content):
+            label = name if which == "regenerated" else f"{content['law']}, {which}"
+            sets.setdefault(label + (f", g = {g:g}" if g else ""), (content, which))
+    return sets
 
 
-MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon noise"}
 # Probability inside one and two standard deviations of a normal pair of constants: 1 - exp(-k^2 / 2).
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
@@ -303,14 +290,10 @@ MOST, KEPT = 18, 12  # constants of which a figure shows all: the panels of more
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
-@styled
-def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
-    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
-
-    kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
-    """
+def corner_figure(record_name: str, source: Source) -> Figure:
+    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values."""
     fitted = source.needed(record_name)
-    samples = fitted.arrays[f"samples_{kind}"].astype(float)
+    samples = fitted.arrays["samples_misfit"].astype(float)
     names, held_back = fitted.content["covariance"]["names"], ""
     if len(names) > MOST:
         correlation = np.abs(np.corrcoef(samples, rowvar=False))
@@ -329,9 +312,9 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
             if value is not None and samples[:, column].min() <= value <= samples[:, column].max():
                 mark(grid, column, value, color=color, linestyle=style)
     _axes(grid, names)
-    title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
+    title = f"{record_name}: spread by the law's misfit taken for noise" + (f";\n{held_back}" if held_back else "")
     _caption(figure, samples, names, constants, title)
-    return save(figure, out, name or f"corner-{record_name}")
+    return figure
 
 
 def corner_grid(figure: Figure, samples: Floats, bins: int, **more: Any) -> NDArray[Any]:
@@ -418,8 +401,7 @@ def sums_of(folder: Path) -> dict[str, gaussians.SumRecord]:
     return {name: gaussians.load(path) for name, path in record.available(folder / SUMS).items()}
 
 
-@styled
-def sum_figure(source: Source, out: Path, name: str = OF_SUMS) -> list[Path]:
+def sum_figure(source: Source) -> Figure:
     """Draw rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
     sums = sums_of(source.folder)
     columns = min(len(sums), LONGEST)
@@ -434,34 +416,32 @@ def sum_figure(source: Source, out: Path, name: str = OF_SUMS) -> list[Path]:
     for ax in panels[0::columns]:
         ax.set_ylabel("mean relative error of R$_d$ [-]")
     legend_below(figure, panels[: len(sums)])
-    return save(figure, out, name)
+    return figure
 
 
 def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
     """Return what the figure shows, and what six Gaussians cost by these records."""
-    of_six = {
-        (key, stack, light, channel): value
-        for stack, one in sums.items()
-        for light in ILLUMINATIONS
-        for key in ("rel", "alone")
-        for channel, value in zip(CHANNELS, one.content["sums"][light]["by_count"][DEFAULT - 1][key], strict=True)
-    }
-    rel, alone = ({place[1:]: v for place, v in of_six.items() if place[0] == key} for key in ("rel", "alone"))
+    rel: dict[tuple[str, str, str], float] = {}
+    alone = 0.0
+    for (stack, one), light in product(sums.items(), ILLUMINATIONS):
+        six = one.content["sums"][light]["by_count"][DEFAULT - 1]
+        rel |= {(stack, light, channel): value for channel, value in zip(CHANNELS, six["rel"], strict=True)}
+        alone = max(alone, *six["alone"])
     worst = max(rel, key=rel.__getitem__)
     text = (
         "Sums of Gaussians of one set of variances in all colours: mean relative error of R_d, in rings even in ln r "
         "from 0.01 mean free paths to 99.5 % of the light. "
         f"Six are off by {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
-        f"{worst[2]}, {worst[1]}), by at most {_percent(max(alone.values()))} where each colour has its own variances."
+        f"{worst[2]}, {worst[1]}), by at most {_percent(alone)} where each colour has its own variances."
     )
     for one in sums.values():
-        if others := published(one).get(one.content["setting"]["illumination"]):
-            own = one.content["sums"][one.content["setting"]["illumination"]]["by_count"][DEFAULT - 1]
-            off = ", ".join(_percent(each["rel"]) for each in others)
+        light = one.content["setting"]["illumination"]
+        if others := published(one).get(light):
+            off, own = ", ".join(_percent(each["rel"]) for each in others), one.content["sums"][light]["by_count"]
             text += (
                 f" The six that d'Eon and Luebke published for a skin (GPU Gems 3, ch. 14) are off this one's light by "
                 f"{off} in red, green and blue; their cdf by at most {max(each['ks'] for each in others):.2g}, that of "
-                f"the six here by {max(own['ks']):.2g}."
+                f"the six here by {max(own[DEFAULT - 1]['ks']):.2g}."
             )
     return text
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from textwrap import fill
@@ -25,7 +24,7 @@ from profilefit.report.figures import canvas as pen
 from profilefit.report.figures.canvas import canvas, plain_log, save, styled
 from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Panel, Point, TradeoffPart, front, standings
 
-STEP = 4.5  # from a point to the nearest place of its label [pt]
+SIZE, STEP = 7.5, 4.5  # of a label, and from a point to its nearest place [pt]
 # Where a label may stand about its point, in such steps, the nearest places first.
 RIGHT, UP = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 21.0), (0.0, 1.5, 3.0, 5.0, 8.0, 11.0, 15.0)
 PLACES = sorted(
@@ -35,31 +34,23 @@ PLACES = sorted(
 DISTANCE = 0.02  # square pixels of overlap that a place may have rather than lie one square point farther away
 
 
-@dataclass(frozen=True)
-class Label:
-    """A text, and the point (x, y) in data coordinates that it belongs to."""
-
-    text: str
-    x: float
-    y: float
-
-
-def place_labels(axes: Axes, labels: Sequence[Label], occupied: Sequence[Bbox], size: float = 7.5) -> list[float]:
+def place_labels(axes: Axes, labels: Sequence[tuple[str, float, float]], occupied: Sequence[Bbox]) -> list[float]:
     """Write the labels; square pixels that each shares with others or has outside the axes, 0 where there was room.
 
+    labels    texts, each with the point (x, y) in data coordinates that it belongs to
     occupied  boxes in pixels that should stay free, such as `box_of` of bars; the figure must be laid out already
     """
     renderer = renderer_of(axes)
     inside = axes.get_window_extent(renderer)
-    occupied = [*occupied, *(box_of(axes, [(one.x, one.y)], size / 2) for one in labels)]
+    occupied = [*occupied, *(box_of(axes, [(x, y)], SIZE / 2) for _, x, y in labels)]
     crowdings = []
-    for one in labels:
+    for text, x, y in labels:
         note = axes.annotate(
-            one.text,
-            (one.x, one.y),
+            text,
+            (x, y),
             PLACES[0],
             textcoords="offset points",
-            fontsize=size,
+            fontsize=SIZE,
             annotation_clip=False,
             zorder=5,
             bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
@@ -149,8 +140,7 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
         occupied = list(_occupied(axes, panel))
         first = {point.method: point for point in reversed(panel.points)}
         texts = [text_of(point, first[point.method] is point) for point in panel.points]
-        labels = [Label(text, *xy) for text, *xy in zip(texts, *_xy(panel.points), strict=True)]
-        place_labels(axes, labels, occupied)
+        place_labels(axes, list(zip(texts, *_xy(panel.points), strict=True)), occupied)
     return save(figure, out, f"tradeoff-{part.name}")
 
 

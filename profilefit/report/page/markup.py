@@ -15,15 +15,16 @@ from rich.text import Text
 LETTERS = Console(file=None, color_system=None, highlight=False, markup=False)
 
 
-def element(tag: str, inside: str, **attributes: str) -> str:
-    """Return `<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens."""
-    named = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
+def element(tag: str, inside: str, **attributes: str | None) -> str:
+    """Return `<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens; None leaves one out."""
+    given = {key: text for key, text in attributes.items() if text is not None}
+    named = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in given.items())
     return f"<{tag}{named}>{inside}</{tag}>"
 
 
 def paragraph(text: str, class_: str = "") -> str:
     """Return a paragraph of plain text."""
-    return element("p", escape(text), **({"class_": class_} if class_ else {}))
+    return element("p", escape(text), class_=class_ or None)
 
 
 def command(line: str) -> str:
@@ -33,8 +34,7 @@ def command(line: str) -> str:
 
 def details(summary: str, inside: str, id_: str = "", is_open: bool = False) -> str:
     """Return a summary with content that a click opens."""
-    given = ({"id_": id_} if id_ else {}) | ({"open": ""} if is_open else {})
-    return element("details", f"<summary>{summary}</summary>\n{inside}", **given)
+    return element("details", f"<summary>{summary}</summary>\n{inside}", id_=id_ or None, open="" if is_open else None)
 
 
 def section(id_: str, title: str, parts: Iterable[str]) -> str:
@@ -56,7 +56,7 @@ def markup(part: RenderableType) -> str:
     if isinstance(part, str):
         return paragraph(part)
     if isinstance(part, Text):
-        return element("p", _letters(part, _style(part)), **_classes(_style(part)))
+        return element("p", _letters(part, _style(part)), class_=_classes(_style(part)))
     if isinstance(part, Padding):
         return markup(part.renderable)
     if isinstance(part, Group):
@@ -79,9 +79,10 @@ def _table(table: Table) -> str:
 def _row(columns: Sequence[Column], cells: Iterable[RenderableType], tag: str) -> str:
     filled = []
     for column, cell in zip(columns, cells, strict=True):
-        side = {"class_": "number"} if column.justify == "right" else {} if column.no_wrap else {"class_": "text"}
+        side = "number" if column.justify == "right" else None if column.no_wrap else "text"
         text = Text(cell) if isinstance(cell, str) else cell
-        filled.append(element(tag, _letters(text, Style.null()) if isinstance(text, Text) else markup(text), **side))
+        inside = _letters(text, Style.null()) if isinstance(text, Text) else markup(text)
+        filled.append(element(tag, inside, class_=side))
     return element("tr", "".join(filled))
 
 
@@ -90,8 +91,8 @@ def _letters(text: Text, around: Style) -> str:
     own, stretches = _style(text), []
     for letters, stretch, _ in text.render(LETTERS):
         inside, style = escape(letters).replace("\n", "<br>"), stretch or own  # a text of one style names none
-        classes = _classes(style) if style != around else {}
-        stretches.append(element("span", inside, **classes) if classes else inside)
+        classes = _classes(style) if style != around else None
+        stretches.append(element("span", inside, class_=classes) if classes else inside)
     return "".join(stretches)
 
 
@@ -99,9 +100,9 @@ def _style(text: Text) -> Style:
     return text.style if isinstance(text.style, Style) else LETTERS.get_style(text.style or "none")
 
 
-def _classes(style: Style) -> dict[str, str]:
-    """Return class names for a style's weight and colour."""
+def _classes(style: Style) -> str | None:
+    """Return class names for a style's weight and colour; None where it has neither."""
     words = [word for word in ("bold", "dim") if getattr(style, word)]
     if style.color is not None:
         words.append(style.color.name)
-    return {"class_": " ".join(words)} if words else {}
+    return " ".join(words) or None

@@ -8,20 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.folder import fits_folder
-from profilefit.report.drawing import inline
 from profilefit.report.figures.fit_figures import RINGS, SPOT
 from profilefit.report.page.document import document
-from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
+from profilefit.report.page.markup import command, details, element, markup, paragraph
+from profilefit.report.page.sections import EvidenceFolder
 from profilefit.report.tables.fit_tables import photo_lines, photo_tables
 from profilefit.shader.law_file import export_medium
 
-MOST_DRAWING = 2**24  # bytes
 TITLE = "A medium, by photographs of a laser spot"
 LEAD = "What scatters and absorbs behind a spot of light, colour by colour, from a bracket of its photographs."
 DRAWN = {
@@ -61,19 +59,15 @@ def photo_page(photo: Photo, folder: Path, text: str) -> str:
     """Return the page as HTML that needs no other file; `folder` holds the drawings, text is that of the shader."""
     at = f"--n {photo.setting.n:g} --g {photo.setting.g:g}"
     exports = f"profilefit export hazard-diffuse {at} --lang hlsl", f"profilefit export hazard {at}"
+    drawings = EvidenceFolder(folder, fits_folder())
     head, shown = f"medium.glsl, {len(text.splitlines())} lines", element("code", escape(text))
     shown = element("pre", shown, tabindex="0")
     parts = {
         "medium": ("The medium", "\n".join([*map(markup, photo_tables(photo)), *map(paragraph, photo_lines(photo))])),
-        "spot": ("The spot", _drawing(folder, SPOT, on_paper=True)),
-        "fit": ("The fit", _drawing(folder, RINGS)),
+        "spot": ("The spot", drawings.drawing(SPOT, DRAWN[SPOT], on_paper=True)),
+        "fit": ("The fit", drawings.drawing(RINGS, DRAWN[RINGS])),
         "shader": ("For a shader", paragraph(SHADER) + command("\n".join(exports)) + details(head, shown)),
     }
     shots = len(photo.shot.sources)
     summary = f"{shots} exposure{'s' if shots != 1 else ''} from {photo.shot.sources[0]} on, profilefit {__version__}."
     return document(TITLE, LEAD, summary, parts)
-
-
-def _drawing(folder: Path, name: str, on_paper: bool = False) -> str:
-    svg = read_whole(folder / f"{name}.svg", MOST_DRAWING).decode("utf-8")
-    return figure(inline(svg, name, DRAWN[name]), DRAWN[name], on_paper)

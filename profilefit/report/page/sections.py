@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -91,14 +91,14 @@ def _drawn(plan: plots.Plan, source: Source) -> str:
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
     title = CAPTIONS.get(plan.name) or CAPTIONS[plan.name.split("-")[0]]
-    return _drawing(plan.name, lambda out: plan.drawn(source, out), title)
+    return _drawing(plan, source, title)
 
 
-def _drawing(name: str, draw: Callable[[Path], list[Path]], title: str) -> str:
-    """Return the figure `name` that `draw` writes into a folder."""
+def _drawing(plan: plots.Plan, source: Source, title: str) -> str:
+    """Return the figure of a plan, all of whose records are there."""
     with tempfile.TemporaryDirectory() as folder, only("svg"):
-        (file,) = draw(Path(folder))
-        return figure(inline(file.read_text(encoding="utf-8"), name, title), title)
+        (file,) = plan.drawn(source, Path(folder))
+        return figure(inline(file.read_text(encoding="utf-8"), plan.name, title), title)
 
 
 def whole_figure(source: Source, name: str) -> str:
@@ -140,10 +140,13 @@ class EvidenceFolder:
     folder: Path
     records: Path
 
-    def section(self, name: str, parts: Callable[[EvidenceFolder], Iterator[str]]) -> str:
+    def section(self, name: str, parts: Callable[[EvidenceFolder, Content], Iterator[str]]) -> str:
         """Return the parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
+        missing = paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")
         try:
-            return "\n".join(parts(self))
+            content = self.content(name)
+            shown: Iterable[str] = [missing] if content is None else parts(self, content)
+            return "\n".join([*shown, *_pictures(self, RENDERS if name == "check" else {})])
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
             expected = f"{self.folder / name}.json: expected what `profilefit {name} --out` writes"
             raise InputError(f"{expected}, got {type(error).__name__}: {error}") from error
@@ -187,10 +190,6 @@ class EvidenceFolder:
         return "\n".join(parts)
 
 
-def _missing(name: str) -> str:
-    return paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")
-
-
 # `python -m benchmarks.render` makes them.
 RENDERS = {
     "render-laws.png": "A head by the exact profile, four laws and the separable filter, and how far each is off.",
@@ -223,13 +222,6 @@ MEANING = (
 COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
 
 
-def shader(evidence: EvidenceFolder) -> Iterator[str]:
-    """Yield the parts of its section."""
-    content = evidence.content("check")
-    yield _missing("check") if content is None else "\n".join([evidence.origin(content), *_check(content)])
-    yield from _pictures(evidence, RENDERS)
-
-
 def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section: records of stacks, sums of Gaussians, pictures; none without a record."""
     table = None if source.names else stack_table(source.folder)
@@ -237,13 +229,15 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
         return
     yield markup(table)
     if sums := plots.sums_of(source.folder):
-        yield _drawing(plots.OF_SUMS, lambda out: plots.sum_figure(source, out), plots.sum_caption(sums))
+        yield _drawing(plots.Plan(plots.OF_SUMS, (), (), plots.sum_figure), source, plots.sum_caption(sums))
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     yield from _pictures(evidence, OF_LAYERS)
 
 
-def _check(content: Content) -> Iterator[str]:
+def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
+    """Yield the parts of its section."""
+    yield evidence.origin(content)
     counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
@@ -286,12 +280,8 @@ CHARTS = {
 }
 
 
-def speed(evidence: EvidenceFolder) -> Iterator[str]:
+def speed(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     """Yield the parts of its section."""
-    content = evidence.content("tradeoff")
-    if content is None:
-        yield _missing("tradeoff")
-        return
     for name, title in CHARTS.items():
         if name in content:
             # Parts may have been measured on different days.
@@ -319,12 +309,8 @@ ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
-def failures(evidence: EvidenceFolder) -> Iterator[str]:
+def failures(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     """Yield the parts of its section."""
-    content = evidence.content("stability")
-    if content is None:
-        yield _missing("stability")
-        return
     yield evidence.origin(content)
     yield paragraph(HOLDS[bool(content["passed"])], "bold")
     aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == Verdict.NOT_JUDGED.words)

@@ -13,11 +13,12 @@ from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, row_table, significant
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.shader.check.chosen import REGENERATED, checked, chosen
+from profilefit.shader.check.chosen import REGENERATED, Checked, checked, chosen
 from profilefit.shader.check.dense_grid import ShaderCheck
 from profilefit.shader.check.law_check import HALVES, JUDGED, OWN, HalfCheck, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
 
+Group = tuple[str, tuple[str, ...], Sequence[ShaderCheck]]
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
 MAP_COLUMNS = ("A\nmodel", "A\nfloat32", "α\nmodel", "α\nfloat32")
@@ -36,20 +37,30 @@ COST_CAPTION = (
 HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16 alone, worst of 24 albedos, l = 1"
 
 
-def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
-    """Return a line a law and a line a map."""
+def check_tables(found: Checked, in_detail: bool = False) -> list[RenderableType]:
+    """Return a line a law and a line a map, costs and half precision; `in_detail` each law's errors as well."""
     parts: list[RenderableType] = []
-    for kind, names, checks in (("law", LAW_COLUMNS, laws), ("map", MAP_COLUMNS, maps)):
-        if checks:
-            has_g = any(one.of.setting.g for one in checks)
-            header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
-            rows = [(one.of.label, *_setting(one.of)[1 : 2 + has_g], *_cells(one)) for one in checks]
-            title, caption = f"{kind.capitalize()}s in float32, {device}", CAPTION if kind == "law" else ""
-            parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
-    return parts
+    for kind, names, checks in _groups(found):
+        has_g = any(one.of.setting.g for one in checks)
+        header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
+        rows = [(one.of.label, *_setting(one.of)[1 : 2 + has_g], *_cells(one)) for one in checks]
+        title, caption = f"{kind.capitalize()}s in float32, {found.device}", CAPTION if kind == "law" else ""
+        parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
+    parts += _place_tables(found.laws) if in_detail else []
+    if found.costs:
+        title, header = f"Cost of one evaluation, {found.device}", ("source", *WORKS)
+        parts.append(row_table(title, header, _cost_rows(found.costs), COST_CAPTION, left=("source",)))
+    return [*parts, *([_half_table(found.halves)] if found.halves else [])]
 
 
-def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
+def _groups(found: Checked) -> list[Group]:
+    """Return laws and maps, each with their name and the headers of their errors, as far as there are any."""
+    laws: Group = ("law", LAW_COLUMNS, found.laws)
+    maps: Group = ("map", MAP_COLUMNS, found.maps)
+    return [group for group in (laws, maps) if group[2]]
+
+
+def _place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
     """Return the distribution of each law's errors, and where the largest is; below the GPU's beside the record's."""
     parts: list[RenderableType] = []
     for one in laws:
@@ -64,18 +75,12 @@ def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
     return parts
 
 
-def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
-    """Return a row for each source."""
-    title = f"Cost of one evaluation, {device}"
-    return row_table(title, ("source", *WORKS), _cost_rows(costs), COST_CAPTION, left=("source",))
-
-
 def _cost_rows(costs: Mapping[str, Cost]) -> list[tuple[str, ...]]:
     works = {name: [(cost.ns[work], cost.ratio[work]) for work in WORKS] for name, cost in costs.items()}
     return [(name, *(f"{significant(ns)} ({ratio:.2f})" for ns, ratio in each)) for name, each in works.items()]
 
 
-def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
+def _half_table(checks: Sequence[HalfCheck]) -> RenderableType:
     """Return a line a law, a column for each thing that is stored in float16."""
     stored = [name for name in HALVES if any(name in one.rel for one in checks)]
     rows = []
@@ -97,41 +102,32 @@ def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
 def markdown_check(folder: Path) -> str:
     """Return the README's tables: all regenerated laws, and Liang et al.'s printed ones. ShaderError without OpenGL."""
     regenerated, printed = chosen((), REGENERATED, folder), chosen(("liang",), "published", folder)
-    results = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
-    return markdown_checks(results.laws, results.maps, results.costs, results.device)
+    return markdown_checks(checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder))
 
 
-def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
+def markdown_checks(found: Checked) -> str:
     """Return the README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
-    for kind, names, group in (("law", LAW_COLUMNS, laws), ("map", MAP_COLUMNS, maps)):
-        if group:
-            header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
-            rows = [(one.of.label, *_setting(one.of), *_cells(one)) for one in group]
-            parts.append(markdown_table(header, rows))
-    if broken := [f"- `{_called(one)}`: {bound}" for one in (*laws, *maps) for bound in one.broken]:
+    for kind, names, checks in _groups(found):
+        header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
+        parts.append(markdown_table(header, [(one.of.label, *_setting(one.of), *_cells(one)) for one in checks]))
+    if broken := [f"- `{_called(one)}`: {bound}" for one in found.checks for bound in one.broken]:
         parts.append("\n".join(broken))
-    if costs:
-        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(costs)))
-    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if costs else [])]
-    return "\n\n".join([*parts, f"On {device}. {'. '.join(captions)}."])
+    if found.costs:
+        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(found.costs)))
+    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if found.costs else [])]
+    return "\n\n".join([*parts, f"On {found.device}. {'. '.join(captions)}."])
 
 
-def content(
-    laws: Sequence[LawCheck],
-    maps: Sequence[MapCheck],
-    costs: Mapping[str, Cost],
-    halves: Sequence[HalfCheck],
-    device: str,
-) -> dict[str, Any]:
+def content(found: Checked) -> dict[str, Any]:
     """Return all checks as plain numbers and text, for --json; null stands for what is not finite."""
     whole = {
-        "device": device,
-        "passed": not any(one.broken for one in (*laws, *maps)),
-        "laws": [{**_check_content(one), "spreads": one.spreads} for one in laws],
-        "maps": [_check_content(one) for one in maps],
-        "costs": dict(costs),
-        "float16": {_at_index(one.of): {"rel": one.rel, "ks": one.ks} for one in halves},
+        "device": found.device,
+        "passed": not found.is_broken,
+        "laws": [{**_check_content(one), "spreads": one.spreads} for one in found.laws],
+        "maps": [_check_content(one) for one in found.maps],
+        "costs": found.costs,
+        "float16": {_at_index(one.of): {"rel": one.rel, "ks": one.ks} for one in found.halves},
     }
     return dict(plain(whole))
 

@@ -152,8 +152,7 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
         )
     yield from _goodness(result)
     for one in fit.rivals:  # other media that explain the data as well
-        values = rival_values(fit, one)
-        told = ", ".join(f"{name} {values[name]:.3g} {unit_of(name, fit.data.unit)}".rstrip() for name in RIVALLED)
+        told = _words(rival_values(fit, one), RIVALLED, fit.data.unit)
         yield (
             f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
             "both: measure nearer to the beam, or the total reflectance, or the scale"
@@ -176,6 +175,11 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
         yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
     if result.walk is not None and result.walk.result != "converged":
         yield f"posterior: {result.walk.result}"
+
+
+def _words(values: Mapping[str, float], names: Sequence[str], unit: str) -> str:
+    """Return values with their units, where lengths are in `unit`."""
+    return ", ".join(f"{name} {values[name]:.3g} {unit_of(name, unit)}".rstrip() for name in names)
 
 
 def p_value(value: float) -> str:
@@ -286,7 +290,7 @@ def _medium(result: MediumPosterior) -> Iterator[str]:
     if there is not None:
         names, settings = spec.assumed, (spec.law.setting, there.setting)
         here, other = (" and ".join(f"{name} = {getattr(one, name):g}" for name in names) for one in settings)
-        told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
+        told = _words(there.values, RIVALLED[:2], unit)
         yield (
             f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
             f"chi-square {there.rise:+.1f}: give {' and '.join(f'`{name}`' for name in names)}, or a range"
@@ -404,7 +408,6 @@ def layers_content(fit: LayersFit) -> dict[str, Any]:
 # Photographs of a spot
 
 MEDIUM = ("mu_s'", "mu_a", "alpha", "l", "A")
-UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm", "A": ""}
 REMEDY = "photograph cards, or expose longer"
 CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
 
@@ -418,7 +421,7 @@ def photo_tables(photo: Photo) -> list[RenderableType]:
             best = photo.bounds[colour].get(name)
             rows.append((
                 colour if name == MEDIUM[0] else "", name, to_error(value, error), significant(error),
-                cells.interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+                cells.interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", unit_of(name, "mm"),
             ))  # fmt: skip
     title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
     caption = (
@@ -452,7 +455,7 @@ def photo_lines(photo: Photo) -> Iterator[str]:
         if not fit.converged:
             yield f"{colour}: NO ANSWER: {fit.result}"
         for one in fit.rivals:
-            values = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in (*MEDIUM[:2], "A"))
+            values = _words(one.values, (*MEDIUM[:2], "A"), "mm")
             yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {values}; chi-square {one.chi2 - fit.chi2:+.1f}"
         for name in MEDIUM[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:

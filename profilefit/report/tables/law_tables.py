@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import chain, groupby
+from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,11 +61,11 @@ class MeasuredSampler:
 
 def for_each(
     measure: Callable[[LoadedLaw], Measured], laws: Sequence[LoadedLaw], track: Track | None = None, title: str = ""
-) -> list[Measured]:
+) -> list[tuple[LoadedLaw, Measured]]:
     """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         results = pool.map(measure, laws)
-        return list(track(results, title, len(laws)) if track else results)
+        return list(zip(laws, track(results, title, len(laws)) if track else results, strict=True))
 
 
 def measured_samplers(named: LoadedLaw, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
@@ -166,11 +166,7 @@ def measured(
     qualities = for_each(lambda one: profile_quality(one.law, alpha), profiles, track, "profiles")
     of_maps = for_each(lambda one: albedo_quality(one.law), maps, track, "maps")
     samplers = for_each(lambda one: measured_samplers(one, sampled_alpha), sampled, track, "samplers")
-    return Qualities(
-        profiles=list(zip(profiles, qualities, strict=True)),
-        maps=list(zip(maps, of_maps, strict=True)),
-        samplers=list(chain.from_iterable(samplers)),
-    )
+    return Qualities(qualities, of_maps, [one for _, of_law in samplers for one in of_law])
 
 
 def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
@@ -225,8 +221,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
     def laws() -> str:
         profiles = profile_laws(folder, matched=False)
-        qualities = for_each(lambda one: profile_quality(one.law, ALBEDOS), profiles)
-        return markdown_laws(list(zip(profiles, qualities, strict=True)))
+        return markdown_laws(for_each(lambda one: profile_quality(one.law, ALBEDOS), profiles))
 
     check, claims = (lambda: markdown_check(folder)), (lambda: markdown_claims(folder / EVIDENCE))
     return {"laws": laws, "check": check, "claims": claims}

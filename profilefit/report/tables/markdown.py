@@ -72,7 +72,7 @@ def _hazard(contents: Mapping[str, Content]) -> str:
             of = [content["constants"][name] for content in alike.values()]
             rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
         for measure in ("rel", "ks"):
-            worst_of = (records.regenerated_worst(content, measure) for content in alike.values())
+            worst_of = (records.worst(content, "regenerated", measure) for content in alike.values())
             rows.append((f"{measure}, worst", *map(significant, worst_of)))
         tables.append(markdown_table(("constant", *alike), rows))
     return "\n\n".join(tables)
@@ -155,10 +155,10 @@ def _measured(contents: Mapping[str, Content], measure: str) -> list[tuple[str, 
     """Return (record or law, set, measures) of each set once, printed constants of a law only once."""
     sets: dict[tuple[str, str], Content] = {}
     for name, content in _fits(contents).items():
-        for which in records.measured_sets(content):
-            regenerated = which == "regenerated"
-            owner = name if regenerated else f"{content['law']}{' map' if records.measures(content, 'delta_A') else ''}"
-            if measure in content["quality"][which] and (converged(content) or not regenerated):
+        for which in records.judged_sets(content):
+            law = f"{content['law']}{' map' if records.measures(content, 'delta_A') else ''}"
+            owner = name if which == "regenerated" else law
+            if measure in content["quality"][which]:
                 sets.setdefault((owner, which), content["quality"][which])
     return [(*place, values) for place, values in sets.items()]
 

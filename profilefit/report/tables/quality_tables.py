@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,8 @@ from rich.console import RenderableType
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.recipes.record import SPANS
-from profilefit.report.records import Content, at_index, by_index, converged, measured_sets, measures, regenerated_worst
+from profilefit.report import records
+from profilefit.report.records import Content, at_index, by_index, converged, measured_sets, measures
 from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
 
 SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
@@ -38,18 +38,9 @@ def values_of(content: Content, measure: str) -> list[float] | None:
 
 
 def worst_measures(content: Content) -> dict[str, dict[str, float]]:
-    """Measure -> set of constants -> its worst over alpha, and over n where a record spans indices.
-
-    A failed fit has no regenerated law to measure.
-    """
-    quality = content["quality"]
-    names = [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
-    keys = [key for key in (*OF_PROFILE, "delta_A", "largest_s") if key in quality["regenerated"]]
-    worst: dict[str, dict[str, float]] = {key: {} for key in keys}
-    for key, name in product(keys, names):
-        is_law = name == "regenerated"
-        worst[key][name] = regenerated_worst(content, key) if is_law else MEASURES[key].worst(quality[name][key])
-    return worst
+    """Measure -> set of constants -> its worst over alpha, and over n where a record spans indices."""
+    keys = [key for key in (*OF_PROFILE, "delta_A", "largest_s") if measures(content, key)]
+    return {key: {name: records.worst(content, name, key) for name in records.judged_sets(content)} for key in keys}
 
 
 def spark_table(content: Content) -> list[RenderableType]:

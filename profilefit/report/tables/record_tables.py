@@ -250,12 +250,9 @@ def evidence_tables(content: Content) -> list[RenderableType]:
     if content["table1"]:
         parts.append(_table1(content["table1"]))
     if halves := content.get("halves"):
-        columns = {
-            "material": [f"{row.get('material', ABSENT)}, {row.get('model', '')}" for row in halves],
-            "off": [_share(row.get("off")) for row in halves],
-        }
+        lines = [(f"{row.get('material', ABSENT)}, {row.get('model', '')}", _share(row.get("off"))) for row in halves]
         title = "Table 1 as printed: mean of its halves over its whole, less 1"
-        parts.append(column_table(title, columns, left=("material",)))
+        parts.append(row_table(title, ("material", "off"), lines, left=("material",)))
     return parts or [Text("This record holds no readings.")]
 
 
@@ -283,21 +280,18 @@ def _table1(rows: list[Content]) -> RenderableType:
         best = min(known, key=lambda row: abs(log(_ratio(row)[-1])) if _ratio(row) else inf, default=None)
         of_best = ("channel", "range_choice", "range_mm")
         shown += [row for row in group if best is None or all(row.get(key) == best.get(key) for key in of_best)]
-    ranges = [f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT for row in shown]
-    columns = {
-        "material": [
-            f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {size}"
-            for row, size in zip(shown, ranges, strict=True)
-        ],
-        "model": [row.get("model", ABSENT) for row in shown],
-    }
-    for place, part in enumerate(("near half", "far half", "all")):
-        columns[part] = [significant(ratio[place], 3) if place < len(ratio) else ABSENT for ratio in map(_ratio, shown)]
+    lines = []
+    for row in shown:
+        size = f"{row['range_mm']:g} mm" if "range_mm" in row else ABSENT
+        material = f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {size}"
+        ratios = [*(significant(ratio, 3) for ratio in _ratio(row)), *[ABSENT] * 3]
+        lines.append((material, row.get("model", ABSENT), *ratios[:3]))
     caption = (
         f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
         "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
     )
-    return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model",))
+    header = ("material", "model", "near half", "far half", "all")
+    return row_table("Table 1 redone", header, lines, caption, left=("material",), fold=("model",))
 
 
 def _ratio(row: Content) -> list[float]:
@@ -359,11 +353,8 @@ def summary(contents: Records) -> RenderableType:
             lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
         columns = {"record": list(readings), "found": lines}
         shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
-    failures = [
-        Text(f"{name}: {content['fit']['result']}", style="red")
-        for name, content in contents.items()
-        if "fit" in content and not converged(content)
-    ]
+    failed = {name: content["fit"]["result"] for name, content in contents.items() if "fit" in content}
+    failures = [Text(f"{name}: {text}", style="red") for name, text in failed.items() if text != "converged"]
     parts = [part for table in shown for part in (table, Text())]
     return Group(*parts, *failures, Text(CAPTION, style="dim"))
 
@@ -371,11 +362,9 @@ def summary(contents: Records) -> RenderableType:
 def _summary_table(measure: str, contents: Records) -> RenderableType:
     """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
     title, headers = SUMMARIES[measure]
-    spans = [content.get("indices") for content in contents.values()]
-    numbers = [f"{content['setting']['n']:g}" for content in contents.values()]
     columns = {
         "record": list(contents),
-        "n": [f"≤ {ends[1]:g}" if ends else n for ends, n in zip(spans, numbers, strict=True)],
+        "n": [f"≤ {c['indices'][1]:g}" if c.get("indices") else f"{c['setting']['n']:g}" for c in contents.values()],
         "photons": [truth(content).removesuffix(" photons") for content in contents.values()],
         **{header: [_course(content, key) for content in contents.values()] for header, key in headers.items()},
     }

@@ -155,8 +155,8 @@ def regions_csv(parts: Iterable[Findings]) -> str:
 def fits_csv(fits: Sequence[FitCase]) -> str:
     """Return every case of fits as CSV, a line each."""
     values = attrgetter("subject", "case", "value", "converged", "best", "spread", "worst")
-    results = ("; ".join(f"{count} {kind}" for kind, count in one.results) for one in fits)
-    return _csv(FIT_COLUMNS, ((*values(one), text) for one, text in zip(fits, results, strict=True)))
+    rows = ((*values(one), "; ".join(f"{count} {kind}" for kind, count in one.results)) for one in fits)
+    return _csv(FIT_COLUMNS, rows)
 
 
 def content(parts: Sequence[Findings]) -> dict[str, Any]:

@@ -46,20 +46,19 @@ ENDS = {"": "value", "_low": "low", "_high": "high"}
 
 def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
     """Return a table a panel; under the last one what was left out, and what is not in the times."""
-    return [_table(part, panel, part.notes if panel is part.panels[-1] else ()) for panel in part.panels]
-
-
-def _table(part: TradeoffPart, panel: Panel, notes: Sequence[str]) -> RenderableType:
-    points = panel.points
-    columns = point_columns(list(map(asdict, points)), panel.cost.split("[")[1].rstrip("]"))
-    if any("standardised" in p.facts for p in points):
-        columns["distance"] = [significant(float(p.facts["standardised"])) for p in points]
-    columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
-    caption = f"cost: {panel.cost}; error: {panel.error}".replace("$", "")
-    if "distance" in columns:
-        caption += "; distance: of the constants from their noise-free limit, in their standard errors"
-    title = f"{part.name}, {panel.title}".replace("$", "")
-    return column_table(title, columns, "\n".join((caption, *notes)), left=("", "stands"))
+    tables: list[RenderableType] = []
+    for panel in part.panels:
+        points = panel.points
+        columns = point_columns(list(map(asdict, points)), panel.cost.split("[")[1].rstrip("]"))
+        if any("standardised" in p.facts for p in points):
+            columns["distance"] = [significant(float(p.facts["standardised"])) for p in points]
+        columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
+        caption = f"cost: {panel.cost}; error: {panel.error}".replace("$", "")
+        if "distance" in columns:
+            caption += "; distance: of the constants from their noise-free limit, in their standard errors"
+        notes = "\n".join((caption, *(part.notes if panel is part.panels[-1] else ())))
+        tables.append(column_table(f"{part.name}, {panel.title}".replace("$", ""), columns, notes, left=("", "stands")))
+    return tables
 
 
 def point_columns(points: Sequence[Mapping[str, Any]], cost: str = "cost") -> dict[str, list[str]]:

@@ -1,7 +1,6 @@
 """Every law that loads, once, under its own light; and the tables that say how good each is."""
 
 import json
-import shutil
 from dataclasses import fields
 
 import numpy as np
@@ -15,6 +14,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import albedo_laws, profile_laws, sampled_laws
 from profilefit.report.tables import law_tables as tables
 from profilefit.report.tables.law_tables import every_law, measured, measured_samplers
+from tests.unit.report.test_figures import folder_with
 from tests.unit.report.test_tables import parsed, rendered
 
 FITS = catalogue.fits_folder()
@@ -24,9 +24,7 @@ ALPHA = np.array([0.3, 0.9])
 @pytest.fixture
 def folder(tmp_path):
     """A folder with two records."""
-    for name in ("burley-whole", "albedo-rational"):
-        shutil.copy(FITS / f"{name}.json", tmp_path)
-    return tmp_path
+    return folder_with(tmp_path, "burley-whole", "albedo-rational")
 
 
 def printed(parts, width=100) -> list[str]:
@@ -109,8 +107,8 @@ def test_of_two_xi_that_draw_one_radius_the_one_meant_counts():
 
 def test_markdown_has_a_line_a_law(folder):
     laws = profile_laws(folder, ["burley-whole"])
-    [quality] = tables.for_each(lambda one: profile_quality(one.law, ALPHA), laws)
-    [[cells]] = parsed(tables.markdown_laws([(laws[0], quality)]))
+    [(law, quality)] = tables.for_each(lambda one: profile_quality(one.law, ALPHA), laws)
+    [[cells]] = parsed(tables.markdown_laws([(law, quality)]))
     home = tuple(cells[key] for key in ("law", "constants", "light", "n", "number"))
     assert home == ("burley", "burley-whole", "searchlight", "1", "4")
     assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)

@@ -3,6 +3,7 @@
 from profilefit.recipes import catalogue
 from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
+from profilefit.shader.check.chosen import Checked
 from profilefit.shader.check.dense_grid import Count, Spread
 from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck, MapCheck
 from profilefit.shader.check.law_cost import WORKS, Cost
@@ -28,12 +29,16 @@ def mapped(*bounds):
     return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, NONE, Count(0, 0, 0, 7), bounds, {})
 
 
+def found(*laws, costs=COSTS):
+    return Checked(list(laws), [mapped(GOOD)], costs, [], "a device", "")
+
+
 def test_a_line_a_law_says_whether_it_passes():
     """A record that says nothing of the sampler shows nothing of it."""
     silent = law(GOOD)
     del silent.spreads[SAMPLE], silent.spreads[OWN]
     laws = [law(GOOD), law(GOOD, BAD), silent]
-    text = rendered(check_tables.check_tables(laws, [mapped(GOOD)], "a device"), 100)
+    text = rendered(check_tables.check_tables(found(*laws)), 100)
     rows = [line.split() for line in text.splitlines() if "-refracting" in line]
     assert " ".join(rows[0]) == "hazard-refracting 1.4 0.049 1.0e-06 0.0096 2.0e-07 4.0e-07 2.0e-07 0 0 pass"
     assert rows[1][-1] == "FAIL"
@@ -52,7 +57,7 @@ def test_broken_bounds_are_lines_that_say_where_and_by_how_much():
 
 
 def test_the_readme_has_laws_maps_broken_bounds_and_costs():
-    text = check_tables.markdown_checks([law(GOOD, BAD)], [mapped(GOOD)], COSTS, "a device")
+    text = check_tables.markdown_checks(found(law(GOOD, BAD)))
     laws, maps, broken, costs, device = text.split("\n\n")
     assert laws.splitlines()[2].split()[1:8:2] == ["hazard-refracting", "searchlight", "1.4", "0"]
     assert maps.splitlines()[2].split()[-2:] == ["pass", "|"]
@@ -66,14 +71,14 @@ def test_the_readme_has_laws_maps_broken_bounds_and_costs():
 def test_costs_fit_into_100_columns():
     """Of the longest name, and a ratio as on a software rasteriser."""
     costs = {"burley_diffuse_mfp": Cost(dict.fromkeys(WORKS, 123.0), dict.fromkeys(WORKS, 12.25))}
-    text = rendered([check_tables.cost_table(costs, "a device")], 100)
+    text = rendered(check_tables.check_tables(found(costs=costs)), 100)
     (row,) = (line.split() for line in text.splitlines() if line.startswith("burley_diffuse_mfp"))
     assert row == ["burley_diffuse_mfp", *["123", "(12.25)"] * len(WORKS)]
 
 
 def test_json_takes_numbers_and_text_only():
-    found = check_tables.content([law(BAD)], [mapped(GOOD)], COSTS, [], "a device")
-    assert found["passed"] is False
-    assert found["laws"][0]["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
-    assert found["laws"][0]["broken"] == [str(BAD)]
-    assert found["costs"]["hazard"]["ratio"]["both"] == 2.5
+    told = check_tables.content(found(law(BAD)))
+    assert told["passed"] is False
+    assert told["laws"][0]["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
+    assert told["laws"][0]["broken"] == [str(BAD)]
+    assert told["costs"]["hazard"]["ratio"]["both"] == 2.5

@@ -12,10 +12,8 @@ import pytest
 from profilefit.errors import OutputError, RecordError
 from profilefit.fitting.discrepancy import LawWithErrors
 from profilefit.recipes import catalogue
-from profilefit.report import draw_all
-from profilefit.report.figures import record_figures
 from profilefit.report.figures.canvas import only
-from profilefit.report.figures.record_figures import PAPER, corner_figure, energy_within, plans
+from profilefit.report.figures.record_figures import PAPER, draw_all, energy_within, plans, residual_figure
 from profilefit.report.records import DRAWS, Source, coefficients
 
 pytestmark = pytest.mark.slow
@@ -43,7 +41,7 @@ def drawn(source, tmp_path_factory):
     out = tmp_path_factory.mktemp("figures")
     before = dict(matplotlib.rcParams)
     chosen = [plan for plan in plans(source) if plan.name in EACH_KIND]
-    files = [file for plan in chosen for file in plan.draw(source, out, name=plan.name)]
+    files = [file for plan in chosen for file in plan.drawn(source, out)]
     return files, before, dict(matplotlib.rcParams)
 
 
@@ -72,7 +70,7 @@ def test_the_dear_ones_are_whole_too(source, tmp_path):
     assert {*DEAR, *EACH_KIND} >= {plan.name for plan in PAPER if plan.name != "liang-15-c"}
     chosen = [plan for plan in plans(source) if plan.name in DEAR]
     assert len(chosen) == len(DEAR)
-    require_whole([file for plan in chosen for file in plan.draw(source, tmp_path, name=plan.name)])
+    require_whole([file for plan in chosen for file in plan.drawn(source, tmp_path)])
 
 
 def require_whole(files):
@@ -92,11 +90,11 @@ def test_svg_carries_text_and_no_date_and_is_the_same_twice_and_one_format_may_b
     assert b">gaussians-4</text>" in first["quality"]
     again = {plan.name: plan for plan in plans(source) if plan.name in AGAIN}
     for name, plan in again.items():
-        plan.draw(source, tmp_path, name=name)
+        plan.drawn(source, tmp_path)
         assert (tmp_path / f"{name}.svg").read_bytes() == first[name]
     with only("svg"):
-        assert again[SMALL_CORNER].draw(source, tmp_path / "one", name="one") == [tmp_path / "one" / "one.svg"]
-    assert [file.name for file in (tmp_path / "one").iterdir()] == ["one.svg"]
+        files = again[SMALL_CORNER].drawn(source, tmp_path / "one")
+    assert list((tmp_path / "one").iterdir()) == files == [tmp_path / "one" / f"{SMALL_CORNER}.svg"]
 
 
 def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
@@ -108,8 +106,9 @@ def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
 
 
 def test_a_corner_of_many_constants_shows_the_most_correlated(source, tmp_path):
+    (plan,) = (plan for plan in plans(source) if plan.name == "corner-hazard-refracting")
     with only("svg"):
-        (file,) = corner_figure("hazard-refracting", source, tmp_path)
+        (file,) = plan.drawn(source, tmp_path)
     svg, samples = file.read_text(encoding="utf-8"), source.needed("hazard-refracting").arrays["samples_misfit"]
     names = source.content("hazard-refracting")["covariance"]["names"]
     shown = [name for name in names if f">{name}</text>" in svg]
@@ -129,13 +128,9 @@ def test_residuals_of_a_profile_are_those_of_its_rings(source):
 
 
 @pytest.mark.parametrize("name", ["albedo-rational-forward", "albedo-rational-diffuse-forward"])
-def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name, tmp_path):
+def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name):
     """Its error is 2.9e-3 at worst; taken for the medium's own, albedos that are reduced leave .35."""
-    figures = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(record_figures, "save", lambda figure, *_: figures.append(figure) or [])
-        record_figures.residual_figure(name, source, tmp_path)
-    [ax] = figures[0].axes
+    [ax] = residual_figure(name, source).axes
     left = np.asarray(ax.lines[0].get_ydata(), float)
     assert left.size > 20
     assert 1e-4 < np.max(np.abs(left)) < 3e-3

@@ -1,36 +1,29 @@
 """The error map of inverse cdfs: what it draws, and what its caption reads off the records."""
 
-import json
-import shutil
-from itertools import product
-
 import numpy as np
 import pytest
 
-from profilefit.recipes import catalogue
 from profilefit.report.figures import paper_figures as figures
 from profilefit.report.figures.canvas import canvas
+from profilefit.report.figures.record_figures import PAPER
 from profilefit.report.records import Source
-
-SHIPPED = catalogue.fits_folder()
+from tests.unit.report.test_figures import folder_with
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def source(tmp_path_factory):
     """The paper's inverse and one other, the printed one with errors that a reader can check."""
-    folder = tmp_path_factory.mktemp("records")
-    for name, kind in product(("liang-inverse-whole", "quantile"), ("json", "npz")):
-        shutil.copy(SHIPPED / f"{name}.{kind}", folder)
-    content = json.loads((folder / "liang-inverse-whole.json").read_text())
-    content["quality"]["alpha"] = [0.1, 0.3, 0.5, 0.8, 0.9]
-    for which in ("published", "regenerated"):
-        content["quality"][which]["inversion_error"] = [0.04, 0.02, 0.07, 0.05, 0.083]
-    (folder / "liang-inverse-whole.json").write_text(json.dumps(content))
-    return folder
+
+    def edit(content):
+        if content["law"] == "liang":
+            content["quality"]["alpha"] = [0.1, 0.3, 0.5, 0.8, 0.9]
+            for which in ("published", "regenerated"):
+                content["quality"][which]["inversion_error"] = [0.04, 0.02, 0.07, 0.05, 0.083]
+
+    return Source(folder_with(tmp_path_factory.mktemp("inverses"), "liang-inverse-whole", "quantile", edit=edit))
 
 
-def test_caption_says_where_the_printed_inverse_is_worst_and_lines_are_the_records_own_numbers(folder):
-    source = Source(folder)
+def test_caption_says_where_the_printed_inverse_is_worst_and_lines_are_the_records_own_numbers(source):
     caption = figures.inversion_caption(source)
     assert "up to 0.07 for α in [0.4, 0.6]" in caption
     assert caption.endswith("0.04 at α = 0.1, 0.083 at α = 0.9")
@@ -45,6 +38,7 @@ def test_caption_says_where_the_printed_inverse_is_worst_and_lines_are_the_recor
     assert np.all(error <= 1e-3)
 
 
-def test_it_is_drawn_without_the_records_that_it_only_uses(folder, tmp_path):
-    files = figures.inversion_figure(Source(folder), tmp_path)
+def test_it_is_drawn_without_the_records_that_it_only_uses(source, tmp_path):
+    (plan,) = (plan for plan in PAPER if plan.name == "inversion-error")
+    files = plan.drawn(source, tmp_path)
     assert {file.name for file in files} == {"inversion-error.png", "inversion-error.svg"}

@@ -15,8 +15,8 @@ from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.kinds.stack import interfaces, read
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
-from profilefit.report.figures.record_figures import sum_caption, sum_figure, sums_of
-from profilefit.report.kinds import TABLES, published, stack_tables, sum_sections, sum_tables
+from profilefit.report.figures.record_figures import OF_SUMS, plans, sum_caption, sums_of
+from profilefit.report.kinds import TABLES, published, stack_tables, sum_tables
 from profilefit.report.page.sections import EvidenceFolder, layers
 from profilefit.report.records import Source
 from profilefit.scenes.skin.law import D_EON
@@ -171,21 +171,23 @@ def test_the_caption_has_the_numbers_of_the_records():
 
 @pytest.mark.slow
 def test_the_figure_is_whole(tmp_path):
-    files = sum_figure(Source(fits_folder()), tmp_path)
+    source = Source(fits_folder())
+    (plan,) = (plan for plan in plans(source) if plan.name == OF_SUMS)
+    files = plan.drawn(source, tmp_path)
     assert [file.name for file in files] == ["gaussians-of-stacks.png", "gaussians-of-stacks.svg"]
     require_whole(files)
     svg = files[1].read_text(encoding="utf-8")
     assert all(f">{name}</text>" in svg for name in FOUND)
-    again = sum_figure(Source(fits_folder()), tmp_path / "again")
+    again = plan.drawn(source, tmp_path / "again")
     assert again[1].read_bytes() == files[1].read_bytes()
 
 
 def test_the_guide_has_the_numbers_of_the_records():
     """`profilefit report --markdown docs/guide/layered.md` fills its table; the prose below says what it shows."""
-    sections = sum_sections(record.available(fits_folder() / SUMS))
+    sections = TABLES["gaussians"].sections(record.available(fits_folder() / SUMS), fits_folder())
     text = GUIDE.read_text(encoding="utf-8")
     assert f"<!-- stack-gaussians -->\n{sections['stack-gaussians']()}\n<!-- /stack-gaussians -->" in text
-    assert sum_sections({}) == {}
+    assert TABLES["gaussians"].sections({}, fits_folder()) == {}
     sums = [one.content["sums"][light]["by_count"] for one in FOUND.values() for light in ILLUMINATIONS]
     off = 1.0 - np.array([max(last["rel"]) / max(first["rel"]) for first, *_, last in sums]) ** (1 / 7)
     assert 0.295 < off.min() < off.max() < 0.405

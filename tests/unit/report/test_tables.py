@@ -254,15 +254,12 @@ def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
 
 
 LOW, HIGH, POWERS = cells.BLOCKS[0], cells.BLOCKS[-1], [10.0**power for power in range(8)]
+ONE_HIGH = [1.0] * 13 + [1e7] + [1.0] * 10
 SPARKS = {
     "powers of ten are even steps": (POWERS, POWERS, cells.BLOCKS),
     "and back": (POWERS[::-1], POWERS, cells.BLOCKS[::-1]),
     "beyond the ends it stays at them": ([1e-9, 9.0], [1e-4, 1.0], LOW + HIGH),
-    "of many values the largest of each stretch is shown": (
-        [1.0] * 13 + [1e7] + [1.0] * 10,
-        POWERS,
-        LOW * 6 + HIGH + LOW * 5,
-    ),
+    "of many values the largest of each stretch is shown": (ONE_HIGH, POWERS, LOW * 6 + HIGH + LOW * 5),
     "few are a block each": ([1.0] * 5, POWERS, LOW * 5),
     "equal numbers have no scale": ([2.0, 2.0], [2.0, 2.0], LOW * 2),
     "none": ([], [], ""),
