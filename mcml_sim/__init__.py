@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mcml_sim.runs.simulation import simulate, simulate_orders, trace_share
     from mcml_sim.runs.store import DamagedBatch
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             "exact": "",
@@ -67,8 +67,3 @@ __all__ = [
     "write_mco",
     "write_results",
 ]
-
-
-def __dir__() -> list[str]:
-    """Return the names that an interactive shell completes, unused ones included."""
-    return [*globals(), *__all__]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from profilefit.fitting.quality import albedo_quality, profile_quality
     from profilefit.recipes.catalogue import albedo_law, load, names
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             **dict.fromkeys(("albedo_law", "load", "names"), "recipes.catalogue"),
@@ -43,8 +43,3 @@ __all__ = [
     "profile_quality",
     "scenes",
 ]
-
-
-def __dir__() -> list[str]:
-    """Return the names that an interactive shell completes, unused ones included."""
-    return [*globals(), *__all__]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import sys
 from importlib import import_module
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
@@ -19,10 +20,11 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 
 
-def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package: `homes` names the module of each name.
+def attributes(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return the `__getattr__` and `__dir__` of a package: `homes` names the module of each name.
 
     A module itself has the room it is in, with a dot: "media." makes `phase` of `media.phase`, "" stays in the root.
+    By `__dir__` an interactive shell completes names that were not used yet, too.
     """
 
     def of_package(name: str) -> Any:
@@ -31,7 +33,7 @@ def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
         home = f"{package}.{homes[name]}"
         return import_module(home + name) if home.endswith(".") else getattr(import_module(home), name)
 
-    return of_package
+    return of_package, lambda: [*vars(sys.modules[package]), *homes]
 
 
 def command(module: str) -> None:

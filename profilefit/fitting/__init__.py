@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from profilefit.fitting.quality import AlbedoQuality, Quality
     from profilefit.fitting.solver import Solution, least_squares
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             "Structure": "estimate",

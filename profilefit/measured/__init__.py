@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from profilefit.measured.reading import read
     from profilefit.measured.result import MediumPosterior, fit
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {"Measured": "data", "Known": "problem", "read": "reading", "MediumPosterior": "result", "fit": "result"},
     )

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from profilefit.report.tables.law_tables import every_law
     from profilefit.report.tables.markdown import fill, sections
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             **dict.fromkeys(("posterior_figure", "residual_figure"), "figures.fit_figures"),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from profilefit.scenes.stage.technique import Lambert
     from profilefit.scenes.stage.world import Camera
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             **dict.fromkeys(("fur", "heart", "layers", "sea"), ""),
@@ -83,8 +83,3 @@ __all__ = [
     "to_srgb",
     "translucent",
 ]
-
-
-def __dir__() -> list[str]:
-    """Return what an interactive shell completes: names that were not used yet, too."""
-    return [*globals(), *__all__]

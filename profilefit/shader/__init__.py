@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from profilefit.shader.emit import law_text
     from profilefit.shader.law_file import export
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             "ShaderLaw": "check.shader_law",

@@ -7,6 +7,6 @@ if TYPE_CHECKING:
     from profilefit.studies.choose.case import Within
     from profilefit.studies.choose.layers import one_layer
 else:
-    __getattr__ = attributes(__name__, {"Within": "choose.case", "one_layer": "choose.layers"})
+    __getattr__, __dir__ = attributes(__name__, {"Within": "choose.case", "one_layer": "choose.layers"})
 
 __all__ = ["Within", "one_layer"]

@@ -6,11 +6,6 @@ TYPE_CHECKING = False  # importing typing for it would take longer than all the 
 if TYPE_CHECKING:
     from profilefit.scenes.fur.law import best_exponent, shell_shadow, visibility
 else:
-    __getattr__ = attributes(__name__, dict.fromkeys(("best_exponent", "shell_shadow", "visibility"), "law"))
+    __getattr__, __dir__ = attributes(__name__, dict.fromkeys(("best_exponent", "shell_shadow", "visibility"), "law"))
 
 __all__ = ["best_exponent", "shell_shadow", "visibility"]
-
-
-def __dir__() -> list[str]:
-    """Return what an interactive shell completes: names that were not used yet, too."""
-    return [*globals(), *__all__]

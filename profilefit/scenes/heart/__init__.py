@@ -7,14 +7,9 @@ if TYPE_CHECKING:
     from profilefit.scenes.heart.law import balance, crossover_of, screen_share, split
     from profilefit.scenes.heart.truth import surface_blur
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {**dict.fromkeys(("balance", "crossover_of", "screen_share", "split"), "law"), "surface_blur": "truth"},
     )
 
 __all__ = ["balance", "crossover_of", "screen_share", "split", "surface_blur"]
-
-
-def __dir__() -> list[str]:
-    """Return what an interactive shell completes: names that were not used yet, too."""
-    return [*globals(), *__all__]

@@ -6,11 +6,6 @@ TYPE_CHECKING = False  # importing typing for it would take longer than all the 
 if TYPE_CHECKING:
     from profilefit.scenes.layers.law import single_scattering, stack_law
 else:
-    __getattr__ = attributes(__name__, dict.fromkeys(("single_scattering", "stack_law"), "law"))
+    __getattr__, __dir__ = attributes(__name__, dict.fromkeys(("single_scattering", "stack_law"), "law"))
 
 __all__ = ["single_scattering", "stack_law"]
-
-
-def __dir__() -> list[str]:
-    """Return what an interactive shell completes: names that were not used yet, too."""
-    return [*globals(), *__all__]

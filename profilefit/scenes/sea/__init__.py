@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from profilefit.scenes.sea.truth import caustic_irradiance
     from profilefit.scenes.sea.waves import first_hit
 else:
-    __getattr__ = attributes(
+    __getattr__, __dir__ = attributes(
         __name__,
         {
             "first_hit": "waves",
@@ -19,8 +19,3 @@ else:
     )
 
 __all__ = ["beam_share", "caustic_irradiance", "first_hit", "haltrin", "segment_integral"]
-
-
-def __dir__() -> list[str]:
-    """Return what an interactive shell completes: names that were not used yet, too."""
-    return [*globals(), *__all__]

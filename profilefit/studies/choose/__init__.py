@@ -8,6 +8,6 @@ if TYPE_CHECKING:
     from profilefit.studies.choose.cost import shipped
     from profilefit.studies.choose.requirements import read
 else:
-    __getattr__ = attributes(__name__, {"choose": "choice", "shipped": "cost", "read": "requirements"})
+    __getattr__, __dir__ = attributes(__name__, {"choose": "choice", "shipped": "cost", "read": "requirements"})
 
 __all__ = ["choose", "read", "shipped"]

@@ -270,7 +270,7 @@ def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match=r"module 'profilefit' has no attribute 'nothing'"):
         profilefit.nothing  # noqa: B018
     with pytest.raises(AttributeError, match=r"module 'a' has no attribute 'b'"):
-        attributes("a", {})("b")
+        attributes("a", {})[0]("b")
 
 
 INTERRUPTED = """
