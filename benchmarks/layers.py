@@ -35,7 +35,7 @@ from profilefit.scenes.stage import head
 from profilefit.scenes.stage.judge import EXPOSURE
 from profilefit.scenes.stage.picture import to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import alone
+from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
 
@@ -68,10 +68,10 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     rows = []
     media, light = request.media, request.illumination
     plates = [plate_of(medium, light) for medium in media]
-    others = {TABLE: alone(TABLE, of_table(table, plates), request.mfp)}
+    others = {TABLE: NamedTechnique(TABLE, of_table(table, plates), request.mfp)}
     for count in (4, 6):
         sums = [shared_gaussians((medium,), light, count)[0] for medium in media]
-        others[f"gaussians:{count}"] = alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
+        others[f"gaussians:{count}"] = NamedTechnique(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:
             for kind, found in chart.ways(stage, request.changed(pose=pose), table, WAYS, others).items():

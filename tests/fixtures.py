@@ -21,7 +21,7 @@ from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes.run import silent, written
 from profilefit.recipes.workers import Workers
-from profilefit.scenes.stage import gather
+from profilefit.scenes.stage import technique
 from profilefit.scenes.stage.stage import Stage
 from profilefit.shader.context import open_context
 
@@ -205,8 +205,8 @@ def alter(monkeypatch):
     """alter(old, new) changes a line of scatter.frag, for stages that are made afterwards; old is what stands there."""
 
     def change(old, new):
-        before = gather.text_beside
-        assert before(gather.__name__, "glsl/scatter.frag").count(old) == 1
-        monkeypatch.setattr(gather, "text_beside", lambda *place: before(*place).replace(old, new))
+        before = technique.text_beside
+        assert before(technique.__name__, "glsl/scatter.frag").count(old) == 1
+        monkeypatch.setattr(technique, "text_beside", lambda *place: before(*place).replace(old, new))
 
     return change

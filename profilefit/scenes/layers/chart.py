@@ -15,7 +15,7 @@ from profilefit.scenes.layers.truth import StackTable
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import TechniquePair
+from profilefit.scenes.stage.technique import NamedTechnique
 
 
 class Split(NamedTuple):
@@ -49,7 +49,7 @@ def ways(
     request: LayersRequest,
     table: StackTable,
     samples: Mapping[str, Sequence[int]],
-    others: Mapping[str, TechniquePair],
+    others: Mapping[str, NamedTechnique],
     turns: int = TURNS,
 ) -> dict[str, list[ChartPoint]]:
     """Return error and cost of techniques with each of their numbers of samples, of the scene that a stage draws.
@@ -58,5 +58,5 @@ def ways(
     samples  of the kinds of a file, and of `others` by their names
     """
     judge, laws = reference(stage, request, table), laws_of(request)
-    pairs = {kind: others.get(kind) or technique(request.changed(technique={"kind": kind}), laws) for kind in samples}
-    return {kind: points(stage, judge, pairs[kind], request.sampling, samples[kind], turns) for kind in samples}
+    named = {kind: others.get(kind) or technique(request.changed(technique={"kind": kind}), laws) for kind in samples}
+    return {kind: points(stage, judge, named[kind], request.sampling, samples[kind], turns) for kind in samples}

@@ -1,7 +1,7 @@
 """Laws that draw the head: samples of any profile law, or the separable kernel, stretched to its material.
 
 Sampled are the laws of `profilefit.laws` that have a shader source, as fitted or printed, each by its own source; their
-light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (stage/gather.py).
+light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (`Gather`).
 
 What each tap of the separable filter weighs in each channel: J. Jimenez et al., Separable subsurface scattering,
 Computer Graphics Forum 34, 2015, and the authors' own code (iryoku/separable-sss, SeparableSSS.cpp, calculateKernel;

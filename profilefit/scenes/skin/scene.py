@@ -35,12 +35,11 @@ from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, t
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.gather import technique
 from profilefit.scenes.stage.judge import surface_judge
 from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import Lambert, Technique, alone
+from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene
 
 
@@ -199,8 +198,8 @@ def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
     scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
-    pair = alone(of.label, of.method, scene.material.mfp)
+    named = NamedTechnique(of.label, of.method, scene.material.mfp)
     with Stage(context, of.size) as stage:
         stage.draw(scene)
         request.require_lit(of.file, stage.buffers())
-        return request.rendered(stage, surface_judge(stage, scene, pair.mfp, of.setting), of, pair)
+        return request.rendered(stage, surface_judge(stage, scene, named.mfp, of.setting), of, named)

@@ -10,10 +10,9 @@ from benchmarks.planes import flat, step_edge
 from mcml_sim import Setting
 from profilefit.errors import ShaderError
 from profilefit.scenes.skin import material
-from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, uniforms_of
-from profilefit.scenes.stage.technique import EXITANCE, Lambert, LawText, Technique, maps, through_text
+from profilefit.scenes.stage.technique import EXITANCE, Gather, Lambert, LawText, Technique, maps
 from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE = (128, 128)
@@ -49,7 +48,7 @@ class Scaled(Technique):
         ]
 
     def through(self):
-        return LawText("scaled", through_text("1.0"))
+        return LawText.of_share("scaled", "1.0")
 
 
 def test_uniforms_are_those_of_the_source():

@@ -152,7 +152,7 @@ def test_the_shader_adds_what_numpy_does(stage, kind, g):
     stage.draw(drawn)
     by = of_stack(laws(), LEAST, MOST, ())
     plain, seen = stage.scatter(by, MFP, SAMPLES), stage.buffers()
-    single = WithSingle.of(by, three, LEAST, MOST)
+    single = WithSingle(by, three, LEAST, MOST)
     found = stage.scatter(single, MFP, SAMPLES).astype(float) - plain
     toward = drawn.camera.view()[:3, :3] @ unit(direction)
     into = seen.normal.astype(float) @ toward
@@ -185,7 +185,7 @@ def test_the_shader_adds_what_numpy_does(stage, kind, g):
 def test_light_from_everywhere_has_no_direction(stage):
     """Nor has light from behind: there the pass changes not a bit."""
     by = of_stack(laws(), LEAST, MOST, ())
-    single = WithSingle.of(by, media(), LEAST, MOST)
+    single = WithSingle(by, media(), LEAST, MOST)
     for show, what in ((stage.draw, scene((0.0, 0.0, -1.0), uneven_ball())), (stage.upload, flat(SIZE, 1.0, 0.5))):
         show(what)
         np.testing.assert_array_equal(stage.scatter(single, MFP, SAMPLES), stage.scatter(by, MFP, SAMPLES))
