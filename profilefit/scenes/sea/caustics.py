@@ -14,8 +14,7 @@ import moderngl
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
-from profilefit.errors import InputError
+from mcml_sim.media.checks import checked_whole, require
 from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
@@ -75,8 +74,7 @@ def focus(waves: Waves, depth: float, n: float = 1.34, tilt: float = 0.0) -> flo
 
 def splat_for(f: float) -> Splat:
     """Return the cheapest splat that is right: faces before the first fold, F < 1, cells from there on."""
-    if not f >= 0:
-        raise InputError(f"F must be a number >= 0, got {f!r}")
+    require(f >= 0, "F", "a number >= 0", f)
     return Splat.FACES if f < FOLDS else Splat.CELLS
 
 
@@ -144,8 +142,7 @@ class Caustics:
 
     def passes(self, splat: Splat) -> tuple[Pass, Pass, Pass]:
         """Return the passes that fill `map`: hits, deposits by a splat, and their fold into the tile."""
-        if not isinstance(splat, Splat):
-            raise InputError(f"splat must be one of {', '.join(map(str, Splat))}, got {splat!r}")
+        require(isinstance(splat, Splat), "splat", f"one of {', '.join(map(str, Splat))}", splat)
         fragment, vertex, shape, count = SHADERS[splat]
         given: dict[str, object] = {
             "pixel": self._pixel,
