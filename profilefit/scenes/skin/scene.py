@@ -12,9 +12,10 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.exact.single_scattering import entered
+from mcml_sim.media.checks import require
 from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError, SettingError
+from profilefit.errors import SettingError
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
@@ -66,8 +67,7 @@ def head_scene(
     detail  of the meshes, a whole number >= 1;  columns  of the skin's texture
     setting  in which the material has its A: by default n = 1, as in published comparisons; skin has n = 1.4
     """
-    if detail < 1:
-        raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
+    require(detail >= 1, "detail", "a whole number >= 1", detail)
     what = material.middle(setting) if isinstance(material, Painted) else translucent(material, setting)
     most = float(entered(setting))  # a colour that the surface lets out
     face = np.minimum(skin(what.reflectance, columns), np.float32(most))

@@ -31,9 +31,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
-from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, STEP, Curves, CurveTable, exact_table
+from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, Curves, CurveTable, cubic, exact_table
 from profilefit.scenes.stage.picture import TruthError, averaged
 from profilefit.scenes.stage.world import Camera
 
@@ -171,11 +172,10 @@ def gathered(
     Raises InputError; SettingError of a setting with g. 26 000 visible pixels take about a minute on a core, 100 MiB.
     """
     lengths = np.asarray(mfp, float)
-    if lengths.shape != (3,) or not np.all((lengths > 0) & np.isfinite(lengths)):
-        raise InputError(f"mfp must be three lengths > 0, got {mfp!r}")
+    are_lengths = lengths.shape == (3,) and np.all((lengths > 0) & np.isfinite(lengths))
+    require(are_lengths, "mfp", "three lengths > 0", mfp)
     curves: CurveTable = exact_table(table) if isinstance(table, Setting) else table
-    if not callable(getattr(curves, "curves", None)):
-        raise InputError(f"table must be a Setting, or have a method curves, got {table!r}")
+    require(callable(getattr(curves, "curves", None)), "table", "a Setting, or have a method curves", table)
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     light, share = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     # The number of the visible pixel that stands for each pixel of the image and a margin of NEAR around it.
@@ -357,9 +357,4 @@ def _density(offset: Array, mfp: Array, point: _Points) -> Array:
     """Return R_d / A [1/length^2] of the three channels, (3, n), at vectors (n, 3) from the point: `Curves.density`."""
     r = jnp.sqrt(jnp.sum(offset**2, axis=1))
     x = jnp.clip(r / mfp, NEAREST, FARTHEST)
-    place = (jnp.log(x) - np.log(NEAREST)) / STEP
-    k = jnp.minimum(place.astype(int), point.profile.shape[1] - 1)
-    t = place - k
-    c = jnp.take_along_axis(point.profile, k[..., None], axis=1)
-    power = c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * c[..., 3]))
-    return jnp.exp(power - point.kappa[:, None] * x) / mfp**2
+    return jnp.exp(cubic(point.profile, x) - point.kappa[:, None] * x) / mfp**2
