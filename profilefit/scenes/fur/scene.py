@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Annotated, Literal, NamedTuple, Self
 
 import moderngl
@@ -166,10 +167,7 @@ class FurRender(NamedTuple):
 
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
-        draw, time = (
-            (lambda count: self.picture(by, count)),
-            (lambda count: self.renderer.time(*self._passes(by, count))),
-        )
+        draw, time = partial(self.picture, by), lambda count: self.renderer.time(*self._passes(by, count))
         return self.judge.points(by.name, layers, draw, time, turns)
 
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:

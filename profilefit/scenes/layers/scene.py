@@ -98,8 +98,7 @@ def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
     """Draw the picture beside its reference, with error and cost: minutes, for exact light at nine thicknesses."""
     scene = scene_of(of)
     with Stage(context, of.size) as stage:
-        stage.draw(scene)
-        request.require_lit(of.file, stage.buffers())  # before the minutes that exact light takes
+        request.draw_lit(stage, scene, of.file)  # before the minutes that exact light takes
         table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
         named = technique(of, laws_of(of) if of.kind in OF_LAW else None)
         seen = passes.WithSingle(named.by, of.media, of.thickness.least, of.thickness.most) if of.single else named.by
@@ -109,8 +108,7 @@ def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
 def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
     scene = scene_of(of)
-    stage.draw(scene)
-    request.require_lit(of.file, stage.buffers())
+    request.draw_lit(stage, scene, of.file)
     return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 

@@ -200,6 +200,5 @@ def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
     named = NamedTechnique(of.label, of.method, scene.material.mfp)
     with Stage(context, of.size) as stage:
-        stage.draw(scene)
-        request.require_lit(of.file, stage.buffers())
+        request.draw_lit(stage, scene, of.file)
         return request.rendered(stage, surface_judge(stage, scene, named.mfp, of.setting), of, named)

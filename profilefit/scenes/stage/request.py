@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import TURNS, Judge, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.picture import RenderResult
@@ -156,8 +156,10 @@ class ViewRequest(Declared):
         return sorted({self.technique.samples, *self.technique.chart})
 
 
-def require_lit(file: str, buffers: Buffers) -> None:
-    """Raise InputError where a view shows nothing that light reaches and scatters in."""
+def draw_lit(stage: Stage, scene: Scene, file: str) -> None:
+    """Draw a scene; InputError, with the file, where it shows nothing that light reaches and scatters in."""
+    stage.draw(scene)
+    buffers = stage.buffers()
     inside = buffers.mask > INSIDE
     if not np.any(buffers.irradiance[inside] > 0):
         raise InputError(f"{file}: the view must show something that light scatters in, and light must reach it")

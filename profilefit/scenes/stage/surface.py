@@ -78,10 +78,6 @@ class View(NamedTuple):
         )
         return across, along
 
-    def coarsened(self, factor: int) -> View:
-        """Return the view with pixels that many times as large."""
-        return self._replace(pixel=self.pixel * factor)
-
 
 class Surface(NamedTuple):
     """A G-buffer (h, w, ...) in view space; what the mask leaves out is not read.
@@ -196,19 +192,18 @@ def gathered(
 
 
 def refined(
-    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike, factor: int = 2
+    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Return light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
+    """Return light at pixels (m, 2) of a coarser view, from a surface twice as fine, and the error without it.
 
     view  the fine one. -> the means of the fine light over each pixel (m, 3), and the coarse light less these (m, 3):
     an estimate of the error of the coarse one, and a bound for that of the fine one.
     """
-    coarse = fine.coarsened(factor)
+    coarse, wide = fine.coarsened(2), view._replace(pixel=2 * view.pixel)
     chosen = _chosen(coarse, pixels)
-    inside = np.stack(np.meshgrid(range(factor), range(factor), indexing="ij"), axis=-1).reshape(-1, 2)
-    parts = (factor * chosen[:, None] + inside).reshape(-1, 2)
+    parts = (2 * chosen[:, None] + [(0, 0), (0, 1), (1, 0), (1, 1)]).reshape(-1, 2)
     mean = gathered(fine, view, mfp, table, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
-    return mean, gathered(coarse, view.coarsened(factor), mfp, table, chosen).light - mean
+    return mean, gathered(coarse, wide, mfp, table, chosen).light - mean
 
 
 def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
