@@ -57,11 +57,10 @@ class Buffers:
             if np.shape(array) != accepted:
                 raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
         mask = np.asarray(self.mask)
-        require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
+        finite("mask", mask)  # NaN would be neither inside nor outside
         inside = mask > INSIDE
         for name, array in given.items():
-            value = np.asarray(array)[inside]
-            require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+            finite(name, np.asarray(array)[inside], f"finite where mask > {INSIDE}")
         albedo = np.asarray(self.reflectance)[inside]
         good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
         require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")

@@ -20,7 +20,6 @@ divided by Gauss points, all others taken at their middle. All pairs count, near
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -322,21 +321,24 @@ def _some(
 @jax.jit
 def _sums(scene: _Scene, points: _Points, mfp: Array) -> tuple[Array, Array]:
     """Return sum W E and sum W, each (m, 3)."""
-    return jax.lax.map(partial(_sum, scene, mfp), points)
+    length = mfp[:, None]
 
+    def at(point: _Points) -> tuple[Array, Array]:
+        far = jnp.where(jnp.max(jnp.abs(scene.place - point.place), axis=1) > NEAR, scene.area, 0.0)
+        lit, share = point.own * point.irradiance, point.own
+        for position, area, irradiance in (
+            (scene.position, far, scene.irradiance),
+            _divided(scene, point.around[STEPS > CLOSE], 2),
+            _divided(scene, point.around[(STEPS > 0) & (STEPS <= CLOSE)], 4),
+        ):
+            r = jnp.sqrt(jnp.sum((position - point.position) ** 2, axis=1))
+            x = jnp.clip(r / length, NEAREST, FARTHEST)
+            density = jnp.exp(cubic(point.profile, x) - point.kappa[:, None] * x) / length**2  # as `Curves.density`
+            weight = area * density
+            lit, share = lit + jnp.sum(weight * irradiance.T, axis=1), share + jnp.sum(weight, axis=1)
+        return lit, share
 
-def _sum(scene: _Scene, mfp: Array, point: _Points) -> tuple[Array, Array]:
-    """Return both sums for one point, (3,)."""
-    far = jnp.where(jnp.max(jnp.abs(scene.place - point.place), axis=1) > NEAR, scene.area, 0.0)
-    lit, share = point.own * point.irradiance, point.own
-    for position, area, irradiance in (
-        (scene.position, far, scene.irradiance),
-        _divided(scene, point.around[STEPS > CLOSE], 2),
-        _divided(scene, point.around[(STEPS > 0) & (STEPS <= CLOSE)], 4),
-    ):
-        weight = area * _density(position - point.position, mfp[:, None], point)
-        lit, share = lit + jnp.sum(weight * irradiance.T, axis=1), share + jnp.sum(weight, axis=1)
-    return lit, share
+    return jax.lax.map(at, points)
 
 
 def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Array]:
@@ -346,10 +348,3 @@ def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Ar
     position = scene.position[pixels, None] + a * scene.across[pixels, None] + b * scene.along[pixels, None]
     area = scene.area[pixels, None] * (0.25 * np.outer(weights, weights).ravel())
     return position.reshape(-1, 3), area.ravel(), jnp.repeat(scene.irradiance[pixels], count * count, axis=0)
-
-
-def _density(offset: Array, mfp: Array, point: _Points) -> Array:
-    """Return R_d / A [1/length^2] of the three channels, (3, n), at vectors (n, 3) from the point: `Curves.density`."""
-    r = jnp.sqrt(jnp.sum(offset**2, axis=1))
-    x = jnp.clip(r / mfp, NEAREST, FARTHEST)
-    return jnp.exp(cubic(point.profile, x) - point.kappa[:, None] * x) / mfp**2
