@@ -194,9 +194,17 @@ def context(shared_context):
 
 
 @pytest.fixture
-def stage(context):
-    """128 x 128 pixels."""
-    with Stage(context, (128, 128), shadow_side=16) as stage:
+def stage(context, request):
+    """A stage as a module's STAGE says, columns and rows and the side of its shadow map; else of 128 x 128 pixels."""
+    size, shadow_side = getattr(request.module, "STAGE", ((128, 128), 16))
+    with Stage(context, size, shadow_side) as stage:
+        yield stage
+
+
+@pytest.fixture
+def small(context, request):
+    """A stage beside it, of a module's SMALL columns and rows."""
+    with Stage(context, request.module.SMALL, shadow_side=16) as stage:
         yield stage
 
 

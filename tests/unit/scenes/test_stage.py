@@ -19,13 +19,8 @@ from profilefit.scenes.stage.technique import EXITANCE, RADIANCE
 from profilefit.scenes.stage.world import Camera
 from tests.unit.scenes.scenes import RADIUS, ball, refused, scene
 
-SIZE = (64, 48)
-
-
-@pytest.fixture
-def stage(context):
-    with Stage(context, SIZE, shadow_side=512) as stage:
-        yield stage
+SIZE = 64, 48
+STAGE = SIZE, 512
 
 
 @pytest.mark.parametrize("kind", ["orthographic", "perspective"])

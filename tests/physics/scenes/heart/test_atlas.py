@@ -120,12 +120,7 @@ def test_bad_sums(changed, told):
 KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
 RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24
 WHITE = np.ones((1, 1, 3), np.float32)
-
-
-@pytest.fixture
-def stage(context):
-    with Stage(context, (32, 32), shadow_side=64) as stage:
-        yield stage
+STAGE = (32, 32), 64
 
 
 @contextmanager

@@ -18,11 +18,11 @@ from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import unit
 from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE, SAMPLES = (96, 96), Sampling(4)
+STAGE = SIZE, 256
 LEAST, MOST = 0.05, 0.5  # thickness of the first layer [mm]
 # Of each colour mu_a and mu_s of two layers [1/mm], and near what a fit of such a stack gives for its interface.
 COLOURS = (((0.05, 1.8), (0.20, 1.13)), ((0.20, 2.2), (0.80, 1.2)), ((0.35, 2.6), (1.2, 1.3)))
@@ -128,12 +128,6 @@ def test_no_energy_comes_or_goes(n):
         apart = np.pi * np.asarray(single_scattering(own, cosine, out[:, None], turn)) - alike
         assert of_out @ apart.mean(axis=1) == pytest.approx(0.0, abs=1e-7)
         assert of_out @ np.abs(apart).mean(axis=1) > 0.05 * alike
-
-
-@pytest.fixture
-def stage(context):
-    with Stage(context, SIZE, shadow_side=256) as stage:
-        yield stage
 
 
 def uneven_ball():

@@ -18,6 +18,7 @@ from profilefit.scenes.sea.waves import (
     wrong_shares,
 )
 from profilefit.scenes.stage.renderer import float_texture
+from profilefit.scenes.stage.world import unit
 from profilefit.shader.context import program
 from profilefit.shader.emit import text_beside
 from tests.unit.scenes.scenes import refused
@@ -110,10 +111,6 @@ DEPTH = 5.0
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def unit(*direction):
-    return np.array(direction) / np.linalg.norm(direction)
-
-
 def lit_floor(steep, count=2000, seed=0):
     """A floor, origins above it and rays of a sun at 63 degrees below waves, of which the flattest has this S."""
     rng = np.random.default_rng(seed)
@@ -136,7 +133,7 @@ def in_depths(context, steep):
 
 def test_a_plane_is_met_exactly():
     """z = -5 + 0.3 x: one Newton step is exact, whatever the bracket. Scalars in, scalar out."""
-    ray = unit(1.0, 0.0, -2.0)
+    ray = unit((1.0, 0.0, -2.0))
 
     def slant(x, y):
         return -5.0 + 0.3 * np.asarray(x)
@@ -166,11 +163,11 @@ def test_rays_that_never_hit_are_nan():
     np.testing.assert_array_equal(np.isnan(found), [True, True, False])
     # A map that ends: rays that leave it before they are down.
     ends = lambda x, y: np.where(np.asarray(x) < 2.0, -5.0, np.nan)  # noqa: E731
-    found = first_hit(ends, np.zeros(3), np.array([unit(1.0, 0.0, -1.0), unit(0.3, 0.0, -1.0)]), -6.0, -4.0)
+    found = first_hit(ends, np.zeros(3), unit([(1.0, 0.0, -1.0), (0.3, 0.0, -1.0)]), -6.0, -4.0)
     np.testing.assert_array_equal(np.isnan(found), [True, False])
     # Upward from a valley, through the hill beside it.
     hills = lambda x, y: np.cos(np.asarray(x))  # noqa: E731
-    up = unit(1.0, 0.0, 0.1)
+    up = unit((1.0, 0.0, 0.1))
     rising = first_hit(hills, [np.pi, 0.0, -0.9], up, -1.0, 1.0, steps=64)
     np.testing.assert_allclose(hills(np.pi + rising * up[0], 0.0), -0.9 + rising * up[2])
 
@@ -179,7 +176,7 @@ def test_the_first_of_three_crossings():
     """A ray that grazes a wave and comes out of it: later crossings are farther on."""
     wave = lambda x, y: 0.5 * np.cos(np.asarray(x))  # noqa: E731
     tilt = lambda x, y: (-0.5 * np.sin(np.asarray(x)), 0.0 * np.asarray(y))  # noqa: E731
-    ray, origin = unit(1.0, 0.0, -0.05), np.array([np.pi, 0.0, 0.55])
+    ray, origin = unit((1.0, 0.0, -0.05)), np.array([np.pi, 0.0, 0.55])
     found = first_hit(wave, origin, ray, -0.5, 0.56, slope=tilt)
     k = np.linspace(0.0, 30.0, 3_000_001)
     gap = origin[2] + k * ray[2] - wave(origin[0] + k * ray[0], 0.0)
