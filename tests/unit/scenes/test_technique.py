@@ -122,8 +122,3 @@ def test_lambert_is_the_light_that_arrives(stage):
     stage.upload(edge)
     np.testing.assert_array_equal(stage.scatter(Lambert(), 2.0, Sampling(1)), edge.irradiance * edge.reflectance)
     assert np.isfinite(stage.render(Lambert(), 2.0)).all()
-
-
-def test_what_is_no_technique_is_refused(stage):
-    stage.upload(flat(SIZE, 1.0, 0.5))
-    refused("law must be a profile law, an ExactLaw or a technique, got 'separable'", stage.scatter, "separable", 1.0)

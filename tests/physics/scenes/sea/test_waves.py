@@ -1,5 +1,7 @@
 """Sums of cosines and what slopes do to sunlight; a ray's first crossing, where iterations fail, in float32."""
 
+from functools import partial
+
 import moderngl
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from profilefit.scenes.stage.renderer import float_texture
 from profilefit.scenes.stage.world import unit
 from profilefit.shader.context import program
 from profilefit.shader.emit import text_beside
-from tests.unit.scenes.scenes import refused
+from tests.unit.scenes.scenes import refusals, refused
 
 TILE = 10.0
 STEP = 2.0 * np.pi / TILE
@@ -105,6 +107,8 @@ def test_what_no_waves_are():
     refused(r"^wind must be two speeds \[m/s\], not both 0", random_sea, 0.1, TILE, wind=(0.0, 0.0))
     refused("^count must be a whole number >= 1, got 0", random_sea, 0.1, TILE, count=0)
     refused(f"^depth {length} -1.0", random_floor, 0.1, TILE, -1.0)
+    wanted = "ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"
+    refused(wanted, wrong_shares, ["bisect"], [1.0])
 
 
 DEPTH = 5.0
@@ -283,27 +287,20 @@ def test_level_floors_in_a_vertex_shader(context):
             assert off.max() < 1e-6 * depth, (depth, slope)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"direction": [0.0, 0.0, -2.0]}, "direction must be of unit length, got \\|direction\\| = 2$"),
-        ({"direction": [0.0, 0.0, 0.0]}, "direction must be of unit length, got \\|direction\\| = 0$"),
-        ({"direction": [0.0, -1.0]}, "direction must have shape \\(\\.\\.\\., 3\\), got \\(2,\\)$"),
-        ({"direction": [0.0, 0.0, np.nan]}, "direction must be finite, got nan$"),
-        ({"origin": [0.0, np.inf, 0.0]}, "origin must be finite, got inf$"),
-        ({"origin": "here"}, "origin must be finite numbers \\(\\.\\.\\., 3\\), got 'here'$"),
-        ({"origin": np.zeros((2, 3)), "direction": [DOWN] * 4}, "origin and direction must broadcast to one shape"),
-        ({"origin": [0.0, 0.0, -5.5]}, "origin must not be below the floor, got one that is 0.5 m below it$"),
-        ({"lowest": -3.0}, "lowest must not be above highest, got -3 and -4 m$"),
-        ({"lowest": np.nan}, "lowest must be a finite level \\[m\\], got nan$"),
-        ({"highest": -5.2}, "highest must be no lower than the floor is, got -5.2 m$"),
-        ({"steps": 0}, "steps must be a whole number >= 1 and <= 1024, got 0$"),
-        ({"steps": 2.5}, "steps must be a whole number >= 1 and <= 1024, got 2.5$"),
-        ({"steps": 1025}, "steps must be a whole number >= 1 and <= 1024, got 1025$"),
-    ],
+test_what_has_no_hit = refusals(
+    partial(first_hit, height=plane, origin=np.zeros(3), direction=DOWN, lowest=-6.0, highest=-4.0),
+    ({"direction": [0.0, 0.0, -2.0]}, "^direction must be of unit length, got \\|direction\\| = 2$"),
+    ({"direction": [0.0, 0.0, 0.0]}, "^direction must be of unit length, got \\|direction\\| = 0$"),
+    ({"direction": [0.0, -1.0]}, "^direction must have shape \\(\\.\\.\\., 3\\), got \\(2,\\)$"),
+    ({"direction": [0.0, 0.0, np.nan]}, "^direction must be finite, got nan$"),
+    ({"origin": [0.0, np.inf, 0.0]}, "^origin must be finite, got inf$"),
+    ({"origin": "here"}, "^origin must be finite numbers \\(\\.\\.\\., 3\\), got 'here'$"),
+    ({"origin": np.zeros((2, 3)), "direction": [DOWN] * 4}, "^origin and direction must broadcast to one shape"),
+    ({"origin": [0.0, 0.0, -5.5]}, "^origin must not be below the floor, got one that is 0.5 m below it$"),
+    ({"lowest": -3.0}, "^lowest must not be above highest, got -3 and -4 m$"),
+    ({"lowest": np.nan}, "^lowest must be a finite level \\[m\\], got nan$"),
+    ({"highest": -5.2}, "^highest must be no lower than the floor is, got -5.2 m$"),
+    ({"steps": 0}, "^steps must be a whole number >= 1 and <= 1024, got 0$"),
+    ({"steps": 2.5}, "^steps must be a whole number >= 1 and <= 1024, got 2.5$"),
+    ({"steps": 1025}, "^steps must be a whole number >= 1 and <= 1024, got 1025$"),
 )
-def test_what_has_no_hit(given, message):
-    good = {"origin": np.zeros(3), "direction": DOWN, "lowest": -6.0, "highest": -4.0}
-    refused(f"^{message}", first_hit, plane, **{**good, **given})
-    wanted = "ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"
-    refused(wanted, wrong_shares, ["bisect"], [1.0])
