@@ -24,6 +24,8 @@ from profilefit.scenes.stage.buffers import finite
 
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
+OF_SEA, SEA_WAVES = 6, 24  # most waves along a side of the tile, and those that are kept
+OF_FLOOR, FLOOR_WAVES = 4, 6
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for
 WHOLE = 1e-6  # a wave vector may be so far from the tile's lattice, in its steps
 STILL = np.zeros(0)
@@ -143,18 +145,8 @@ class Waves:
         return found
 
 
-def random_sea(
-    rms_slope: float,
-    tile: float,
-    seed: int = 0,
-    count: int = 24,
-    harmonics: int = 6,
-    wind: tuple[float, float] = (WIND, 0.0),
-) -> Waves:
-    """Return a wind sea of a given root mean square slope [-] over a tile [m].
-
-    count      of waves that are kept, those of the largest slope;  harmonics  most waves along a side of the tile
-    wind       [m/s] along x and y
+def random_sea(rms_slope: float, tile: float, seed: int = 0, wind: tuple[float, float] = (WIND, 0.0)) -> Waves:
+    """Return a wind sea of a given root mean square slope [-] over a tile [m]; wind  [m/s] along x and y.
 
     Heights are complex normal deviates times the root of Phillips's spectrum, e^{-1 / (k L)^2} / k^4 (k.w / k w)^2 with
     L = w^2 / g (Tessendorf, Simulating Ocean Water, SIGGRAPH course, 2001), on the lattice of the tile. It has no scale
@@ -163,29 +155,26 @@ def random_sea(
     blow = checked_numbers("wind", wind, "two speeds [m/s]")
     speed = float(np.hypot(*blow)) if blow.shape == (2,) else 0.0
     require(0.0 < speed < np.inf, "wind", "two speeds [m/s], not both 0", wind)
-    vectors = _lattice(_length("tile", tile), checked_whole("harmonics", harmonics, 1, 64))
+    vectors = _lattice(_length("tile", tile), OF_SEA)
     k = np.linalg.norm(vectors, axis=1)
     along = vectors @ blow / (k * speed)
     with np.errstate(divide="ignore", over="ignore"):
         root = np.exp(-0.5 / (k * speed**2 / GRAVITY) ** 2) / k**2 * np.abs(along)
     is_strong = np.any(root > 1e-100)  # whose squares are floats
     require(is_strong, "wind", f"strong enough for waves on a tile of {tile:g} m", wind)
-    return _drawn(root, vectors, rms_slope, tile, seed, count)
+    return _drawn(root, vectors, rms_slope, tile, seed)
 
 
-def random_floor(
-    rms_slope: float, tile: float, depth: float, seed: int = 0, count: int = 6, harmonics: int = 4
-) -> Waves:
+def random_floor(rms_slope: float, tile: float, depth: float, seed: int = 0) -> Waves:
     """Return an uneven floor of waves of all directions alike, around a mean depth [m]; the others as of `random_sea`.
 
     Each of the waves, drawn from the lattice of the tile, has about as much slope: heights fall as 1 / k.
     """
-    vectors = _lattice(_length("tile", tile), checked_whole("harmonics", harmonics, 1, 64))
-    rng = np.random.default_rng(seed)
-    chosen = rng.permutation(len(vectors))[: checked_whole("count", count, 1)]
+    vectors = _lattice(_length("tile", tile), OF_FLOOR)
+    chosen = np.random.default_rng(seed).permutation(len(vectors))[:FLOOR_WAVES]
     vectors = vectors[chosen]
     root = 1.0 / np.linalg.norm(vectors, axis=1)
-    return replace(_drawn(root, vectors, rms_slope, tile, seed, count), mean=-_length("depth", depth))
+    return replace(_drawn(root, vectors, rms_slope, tile, seed), mean=-_length("depth", depth))
 
 
 def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floats, Floats, Floats]:
@@ -232,13 +221,13 @@ def _lattice(tile: float, harmonics: int) -> Floats:
     return np.column_stack([x, y])[half] * 2.0 * np.pi / tile
 
 
-def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: int, count: int) -> Waves:
-    """Return complex normal deviates times these roots of variances, and of those so many of the largest slope."""
+def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: int) -> Waves:
+    """Return complex normal deviates times these roots of variances, and of those `SEA_WAVES` of the largest slope."""
     require(is_number(rms_slope) and 0.0 <= rms_slope < np.inf, "rms_slope", "a number >= 0", rms_slope)
     rng = np.random.default_rng(seed)
     real, imaginary = rng.standard_normal((2, root.size)) * root
     amplitudes, phases = np.hypot(real, imaginary), np.arctan2(imaginary, real)
-    order = np.argsort(-amplitudes * np.linalg.norm(vectors, axis=1))[: checked_whole("count", count, 1)]
+    order = np.argsort(-amplitudes * np.linalg.norm(vectors, axis=1))[:SEA_WAVES]
     found = Waves(tile, amplitudes[order], vectors[order], phases[order])
     return found.scaled(rms_slope / found.rms_slope)
 

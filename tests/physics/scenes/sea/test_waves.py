@@ -105,7 +105,6 @@ def test_what_no_waves_are():
     refused(f"^tile {length} 1e-300", random_sea, 0.1, 1e-300)
     refused(f"^tile {length} 1e-300", random_floor, 0.1, 1e-300, 5.0)
     refused(r"^wind must be two speeds \[m/s\], not both 0", random_sea, 0.1, TILE, wind=(0.0, 0.0))
-    refused("^count must be a whole number >= 1, got 0", random_sea, 0.1, TILE, count=0)
     refused(f"^depth {length} -1.0", random_floor, 0.1, TILE, -1.0)
     wanted = "ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"
     refused(wanted, wrong_shares, ["bisect"], [1.0])
