@@ -280,11 +280,9 @@ def test_the_strand_that_is_met_is_where_it_is_met(degrees):
 def test_what_no_patch_has():
     many = "density must be a number > 0 of 1048576 strands at most"
     refused("density must be a number > 0", random_patch, 0.0, 0.1, 1.0, 1.0)
-    refused("density must be a number > 0", random_patch, np.nan, 0.1, 1.0, 1.0)
     refused(many, random_patch, 1e9, 0.1, 1.0, 1.0)
     refused("layers must be a whole", by_slabs, random_patch(9.0, 0.1, 1.0, 1.0), 0.5, np.zeros((1, 2)), 0)
     refused(r"packing must be a number in \[0, 0.6\], got 0.65", spaced_patch, 9.0, 0.1, 1.0, 1.0, 0.65)
-    refused("density must be a number > 0", spaced_patch, 0.0, 0.1, 1.0, 1.0, 0.5)
     refused("each must be a whole number >= 1, got 0", tufted_patch, 9.0, 0.1, 1.0, 1.0, 0, 0.1)
     refused("spread must be a finite length >= 0, got -0.1", tufted_patch, 9.0, 0.1, 1.0, 1.0, 3, -0.1)
     refused(many, tufted_patch, 1e9, 0.1, 1.0, 1.0, 3, 0.1)

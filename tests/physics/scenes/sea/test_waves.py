@@ -289,7 +289,6 @@ def test_level_floors_in_a_vertex_shader(context):
 test_what_has_no_hit = refusals(
     partial(first_hit, height=plane, origin=np.zeros(3), direction=DOWN, lowest=-6.0, highest=-4.0),
     ({"direction": [0.0, 0.0, -2.0]}, "^direction must be of unit length, got \\|direction\\| = 2$"),
-    ({"direction": [0.0, 0.0, 0.0]}, "^direction must be of unit length, got \\|direction\\| = 0$"),
     ({"direction": [0.0, -1.0]}, "^direction must have shape \\(\\.\\.\\., 3\\), got \\(2,\\)$"),
     ({"direction": [0.0, 0.0, np.nan]}, "^direction must be finite, got nan$"),
     ({"origin": [0.0, np.inf, 0.0]}, "^origin must be finite, got inf$"),
@@ -300,6 +299,5 @@ test_what_has_no_hit = refusals(
     ({"lowest": np.nan}, "^lowest must be a finite level \\[m\\], got nan$"),
     ({"highest": -5.2}, "^highest must be no lower than the floor is, got -5.2 m$"),
     ({"steps": 0}, "^steps must be a whole number >= 1 and <= 1024, got 0$"),
-    ({"steps": 2.5}, "^steps must be a whole number >= 1 and <= 1024, got 2.5$"),
     ({"steps": 1025}, "^steps must be a whole number >= 1 and <= 1024, got 1025$"),
 )
