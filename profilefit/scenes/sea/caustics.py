@@ -15,7 +15,7 @@ import numpy as np
 
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole, require
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
@@ -112,8 +112,7 @@ class Caustics:
         require_below(waves, bed)
         self._pixel = waves.tile / self.pixels
         # Light is drawn as many whole pixels aside as a calm sea bends it: margins need hold the waves' share alone.
-        drift = (deep * float(refracted(angle, (np.zeros(1), np.zeros(1)), index)[0][0])) / self._pixel
-        self.drift = round(drift)
+        self.drift = round(deep * calm_ray(angle, index)[0] / self._pixel)
         self._hits, self._splats, self.map = (f"{name} {what}" for what in ("hits", "splats", "map"))
         text = "".join(_text(file) for file in ("waves.glsl", "refract.glsl", "hits.glsl", "hits.frag"))
         given = {

@@ -12,7 +12,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, require
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.world import Rgb
 
 ROUNDING = 1e-6  # by which weights may miss a sum of 1
@@ -73,8 +73,7 @@ class World:
     @cached_property
     def calm(self) -> tuple[float, float]:
         """Tangent of the ray below a calm surface to the vertical, and its flux over that across the sun's rays [-]."""
-        x, _, flux = refracted(self.tilt, (np.zeros(1), np.zeros(1)), self.n)
-        return float(x[0]), float(flux[0])
+        return calm_ray(self.tilt, self.n)
 
     @property
     def beam(self) -> Floats:

@@ -197,6 +197,12 @@ def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floa
     return (np.sin(tilt) / n - along * zx) / down, -along * zy / down, (1.0 - reflected) * np.maximum(across, 0.0)
 
 
+def calm_ray(tilt: float, n: float) -> tuple[float, float]:
+    """Return the tangent to the vertical of sunlight below a calm surface, and its flux, as of `refracted` [-]."""
+    x, _, flux = refracted(tilt, (np.zeros(1), np.zeros(1)), n)
+    return float(x[0]), float(flux[0])
+
+
 def checked_sun(depth: float, tilt: float, n: float) -> tuple[float, float, float]:
     """Return the depth of a floor [m], tilt of the sun [rad] and the water's index over the air's [-]. InputError."""
     require(is_number(depth) and 0.0 < depth < np.inf, "depth", "a length > 0 [m]", depth)
@@ -329,7 +335,7 @@ def wrong_shares(ways: Sequence[int | str], steepnesses: Sequence[float], rays: 
     place = np.random.default_rng(0).uniform(0.0, tile, (rays, 2))
     x, y, _ = refracted(TILT, sea.slope(*place.T), INDEX)
     direction = np.column_stack([x, y, -np.ones(rays)]) / np.sqrt(1.0 + x * x + y * y)[:, None]
-    calm = float(refracted(TILT, (np.zeros(1), np.zeros(1)), INDEX)[0][0])
+    calm, _ = calm_ray(TILT, INDEX)
     found = np.zeros((len(ways), len(steepnesses)))
     for column, steep in enumerate(steepnesses):
         under = floor.scaled(steep / (floor.steepest * calm))
