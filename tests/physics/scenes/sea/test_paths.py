@@ -17,16 +17,7 @@ from profilefit.scenes.sea.law import beam_share, water_mtf
 from profilefit.scenes.sea.paths import Sunlight, followed, met, traced, turn
 from profilefit.scenes.sea.scene import lobes_of
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import (
-    Waves,
-    calm_ray,
-    dense_hit,
-    newton_hit,
-    random_floor,
-    random_sea,
-    refracted,
-    to_plane,
-)
+from profilefit.scenes.sea.waves import Waves, dense_hit, newton_hit, random_floor, random_sea, refracted, to_plane
 from tests.unit.scenes.scenes import refused
 
 SHARP = HenyeyGreenstein(0.924)
@@ -320,7 +311,8 @@ def test_light_to_and_fro_under_a_calm_surface(tilt):
 def test_sunlight_in_the_water_is_a_caustic_map(context, tilt, drift):
     """On the floor, which is so deep that a calm sea bends light by whole pixels; another sea's map is far from it."""
     pixels = 32
-    depth = drift * TILE / pixels / calm_ray(tilt, N)[0] if drift else 4.0
+    bend = float(refracted(tilt, (np.zeros(1), np.zeros(1)), N)[0][0])
+    depth = drift * TILE / pixels / bend if drift else 4.0
     sea, floor = random_sea(0.12, TILE, 3), Waves(TILE, mean=-depth)
     world = World((0.1,) * 3, (0.1,) * 3, MILD, N, sea, floor, ONE, tilt, ONE, NONE)
     light = Sunlight(world, levels=8, pixels=pixels, rays=384)
