@@ -37,15 +37,7 @@ class SeaPasses:
     light  passes of the floor's map and its levels of detail, and of the maps in depths, by their names
     """
 
-    def __init__(
-        self,
-        renderer: Renderer,
-        world: World,
-        splat: Splat,
-        vertices: int = 256,
-        texels: int = 256,
-        slices: int = 12,
-    ) -> None:
+    def __init__(self, renderer: Renderer, world: World, splat: Splat, vertices: int, texels: int, slices: int) -> None:
         """Draw hits once, and lay out the maps.
 
         splat  of all maps;  slices  maps in depths
