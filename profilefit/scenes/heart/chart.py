@@ -31,13 +31,6 @@ def ways(
     }
 
 
-def frames(drawn: HeartRender, kinds: Sequence[str], turns: int = TURNS, sampling: Sampling = SURE) -> dict[str, float]:
-    """Return the least milliseconds of a whole frame by each kind, taken in turns."""
-    techniques = [drawn.named(kind) for kind in kinds]
-    times = [[drawn.stage.time(one.by, one.mfp, sampling, 1, "frame")[0] for one in techniques] for _ in range(turns)]
-    return dict(zip(kinds, np.min(times, axis=0).tolist(), strict=True))
-
-
 def error(drawn: HeartRender, kind: str) -> float:
     """Return the root mean square error of a technique with many samples, over the mean of the reference [-]."""
     return drawn.judge.rmse(drawn.stage.scatter(drawn.technique(kind), drawn.light.mfp, SURE))

@@ -108,7 +108,7 @@ def test_ways_and_frames(context, request_small):
         assert many.rmse < few.rmse < ways["none"][0].rmse
         assert len(many.milliseconds) == 2
         assert many.rmse == pytest.approx(chart.error(found, "screen"))
-        frames = chart.frames(found, ("split", "texture"), turns=1)
+        frames = heart.frames(found, ("split", "texture"), 1, chart.SURE)
         assert list(frames) == ["split", "texture"]
         assert min(frames.values()) > 0
 
