@@ -204,7 +204,7 @@ class _Flight:
         self.z = self.z[kept] + length * dz
         self.least = np.minimum(self.least[kept], self.z)
         below, above = phase.deflection(2.0 * self.rng.random(kept.size) - 1.0)
-        self.dx, self.dy, self.dz = turn(dx, dy, dz, below, above, 2.0 * np.pi * self.rng.random(kept.size))
+        self.dx, self.dy, self.dz = turn((dx, dy, dz), below, above, 2.0 * np.pi * self.rng.random(kept.size))
         self.length = self.rng.exponential(size=kept.size)
         return True
 

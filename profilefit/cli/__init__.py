@@ -46,13 +46,14 @@ for panel, commands in PANELS.items():
 add_version(app, "profilefit")
 
 
-def _stopped() -> str:
-    if sys.argv[1:2] == [regenerate.__name__]:
-        return "stopped; the finished batches are kept, the same command resumes"
-    return "stopped"
-
-
-PROGRAM = Program("profilefit", app, (InputError, OutputError, ShaderError, StoreError), _stopped, remedied=in_options)
+RESUMES = "; the finished batches are kept, the same command resumes"
+PROGRAM = Program(
+    "profilefit",
+    app,
+    (InputError, OutputError, ShaderError, StoreError),
+    lambda: "stopped" + RESUMES * (sys.argv[1:2] == [regenerate.__name__]),
+    remedied=in_options,
+)
 
 
 def main() -> None:

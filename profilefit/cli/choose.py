@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from profilefit.cli.options import AsJson, Quiet
+from profilefit.scenes import SCENES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +65,7 @@ def choose(
     elif measure:
         raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
     else:
-        body, printed, served = OTHERS[kind](str(scene), content, quiet)
+        body, printed, served = OTHERS[kind](import_module(SCENES[kind][0]).read(str(scene), content), quiet)
     answer(body, (), printed, as_json)
     if not served:
         raise typer.Exit(UNSERVED)
@@ -90,38 +92,33 @@ def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> Scene
     return table.content(choice, ratios, layers), printed, choice.chosen is not None
 
 
-def _heart(file: str, content: Table, quiet: bool) -> SceneNeed:
+def _heart(request: Any, quiet: bool) -> SceneNeed:
     from mcml_sim.runs.progress import working
     from profilefit.report.tables.choose_table import atlas_content, atlas_line
-    from profilefit.scenes.heart.scene import read
     from profilefit.shader import opened
     from profilefit.studies.choose.scenes import atlas_need
 
-    request = read(file, content)
     with working("summing what the screen does not see", quiet), opened() as context:
         need = atlas_need(context, request)
     return atlas_content(need), [atlas_line(need)], True
 
 
-def _sea(file: str, content: Table, quiet: bool) -> SceneNeed:
+def _sea(request: Any, quiet: bool) -> SceneNeed:
     from mcml_sim.runs.progress import working
     from profilefit.report.tables.choose_table import sea_content, sea_lines
-    from profilefit.scenes.sea.scene import read
     from profilefit.studies.choose.scenes import sea_need
 
-    request = read(file, content)
     with working("summing the haze", quiet):
         need = sea_need(request)
     return sea_content(need), sea_lines(need), True
 
 
-def _fur(file: str, content: Table, quiet: bool) -> SceneNeed:
+def _fur(request: Any, quiet: bool) -> SceneNeed:
     from mcml_sim.runs.progress import tracked
     from profilefit.report.tables.choose_table import fur_content, fur_lines
-    from profilefit.scenes.fur.scene import read
     from profilefit.studies.choose.scenes import ANGLES, fur_need
 
-    need = fur_need(read(file, content), tracked(ANGLES, "casting rays", "angles", quiet=quiet))
+    need = fur_need(request, tracked(ANGLES, "casting rays", "angles", quiet=quiet))
     return fur_content(need), fur_lines(need), need.way is not None
 
 

@@ -11,11 +11,11 @@ import typer
 from profilefit.errors import OutputError
 from profilefit.recipes.folder import shipped
 
+OUT = Path("examples")
+
 
 def examples(
-    out: Annotated[Path, typer.Option(help="Folder to copy them into; what is there is never replaced.")] = Path(
-        "examples"
-    ),
+    out: Annotated[Path, typer.Option(help="Folder to copy them into; what is there is never replaced.")] = OUT,
 ) -> None:
     """Copy the files that other commands' examples read.
 
@@ -31,9 +31,8 @@ def examples(
 
     files = sorted(path for path in shipped("examples").iterdir() if path.is_file())
     if taken := [path.name for path in files if os.path.lexists(out / path.name)]:
-        raise OutputError(
-            f"cannot write into {out}: {', '.join(taken)} would be replaced; use --out with another folder"
-        )
+        mend = "use --out with another folder"
+        raise OutputError(f"cannot write into {out}: {', '.join(taken)} would be replaced; {mend}")
     for path in files:
         require_writable(out / path.name)
     write_together({out / path.name: path.read_bytes() for path in files})

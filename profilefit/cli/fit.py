@@ -146,8 +146,13 @@ def fit(
     given = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
     where = premises(measured, law, given, {name: f"--{name}" for name in given})
     held = _held(fix or [], measured.unit)
-    known = None if total is None else _total(total)
-    factor = _scale(scale)
+    known: Known | None = None
+    if total is not None:
+        accepted, hint = "a reflectance in (0, 1) with its error, such as 0.52+-0.01", percent(total)
+        if hint or (known := _known("--total", total)).error == 0 or known.value >= 1:
+            raise refused("--total", accepted, total, hint)
+    times = None if scale == FREE else _known("--scale", scale)
+    factor = times.value if times is not None and not times.error else times
     oblique_centre = None if oblique is None else _oblique(oblique, measured.unit)
     if layers is not None:
         options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
@@ -198,8 +203,14 @@ def _fit_phase(
     table = read_phase(request(str(data)) or data)
     if out is not None:
         require_folder(out, "fit.json")
+    low, high = ALL_ANGLES
+    if angles is not None:
+        match = PAIR.fullmatch(angles.strip())
+        low, high = (_number("--angles", match[at]) for at in (1, 2)) if match else (1.0, 0.0)
+        if not 0 <= low < high <= 180:
+            raise refused("--angles", "two rising angles in 0 ... 180 degrees, such as 1:180", angles)
     with working("fitting", quiet):
-        body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
+        body = content(table, fits_of(table, (low, high)))
     answer(body, phase_tables(body), premise_lines(body), as_json, out, "fit.json", quiet=quiet)
     if body["fit"]["result"] != "converged":
         raise typer.Exit(FAILED)
@@ -255,14 +266,6 @@ def _medium(file: Path, unit: str) -> Medium:
     return replace(stack.media[0], layers=tuple(layers))
 
 
-def _range(text: str) -> tuple[float, float]:
-    match = PAIR.fullmatch(text.strip())
-    low, high = (_number("--angles", match[at]) for at in (1, 2)) if match else (1.0, 0.0)
-    if not 0 <= low < high <= 180:
-        raise refused("--angles", "two rising angles in 0 ... 180 degrees, such as 1:180", text)
-    return low, high
-
-
 def _held(fix: list[str], unit: str) -> dict[str, float]:
     """Return what `--fix` holds: alpha or A, and l."""
     from profilefit.measured.data import length
@@ -279,24 +282,6 @@ def _held(fix: list[str], unit: str) -> dict[str, float]:
             raise refused(option, "a number in (0, 1)", value, hint)
         held[name] = length(option, value, unit) if name == "l" else _number(option, value)
     return held
-
-
-def _scale(text: str) -> float | Known | None:
-    """Return the value of `--scale`: None if free, a number, or one with its error."""
-    if text == FREE:
-        return None
-    known = _known("--scale", text)
-    return known if known.error else known.value
-
-
-def _total(text: str) -> Known:
-    accepted = "a reflectance in (0, 1) with its error, such as 0.52+-0.01"
-    if hint := percent(text):
-        raise refused("--total", accepted, text, hint)
-    known = _known("--total", text)
-    if known.error == 0 or known.value >= 1:
-        raise refused("--total", accepted, text)
-    return known
 
 
 def _oblique(text: str, unit: str) -> Oblique:

@@ -9,9 +9,7 @@ import typer
 FILES = ("scene", "stack", "recipe", "photo")
 
 
-def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of the file: {', '.join(FILES)}.")],
-) -> None:
+def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of the file: {', '.join(FILES)}.")]) -> None:
     """Print the JSON Schema of a file.
 
     Editors complete and check keys by it. Limits that join several keys are checked by the commands alone.

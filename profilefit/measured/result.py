@@ -367,7 +367,7 @@ def content(result: MediumPosterior) -> dict[str, Any]:
     fit = result.fit
     data, spec, names, ranges = fit.data, fit.spec, result.identified, fit.range_marginal
     joint = model.correlation(fit.gradients, fit.statistical, names) if names else None
-    body = {
+    body: dict[str, Any] = {
         "data": {
             "file": data.source,
             "sha256": data.digest,

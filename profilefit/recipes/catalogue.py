@@ -22,6 +22,7 @@ Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.
 (ALBEDO_RECORD,) = Rational.entry.records
 Names = Sequence[str] | None
+Lists = Sequence[Callable[..., "list[LoadedLaw]"]]
 REGENERATED = "regenerated"
 NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 
@@ -239,12 +240,7 @@ def find_map(name: str, folder: Folder, **options: Any) -> LoadedLaw | None:
 
 
 def _found(
-    name: str,
-    records: Records,
-    kind: Any,
-    lists: Sequence[Callable[..., list[LoadedLaw]]],
-    constants: str | None = None,
-    **of: Any,
+    name: str, records: Records, kind: Any, lists: Lists, constants: str | None = None, **of: Any
 ) -> LoadedLaw | None:
     """Return the law of a record, else of a class of that name, with the n and g given; None where there is neither."""
     if name in records.paths and constants in (None, REGENERATED):

@@ -24,16 +24,8 @@ from scipy.stats import chi2
 
 from mcml_sim import Orders
 from mcml_sim.media.arrays import Floats
-from profilefit.fitting.estimate import (
-    JACKKNIFE_GROUPS,
-    Fit,
-    ResidualFunction,
-    Rings,
-    fit,
-    judged,
-    misfit_covariance,
-    rings_of,
-)
+from profilefit.fitting import estimate
+from profilefit.fitting.estimate import Fit, ResidualFunction, Rings, judged
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws.base import Constants
@@ -55,9 +47,10 @@ SMALLEST_SHARE = 1e-7
 LARGEST_CUT = 0.1  # of a standard error of A: what the end of the longest paths may take away
 LEAST_CHANCE = 0.0027  # of a difference by noise alone that is none: three standard errors of a single constant
 AGREE, DIFFER = "the fits agree", "the fits differ by more than the photons' noise"
+NO_ERRORS = "the photon fit has no finite errors: leave out radial bins that hold next to no light"
 # Widths of rings [of those fitted], as many at once as the jackknife has groups: that solver is compiled already. Of
 # the trusted ones the error is made; wider rings show the order.
-FACTORS, TRUSTED, ORDER = tuple(range(1, JACKKNIFE_GROUPS + 1)), (2, 3), 2
+FACTORS, TRUSTED, ORDER = tuple(range(1, estimate.JACKKNIFE_GROUPS + 1)), (2, 3), 2
 NONE = 1e-9  # width of a ring that holds nothing [of the next edge]: narrower than any other, wide enough to divide by
 
 
@@ -118,9 +111,8 @@ def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
     for one in sorted(found, key=lambda one: (not one.converged, _cost(one))):
         home = next((group for group in groups if _same(one, group[0])), None)
         if home is None:
-            groups.append([one])
-        else:
-            home.append(one)
+            groups.append(home := [])
+        home.append(one)
     return groups
 
 
@@ -128,7 +120,7 @@ def _same(one: Solution, other: Solution) -> bool:
     """Return whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
-    error = np.sqrt(np.diag(misfit_covariance(other)))
+    error = np.sqrt(np.diag(estimate.misfit_covariance(other)))
     near = np.maximum(SAME_CONSTANT * np.abs(other.parameters), SAME_IN_ERROR * error)
     return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
 
@@ -150,10 +142,10 @@ def crosscheck(own: Fit, exact: Profiles, light: Orders) -> dict[str, Any]:
     # Albedos that rest on enough photons, none of which were cut to an extent that matters.
     error = np.asarray(run.reflectance(photons.alpha).standard_error)
     uncut = np.asarray(run.cut(photons.alpha)) <= LARGEST_CUT * error
-    counted = uncut & (np.asarray(rings_of(photons, xi=xi).weight) > 0)
+    counted = uncut & (np.asarray(estimate.rings_of(photons, xi=xi).weight) > 0)
     limits = tuple(np.asarray(own.rings.limits))
     one, other = (
-        fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
+        estimate.fit(profiles, own.law, own.objective, own.free, used, limits, xi, counted, jackknife=False)
         for profiles in (exact, photons)
     )
     return compared(one, other, light.photons, int(np.sum(seen & ~used)), int(np.sum(~counted)))
@@ -170,8 +162,10 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
     """
     one, other = exact.solution.parameters, photons.solution.parameters
     covariance = np.asarray(photons.statistical)
-    if problem := _problem(exact, photons):
-        result, covariance = problem, np.full((one.size,) * 2, np.nan)
+    failed = [(name, each) for name, each in (("exact", exact), ("photon", photons)) if not each.solution.converged]
+    if failed or photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
+        result = f"the {failed[0][0]} fit failed: {failed[0][1].result}" if failed else NO_ERRORS
+        covariance = np.full((one.size,) * 2, np.nan)
         distance, rank, chance = np.nan, 0, np.nan
     else:
         distance, rank = mahalanobis(other - one, covariance)
@@ -185,15 +179,6 @@ def compared(exact: Fit, photons: Fit, traced: int, rings_left_out: int, albedos
         **{"photons": traced, "chi2": distance, "rank": rank, "chance": chance, "result": result},
         **{"rings_left_out": rings_left_out, "albedos_left_out": albedos_left_out},
     }
-
-
-def _problem(exact: Fit, photons: Fit) -> str | None:
-    for name, one in (("exact", exact), ("photon", photons)):
-        if not one.solution.converged:
-            return f"the {name} fit failed: {one.result}"
-    if photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
-        return "the photon fit has no finite errors: leave out radial bins that hold next to no light"
-    return None
 
 
 def mahalanobis(difference: Floats, covariance: Floats) -> tuple[float, int]:

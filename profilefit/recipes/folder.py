@@ -22,9 +22,9 @@ def known_folder(requested: Path | None = None) -> Path:
     return requested or (LOCAL if available(LOCAL) else fits_folder())
 
 
-def available(folder: Path) -> dict[str, Path]:
-    """Return the records of a folder by name, in order."""
-    return {path.stem: path for path in sorted(folder.glob("*.json"))}
+def available(folder: Path, ending: str = "json") -> dict[str, Path]:
+    """Return the records of a folder by name, in order, or files of another ending."""
+    return {path.stem: path for path in sorted(folder.glob(f"*.{ending}"))}
 
 
 def shipped(name: str) -> Path:

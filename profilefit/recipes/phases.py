@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -118,54 +118,39 @@ def read_phase(path: Path) -> PhaseData:
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
         raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte {content[error.start]:#04x}") from None
-    kept = [(at, line.partition("#")[0].strip()) for at, line in enumerate(lines, start=1)]
-    kept = [(at, line) for at, line in kept if line]
-    if not kept:
+    texts = {at: line.partition("#")[0].strip() for at, line in enumerate(lines, start=1)}
+    (first, header), *rows = [(at, text) for at, text in texts.items() if text] or [(0, "")]
+    if not header:
         raise InputError(f"{path}: expected a header of {ACCEPTED}, got an empty file")
-    units = _header(path, *kept[0])
-    if not FEWEST_ROWS <= len(kept) - 1 <= MOST_ROWS:
-        raise InputError(f"{path}: expected {FEWEST_ROWS} to {MOST_ROWS} rows under the header, got {len(kept) - 1}")
-    rows = []
-    for at, text in kept[1:]:
-        cells = [cell.strip() for cell in text.split(",")]
-        if len(cells) != len(units):
-            raise InputError(f"{path}:{at}: expected {len(units)} cells, as the header has, got {len(cells)}")
-        rows.append([_number(path, at, name, cell) for name, cell in zip(units, cells, strict=True)])
-    column = dict(zip(units, np.array(rows).T, strict=True))
-    degrees, values = column["angle"], column["value"]
-    for (at, _), before, angle, value in zip(kept[1:], [-1.0, *degrees[:-1]], degrees, values, strict=True):
+    units = _header(path, first, header)
+    if not FEWEST_ROWS <= len(rows) <= MOST_ROWS:
+        raise InputError(f"{path}: expected {FEWEST_ROWS} to {MOST_ROWS} rows under the header, got {len(rows)}")
+    table = [_row(path, at, text, units) for at, text in rows]
+    column = dict(zip(units, np.array(table).T, strict=True))
+    degrees, values, sigma = column["angle"], column["value"], column.get("sigma")
+    for (at, _), before, angle, value in zip(rows, [-1.0, *degrees[:-1]], degrees, values, strict=True):
         if not 0 <= angle <= 180 or angle <= before:
             raise InputError(f"{path}:{at}: expected an angle in [0, 180] degrees that rises, got {angle:g}")
         if not value > 0:
             raise InputError(f"{path}:{at}: expected a value > 0, got {value:g}")
     if degrees[-1] < LEAST_DEGREES:
-        raise InputError(
-            f"{path}: expected angles in degrees up to 180, got {degrees[-1]:g} at most: radians times 180 / pi"
-        )
-    sigma = column.get("sigma")
+        got = f"{degrees[-1]:g} at most: radians times 180 / pi"
+        raise InputError(f"{path}: expected angles in degrees up to 180, got {got}")
     if sigma is not None and not np.all(sigma > 0):
-        raise InputError(f"{path}:{kept[1 + int(np.argmin(sigma > 0))][0]}: expected a sigma > 0, got {sigma.min():g}")
+        raise InputError(f"{path}:{rows[int(np.argmin(sigma > 0))][0]}: expected a sigma > 0, got {sigma.min():g}")
     angles = np.radians(degrees)
     with np.errstate(over="ignore", invalid="ignore"):
         pieces = Tabulated.through(angles, values)
         integral = pieces.total
     if angles[0] > 0 and pieces.slope[0] <= -1:
-        raise InputError(
-            f"{path}: expected first rows that rise towards 0 degrees slower than angle^-2, which has an integral, got "
-            f"angle^{2 * pieces.slope[0]:.3g}: a row at 0 degrees ends the rise"
-        )
+        expected = "first rows that rise towards 0 degrees slower than angle^-2, which has an integral"
+        got = f"angle^{2 * pieces.slope[0]:.3g}: a row at 0 degrees ends the rise"
+        raise InputError(f"{path}: expected {expected}, got {got}")
     if not 0 < integral < np.inf:
         raise InputError(f"{path}: expected values whose integral is finite and > 0, got {integral:g}")
-    return PhaseData(
-        str(path),
-        hashlib.sha256(content).hexdigest(),
-        angles,
-        values / integral,
-        None if sigma is None else sigma / values,
-        integral,
-        UNITS[units["value"]],
-        _spans(angles, values / integral),
-    )
+    relative, density = None if sigma is None else sigma / values, values / integral
+    digest, unit = hashlib.sha256(content).hexdigest(), UNITS[units["value"]]
+    return PhaseData(str(path), digest, angles, density, relative, integral, unit, _spans(angles, density))
 
 
 def _spans(angles: Floats, values: Floats) -> list[dict[str, Any]]:
@@ -187,9 +172,8 @@ def _spans(angles: Floats, values: Floats) -> list[dict[str, Any]]:
         on, slope = u[-1] * (2 / u[-1]) ** t, np.log(f[-1] / f[first]) / np.log(u[-1] / u[first])
         with np.errstate(over="ignore"):
             power = min(np.trapezoid(f[-1] * (on / u[-1]) ** slope, on), MOST_SHARE)
-        found.append(
-            (angles[-1], np.pi, 1 - below[-1], "the last value", power, f"the power law of the last {WIDEST:g} degrees")
-        )
+        other = f"the power law of the last {WIDEST:g} degrees"
+        found.append((angles[-1], np.pi, 1 - below[-1], "the last value", power, other))
     return [dict(zip(SPAN, (np.degrees(low), np.degrees(high), *rest), strict=True)) for low, high, *rest in found]
 
 
@@ -213,14 +197,19 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
     return units
 
 
-def _number(path: Path, at: int, name: str, cell: str) -> float:
-    try:
-        number = float(cell)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(f"{path}:{at}: column {name}: expected a finite number, got {_shown(cell)}")
-    return number
+def _row(path: Path, at: int, text: str, names: Collection[str]) -> list[float]:
+    """Return the numbers of a row, one for each column."""
+    cells, numbers = text.split(","), []
+    if len(cells) != len(names):
+        raise InputError(f"{path}:{at}: expected {len(names)} cells, as the header has, got {len(cells)}")
+    for name, cell in zip(names, cells, strict=True):
+        try:
+            numbers.append(float(cell))
+        except ValueError:
+            numbers.append(math.nan)
+        if not math.isfinite(numbers[-1]):
+            raise InputError(f"{path}:{at}: column {name}: expected a finite number, got {_shown(cell)}")
+    return numbers
 
 
 def _shown(cell: str) -> str:
@@ -301,11 +290,11 @@ def fit_phase(
     data = data.off_axis
     used = data.within(*angles)
     if np.count_nonzero(used) < 2 * own.free:
-        raise InputError(
-            f"angles must hold {2 * own.free} rows or more for {form}, got {np.count_nonzero(used)} "
-            f"in {angles[0]:g} ... {angles[1]:g} degrees"
-        )
-    arrays = _arrays(data, used, moments)
+        got = f"{np.count_nonzero(used)} in {angles[0]:g} ... {angles[1]:g} degrees"
+        raise InputError(f"angles must hold {2 * own.free} rows or more for {form}, got {got}")
+    weight = np.where(used, 1.0 if data.sigma is None else 1.0 / data.sigma, 0.0)
+    weight = weight / np.sqrt(np.sum(weight**2) / np.count_nonzero(used))
+    arrays = np.cos(data.angles), np.log(data.values), weight, np.array(moments)
     residual = _residual(form, held)
     random = np.random.default_rng(seed)
     found = [least_squares(residual, start, arrays) for start in own.starts(random, STARTS)]
@@ -329,13 +318,6 @@ def _rms(off: Floats) -> float:
     return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
 
 
-def _arrays(data: PhaseData, used: NDArray[np.bool_], moments: tuple[float, float]) -> tuple[Floats, ...]:
-    """Return cosines, ln values, weights whose squares have the mean 1, and moments."""
-    weight = np.where(used, 1.0 if data.sigma is None else 1.0 / data.sigma, 0.0)
-    weight = weight / np.sqrt(np.sum(weight**2) / np.count_nonzero(used))
-    return np.cos(data.angles), np.log(data.values), weight, np.array(moments)
-
-
 @lru_cache(maxsize=64)
 def _residual(form: str, held: tuple[str, ...]) -> Callable[[Array, Any], Array]:
     """One function a question: a program is compiled for each."""
@@ -353,13 +335,12 @@ def _residual(form: str, held: tuple[str, ...]) -> Callable[[Array, Any], Array]
     return residual
 
 
+Arrays = tuple[Floats, ...]  # cosines, ln values, weights whose squares have the mean 1, and moments
+Mask = NDArray[np.bool_]
+
+
 def _errors(
-    form: PhaseForm,
-    held: tuple[str, ...],
-    best: Solution,
-    arrays: tuple[Floats, ...],
-    data: PhaseData,
-    used: NDArray[np.bool_],
+    form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: Arrays, data: PhaseData, used: Mask
 ) -> dict[str, Floats | None]:
     """Return the errors of the constants (c,), by their names in records; NaN in each where the fit failed.
 
@@ -402,9 +383,7 @@ def _errors(
     }
 
 
-def _jackknife(
-    form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: tuple[Floats, ...], used: NDArray[np.bool_]
-) -> Floats:
+def _jackknife(form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: Arrays, used: Mask) -> Floats:
     """Return the standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2).
 
     They are NaN where a refit fails.
@@ -413,9 +392,8 @@ def _jackknife(
     group = np.where(used, (np.cumsum(used) - 1) // TOGETHER % JACKKNIFE_GROUPS, -1)
     moved = []
     for number in range(JACKKNIFE_GROUPS):
-        again = least_squares(
-            _residual(form.name, held), best.parameters, (cosine, level, weight * (group != number), moments)
-        )
+        fewer = cosine, level, weight * (group != number), moments
+        again = least_squares(_residual(form.name, held), best.parameters, fewer)
         with jax.enable_x64(True):
             own = np.asarray(form.constants(jnp.asarray(again.parameters)))
         moved.append(own if again.converged else np.full(own.shape, np.nan))

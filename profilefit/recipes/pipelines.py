@@ -72,9 +72,8 @@ def work(recipe: Recipe, run: RecipeRun, pipelines: Mapping[str, Pipeline]) -> W
     second = spans and recipe.setting.illumination == "diffuse"
     stage = {"albedo": MAPS, "evidence": COMPARISONS}.get(recipe.pipeline, LAWS)
     order = stage, 0 if spans else 2, second, not recipe.cosines, -recipe.random_starts
-    return Work(
-        recipe.name, (partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light),), finish, order=order
-    )
+    part = partial(_run, pipelines[recipe.pipeline], recipe, run.part(), light)
+    return Work(recipe.name, (part,), finish, order=order)
 
 
 def _run(pipeline: Pipeline, recipe: Recipe, run: RecipeRun, light: Orders | None) -> tuple[RecordContent, list[str]]:
@@ -89,22 +88,16 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         **{key: getattr(recipe, key) for key in ("title", "law", "equations", "pipeline", "note", "setting")},
         **({"indices": recipe.span} if recipe.indices else {}),
         **({"cosines": (0.0, recipe.cosines[-1])} if recipe.cosines else {}),
-        "protocol": {
-            **recipe.model_dump(include={"albedos", "rings", "weighting", "mfp", "start", "held"}),
-            **spans,
-        },
+        "protocol": {**recipe.model_dump(include={"albedos", "rings", "weighting", "mfp", "start", "held"}), **spans},
         "truth": {"kind": recipe.truth},
         "preset": run.preset,
         "seed": run.seed,
         "versions": record.versions(),
     }
     if recipe.truth == "orders" and light is not None:
-        header["truth"] |= {
-            "photons": light.photons,
-            "grid_digest": light.grid.digest,
-            "cut": {f"{a:g}": light.cut(a) for a in (0.9, 0.99, 0.995, 0.999, 1.0)},
-            "ledger": light.ledger,
-        }
+        cut = {f"{a:g}": light.cut(a) for a in (0.9, 0.99, 0.995, 0.999, 1.0)}
+        own = {"photons": light.photons, "grid_digest": light.grid.digest, "ledger": light.ledger}
+        header["truth"] |= {**own, "cut": cut}
     return header
 
 
@@ -200,10 +193,8 @@ def description(recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit)
         "covariance": {"names": result.free, **covariances},
         "discrepancy": off.content(),
         "fit": {
-            "result": result.result,
-            "steps": result.solution.steps,
-            "condition_number": result.solution.condition_number,
-            "residuals": result.structure,
+            **{key: getattr(result.solution, key) for key in ("steps", "condition_number")},
+            **{"result": result.result, "residuals": result.structure},
         },
         "posterior": {
             c.kind: {
@@ -240,11 +231,6 @@ def curves(profiles: Profiles) -> Arrays:
         "energy_error": profiles.standard_error[own],
         "beyond": profiles.beyond[own],
     }
-
-
-def errors_by_name(names: tuple[str, ...], covariance: Floats | None) -> dict[str, float]:
-    """Return standard errors from a covariance; none where there is none."""
-    return {} if covariance is None else dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
 def _constants(

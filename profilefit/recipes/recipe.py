@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -14,16 +14,13 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, printable, words
+from profilefit.recipes.folder import available as available_files
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
 
-TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
 PAPERS = ("as-published", "evidence")
-CHECKS = ("", "orders")
-SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
-TRIMMED = ("r R_d", "R_d", "none")
 NEAR_MATCHED = 1.02  # laws in n are continued to 1 from here
 FEWEST_INDICES, LARGEST_INDEX = 4, 3.0  # coefficients are cubics in n; exact light is promised up to 3
 FEWEST_OF_G = 3  # indices, and mean cosines, of a law in g, whose coefficients are straight lines in n
@@ -48,7 +45,7 @@ class Albedos(Declared):
     low: Share
     high: Share
     count: Annotated[int, Field(ge=3, le=1000)]
-    spacing: Annotated[str, OneOf(*SPACINGS)] = "sqrt(1-alpha)"
+    spacing: Annotated[str, OneOf("alpha", "reflectance", "sqrt(1-alpha)")] = "sqrt(1-alpha)"
 
     @model_validator(mode="after")
     def _rising(self) -> Self:
@@ -64,7 +61,7 @@ class RingLayout(Declared):
     dr: Annotated[float, Field(ge=0.0)] = 0.0
     first: Annotated[float, Field(ge=0.0)] = 0.0
     count: Annotated[int, Field(ge=0, le=1000)] = 0
-    trim: Annotated[str, OneOf(*TRIMMED)] = "none"
+    trim: Annotated[str, OneOf("r R_d", "R_d", "none")] = "none"
     epsilon: Annotated[float, Field(gt=0.0, lt=1.0), words("a number in (0, 1)")] = 0.005
 
     @model_validator(mode="after")
@@ -129,12 +126,12 @@ class Recipe(Declared):
     law: Words
     equations: Words
     pipeline: Annotated[str, OneOf(*PIPELINES)]
-    truth: Annotated[str, OneOf(*TRUTHS)]
+    truth: Annotated[str, OneOf("orders", "exact")]
     start: Words = "published"
     setting_table: SettingTable = Field(SettingTable(), alias="setting")
     indices: Numbers = ()
     cosines: Numbers = ()
-    check: Annotated[str, OneOf(*CHECKS), words("'orders' or absent")] = ""
+    check: Annotated[str, OneOf("", "orders"), words("'orders' or absent")] = ""
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
     albedos: Albedos = Albedos(low=0.05, high=0.995, count=24)
     weighting: Weighting = Weighting(objective="")
@@ -185,35 +182,56 @@ class Recipe(Declared):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        pipeline, objective = self.pipeline, self.weighting.objective
         self._require_setting()
-        self._require_tests()
+        if self.check and self.truth != "exact":
+            got = f"got truth = {self.truth!r}"
+            raise InputError(f'check needs truth = "exact": it compares the photons with it, {got}')
+        if pipeline in PAPERS and (self.check or self.random_starts):
+            raise InputError(f"pipeline {pipeline!r} takes neither check nor random_starts")
         if len(set(self.mfp)) < len(self.mfp):
             raise Refused("a list of different lengths", list(self.mfp), "mfp")
-        if self.pipeline == "as-published" and 1.0 not in self.mfp:
+        if pipeline == "as-published" and 1.0 not in self.mfp:
             raise InputError(f"mfp of pipeline 'as-published' must contain 1.0, got {list(self.mfp)!r}")
-        if self.rings is None and self.pipeline not in ("albedo", "evidence"):
-            raise InputError(f"a recipe of pipeline {self.pipeline!r} needs a table [rings]")
-        objectives = PIPELINES[self.pipeline][0] or ("",)
-        if self.weighting.objective not in objectives:
-            raise Refused(f"one of {', '.join(objectives)}", self.weighting.objective, "weighting", "objective")
-        if self.pipeline == "inverse" and self.weighting.shares == 0:
+        if self.rings is None and pipeline not in ("albedo", "evidence"):
+            raise InputError(f"a recipe of pipeline {pipeline!r} needs a table [rings]")
+        if objective not in (objectives := PIPELINES[pipeline][0] or ("",)):
+            raise Refused(f"one of {', '.join(objectives)}", objective, "weighting", "objective")
+        if pipeline == "inverse" and self.weighting.shares == 0:
             raise Refused("a whole number in 1 ... 10000 of pipeline 'inverse'", 0, "weighting", "shares")
-        for mfp in self.mfp if self.pipeline == "as-published" else (1.0,):
+        for mfp in self.mfp if pipeline == "as-published" else (1.0,):
             if self.rings is not None:
                 self.rings.require_fit(mfp)
         return self
 
     def _require_setting(self) -> None:
-        where = self.setting
-        if self.cosines:
-            self._require_cosines()
-        if where.g != 0 and not self.cosines:
+        """Refuse an illumination, index or g, or several of them, that the pipeline cannot fit to."""
+        where, indices, cosines = self.setting, list(self.indices), list(self.cosines)
+        if cosines:
+            low, high = FORWARD_N
+            if not indices or not all(low <= n <= high for n in indices):
+                raise InputError(f"indices must be in [{low:g}, {high:g}] where there are cosines, got {indices!r}")
+            if not _rising(cosines, FORWARD_G, above=0) or len(cosines) < FEWEST_OF_G:
+                accepted = f"at least {FEWEST_OF_G} in (0, {FORWARD_G:g}]"
+                raise InputError(f"cosines must rise, {accepted}, got {cosines!r}")
+            if self.check:
+                raise Refused("absent where there are cosines", self.check, "check")
+            if where.g not in cosines:
+                raise Refused(f"one of the cosines {cosines!r}", where.g, "setting", "g")
+        elif where.g != 0:
             raise Refused("0 where there are no cosines", where.g, "setting", "g")
         if self.truth == "exact" and not where.n >= 1:
-            accepted = "at least 1 where truth is 'exact' (use truth = \"orders\")"
-            raise Refused(accepted, where.n, "setting", "n")
-        if self.indices:
-            self._require_indices()
+            raise Refused("at least 1 where truth is 'exact' (use truth = \"orders\")", where.n, "setting", "n")
+        if indices:
+            if self.truth != "exact" or self.pipeline not in ("albedo", "profile"):
+                got = f"{self.truth!r}, {self.pipeline!r}"
+                raise InputError(f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {got}")
+            if not _rising(indices, LARGEST_INDEX, above=1):
+                raise InputError(f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {indices!r}")
+            if len(indices) < (fewest := FEWEST_OF_G if cosines else FEWEST_INDICES):
+                raise InputError(f"indices must be at least {fewest}, got {indices!r}")
+            if where.n not in indices:
+                raise Refused(f"one of the indices {indices!r}", where.n, "setting", "n")
         if self.pipeline in PAPERS and where != SEARCHLIGHT:
             raise InputError(f"setting of pipeline {self.pipeline!r} must be {SEARCHLIGHT}, got {where}")
         if self.pipeline == "inverse" and not where.is_matched_isotropic:
@@ -222,36 +240,9 @@ class Recipe(Declared):
             accepted = f"alpha or sqrt(1-alpha) where n is not 1 but {where.n!r}"
             raise Refused(accepted, "reflectance", "albedos", "spacing")
 
-    def _require_indices(self) -> None:
-        got = list(self.indices)
-        if self.truth != "exact" or self.pipeline not in ("albedo", "profile"):
-            words = f"{self.truth!r}, {self.pipeline!r}"
-            raise InputError(f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {words}")
-        if not all(1 < n <= LARGEST_INDEX for n in got) or got != sorted(set(got)):
-            raise InputError(f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {got!r}")
-        if len(got) < (fewest := FEWEST_OF_G if self.cosines else FEWEST_INDICES):
-            raise InputError(f"indices must be at least {fewest}, got {got!r}")
-        if self.setting.n not in got:
-            raise Refused(f"one of the indices {got!r}", self.setting.n, "setting", "n")
 
-    def _require_cosines(self) -> None:
-        (low, high), got = FORWARD_N, list(self.cosines)
-        if not self.indices or not all(low <= n <= high for n in self.indices):
-            accepted = f"in [{low:g}, {high:g}] where there are cosines"
-            raise InputError(f"indices must be {accepted}, got {list(self.indices)!r}")
-        if got != sorted(set(got)) or not all(0 < g <= FORWARD_G for g in got) or len(got) < FEWEST_OF_G:
-            raise InputError(f"cosines must rise, at least {FEWEST_OF_G} in (0, {FORWARD_G:g}], got {got!r}")
-        if self.check:
-            raise Refused("absent where there are cosines", self.check, "check")
-        if self.setting.g not in got:
-            raise Refused(f"one of the cosines {got!r}", self.setting.g, "setting", "g")
-
-    def _require_tests(self) -> None:
-        if self.check and self.truth != "exact":
-            got = f"got truth = {self.truth!r}"
-            raise InputError(f'check needs truth = "exact": it compares the photons with it, {got}')
-        if self.pipeline in PAPERS and (self.check or self.random_starts):
-            raise InputError(f"pipeline {self.pipeline!r} takes neither check nor random_starts")
+def _rising(numbers: list[float], most: float, above: float) -> bool:
+    return numbers == sorted(set(numbers)) and all(above < one <= most for one in numbers)
 
 
 def read(path: Path) -> Recipe:
@@ -267,9 +258,8 @@ def read(path: Path) -> Recipe:
     return Recipe.of(str(path), table, RecipeError)
 
 
-def available(folder: Path) -> dict[str, Path]:
-    """Return the recipes of a folder by name, in order."""
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+available = partial(available_files, ending="toml")
+"""Recipes of a folder by name, in order."""
 
 
 def is_recipe(name: str) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -36,6 +36,7 @@ DIGITS = 12
 CONVERGED = "converged"
 SEARCHLIGHT = Setting()
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
+Problem = Callable[[dict[str, Any]], str | None]  # in words, of a record's content
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
 
@@ -88,9 +89,7 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
         return {f"{MISFIT}{ending}" if key == f"{MISFIT_BEFORE}{ending}" else key: one for key, one in table.items()}
 
     found = {**content, "format": FORMAT}
-    for name in ("covariance", "posterior"):
-        if name in found:
-            found[name] = renamed(found[name])
+    found |= {name: renamed(found[name]) for name in ("covariance", "posterior") if name in found}
     if isinstance(found.get("constants"), dict):
         found["constants"] = {name: renamed(one, "_error") for name, one in found["constants"].items()}
         for one in found["constants"].values():
@@ -99,14 +98,24 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read_of(path: Path, pipeline: str, words: str, shown: schema.Fields) -> dict[str, Any]:
-    """Read a record of one pipeline, `words` what it is of, which holds what is `shown`; RecordError on any other."""
+def read_of(
+    path: Path, pipeline: str, words: str, shown: schema.Fields | None = None, problem: Problem | None = None
+) -> dict[str, Any]:
+    """Read a record of one pipeline, `words` what it is, which holds what is `shown`; RecordError on any other.
+
+    problem  what else is wrong with its content, in one line, or None
+    """
     content = read(path)
     if content["pipeline"] != pipeline:
-        raise RecordError(f"{path}: must be a record of {words}, got pipeline {content['pipeline']!r}")
-    if text := schema.mistyped(content, shown):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+        raise RecordError(f"{path}: must be {words}, got pipeline {content['pipeline']!r}")
+    if text := schema.mistyped(content, shown or {}) or (problem(content) if problem else None):
+        raise damaged(path, text)
     return content
+
+
+def damaged(path: Path, text: str) -> RecordError:
+    """Return the error of a record that is damaged, `text` what is wrong inside."""
+    return RecordError(f"{path}: is damaged: {text}; regenerate it")
 
 
 def named(name: str, folder: Path, pipeline: str) -> Path | None:
@@ -120,7 +129,7 @@ def named(name: str, folder: Path, pipeline: str) -> Path | None:
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
     """Raise RecordError where a record lacks what `read` promises, or holds what is of another type."""
     if text := schema.problem(content, whole) or _outside(content):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+        raise damaged(path, text)
 
 
 def _outside(content: Mapping[str, Any]) -> str | None:
@@ -160,14 +169,10 @@ def covers(content: Mapping[str, Any], setting: Setting) -> bool:
 
 def record_name(base: str, setting: Setting) -> str:
     """Return the name of the record of a setting: albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
-    usual, parts = Setting(), [base]
-    if setting.illumination != usual.illumination:
-        parts.append(setting.illumination)
-    if setting.n != usual.n:
-        parts.append(f"n{_shortest(setting.n)}")
-    if setting.g != usual.g:
-        parts.append(f"g{_shortest(setting.g)}")
-    return "-".join(parts)
+    parts = [base] if setting.illumination == SEARCHLIGHT.illumination else [base, setting.illumination]
+    numbers = {name: getattr(setting, name) for name in SPANS}
+    other = {name: value for name, value in numbers.items() if value != getattr(SEARCHLIGHT, name)}
+    return "-".join([*parts, *(f"{name}{np.format_float_positional(one, trim='-')}" for name, one in other.items())])
 
 
 def spanning_name(base: str, setting: Setting) -> str:
@@ -177,10 +182,6 @@ def spanning_name(base: str, setting: Setting) -> str:
     """
     spanning = REFRACTING if setting.g == 0.0 else FORWARD
     return f"{record_name(base, replace(setting, n=1.0, g=0.0))}-{spanning}"
-
-
-def _shortest(value: float) -> str:
-    return np.format_float_positional(value, trim="-")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -263,13 +264,8 @@ class Records:
 
     def settings(self, base: str) -> tuple[Setting, ...]:
         """Return the settings that a record is there for, by its name for Setting()."""
-        near = {name: self.read(path) for name, path in self.paths.items() if name.startswith(base)}
-        found = {name: record_setting(content) for name, content in near.items()}
-        return tuple(
-            setting
-            for name, setting in found.items()
-            if name in (record_name(base, setting), spanning_name(base, setting))
-        )
+        near = {name: record_setting(self.read(path)) for name, path in self.paths.items() if name.startswith(base)}
+        return tuple(of for name, of in near.items() if name in (record_name(base, of), spanning_name(base, of)))
 
     def name(self, base: str, setting: Setting) -> str:
         """Return the name of a setting's record.
@@ -292,9 +288,8 @@ class Records:
         if known := self.settings(base):
             there = "; ".join(self._described(base, one) for one in known)
             raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
-        raise RecordError(
-            f"{path}: there is no such record; `profilefit regenerate {base} --out {self.folder}` makes it"
-        )
+        makes = f"`profilefit regenerate {base} --out {self.folder}` makes it"
+        raise RecordError(f"{path}: there is no such record; {makes}")
 
     def path_or_shipped(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
         """Return the record of a setting, or the one that is shipped, where this folder has none of that setting."""

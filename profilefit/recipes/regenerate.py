@@ -28,6 +28,7 @@ from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.workers import Workers
 
 Request = tuple[kinds.Kind, Any]
+Content = Mapping[str, Any]
 MOST_MOVED = 0.05  # of a stated error
 EQUAL = 10.0**-record.DIGITS  # relative size of the last digit of a record
 READING = 1e-5  # relative move of a constant that a comparison of published readings refits, without errors
@@ -102,18 +103,13 @@ def reproduction(path: Path, name: str) -> Reproduction | None:
     if not shipped.exists() or shipped.resolve() == path.resolve():
         return None
     one, other = record.read(shipped), record.read(path)
-    if any(one.get(key) != other.get(key) for key in SAME) or _photons(one) != _photons(other):
+    before, after = ((each.get("truth") or {}).get("photons") for each in (one, other))
+    if any(one.get(key) != other.get(key) for key in SAME) or before != after:
         return None
     return compared(name, one, other, _chains(shipped, one), _chains(path, other))
 
 
-def compared(
-    name: str,
-    shipped: Mapping[str, Any],
-    other: Mapping[str, Any],
-    chains: Mapping[str, Any],
-    others: Mapping[str, Any],
-) -> Reproduction:
+def compared(name: str, shipped: Content, other: Content, chains: Content, others: Content) -> Reproduction:
     """Compare two records' contents; `chains` and `again` hold the draws of each kind of posterior, (k, p)."""
     if "constants" not in shipped:
         return _of_readings(name, shipped, other)
@@ -141,7 +137,7 @@ def compared(
     return Reproduction(name, len(constants), moved, relative, intervals, "; ".join(problems))
 
 
-def stated_error(constant: Mapping[str, Any]) -> float:
+def stated_error(constant: Content) -> float:
     """Return a constant's error by its record: that of the model where there is one, else the largest of the others.
 
     0 of one that was not fitted.
@@ -151,7 +147,7 @@ def stated_error(constant: Mapping[str, Any]) -> float:
     return max((float(constant.get(name) or 0.0) for name in ERRORS), default=0.0)
 
 
-def _of_readings(name: str, shipped: Mapping[str, Any], made: Mapping[str, Any]) -> Reproduction:
+def _of_readings(name: str, shipped: Content, made: Content) -> Reproduction:
     """Compare the constants of readings of a paper, which have no errors, and the verdicts.
 
     A reading whose fit has no optimum has no constants: its verdict alone counts.
@@ -170,20 +166,14 @@ def _of_readings(name: str, shipped: Mapping[str, Any], made: Mapping[str, Any])
     return Reproduction(name, len(moves), 0.0, relative, 0.0, "; ".join(problems))
 
 
-def _photons(content: Mapping[str, Any]) -> Any:
-    return (content.get("truth") or {}).get("photons")
-
-
-def _chains(path: Path, content: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _chains(path: Path, content: Content) -> dict[str, np.ndarray]:
     if not content.get("posterior"):
         return {}
     arrays = record.read_arrays(path)
     return {kind: np.asarray(arrays[f"samples_{kind}"], float) for kind in content["posterior"]}
 
 
-def _moves(
-    shipped: Mapping[str, Any], made: Mapping[str, Any], chains: Mapping[str, Any], again: Mapping[str, Any]
-) -> Iterator[tuple[float, str]]:
+def _moves(shipped: Content, made: Content, chains: Content, again: Content) -> Iterator[tuple[float, str]]:
     """Return the move of each end of each interval over what is allowed, and whose it is."""
     ends = 4 * sum(draws.shape[1] for draws in chains.values())
     most = float(norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(ends, 1)))))  # Sidak, over all ends of the record

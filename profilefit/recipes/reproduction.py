@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -68,13 +69,6 @@ class Coefficients:
         return Coefficients(self.alpha[where], self.values[where], self.cut[where])
 
 
-def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
-    """Return the same rings for some of the albedos only; `alpha` must be among them."""
-    rows = np.searchsorted(profiles.alpha, alpha)
-    names = ("alpha", "energy", "standard_error", "effective_samples", "beyond")
-    return replace(profiles, **{name: getattr(profiles, name)[rows] for name in names})
-
-
 def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
     """(7) at each albedo by unweighted least squares over the rings that (6) keeps; `mfp` in units of (6)'s strides."""
     rings, whole = protocol.rings, profiles.energy.shape[1] // protocol.rings  # what is left over at the end is dropped
@@ -87,8 +81,12 @@ def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) 
     cut = np.array([cut_radius(r * mfp, row, protocol.stop) / mfp for row in quantities[protocol.trimmed]])
     used = (r <= cut[:, None]).astype(float)
     scale = data[:, :1]
-    starts = np.stack([_linear_start(r, row, keep > 0) for row, keep in zip(data / scale, used, strict=True)])
-    solutions = solve_batch(_rational_misfit, starts, (np.broadcast_to(r, data.shape), data / scale, used))
+    starts = []
+    for y, keep in zip(data / scale, used > 0, strict=True):
+        # a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that has a pole right of 0.
+        a, b, c = _amplitudes([r[keep], np.ones_like(r)[keep], -y[keep]], (y * r)[keep])
+        starts.append([a, b, c] if c > 0 else [-0.05, 0.5, 0.5])
+    solutions = solve_batch(_MISFITS["(7)"], np.array(starts), (np.broadcast_to(r, data.shape), data / scale, used))
     return Coefficients(profiles.alpha, np.stack([s.parameters for s in solutions]) * scale ** [1, 1, 0], cut)
 
 
@@ -99,18 +97,6 @@ def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:
         return float(r[np.argmax(low)]) if low.any() else float(r[-1])
     end = trimmed_radius(r, quantity, EPSILON)
     return max(x for x in walk(float(r[-1])).tolist() if x < end - 1e-9) if stop == "stride before" else end
-
-
-def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
-    """Return a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that has a pole right of 0."""
-    columns = np.stack([r, np.ones_like(r), -y], axis=1)[used]
-    found = np.linalg.lstsq(columns, (y * r)[used], rcond=None)[0]
-    return np.asarray(found if found[2] > 0 else [-0.05, 0.5, 0.5], np.float64)
-
-
-def _rational_misfit(p, item):
-    r, data, used = item
-    return used * ((p[0] * r + p[1]) / (r + p[2]) - data)
 
 
 def even_rings(alpha: Floats, last: float = LAST_RADIUS) -> Profiles:
@@ -170,8 +156,10 @@ def judge(constant_distance: float, curve_distance: float) -> str:
     return "reproduced" if constant_distance <= CONSTANT_TOLERANCE else "curve only"
 
 
-# The paper's closed forms: alpha [-] of A by (8); of alpha a [1/mfp], b [-], c [mfp] of (7), and k1, k2 [mfp] of (19).
+# The paper's closed forms: R' [1/mfp] of r by (7) and alpha [-] of A by (8); of alpha a [1/mfp], b [-], c [mfp] of (7),
+# and k1, k2 [mfp] of (19).
 FORMS: dict[str, Callable] = {
+    "(7)": lambda r, p: (p[0] * r + p[1]) / (r + p[2]),
     "(8)": lambda x, p: p[0] * x / (x**2 + p[1] * x + p[2]),
     "a": lambda alpha, p: p[0] * alpha + p[1] * 10.0 ** (p[2] * (alpha - 1.0)),  # (9)-(11)
     "b": lambda alpha, p: p[0] * alpha ** ((p[1] * (alpha - p[2]) ** 2 + p[3]) * alpha + p[4]),  # (12)-(13)
@@ -258,7 +246,7 @@ def _fit(form: str, x: Floats, data: Floats, start, weight: Floats | float = 1.0
     return least_squares(_MISFITS[form], start, (x, data, weights), scale=np.where(start, np.abs(start), 1.0))
 
 
-def _held(columns: list[Floats], data: Floats) -> Floats:  # amplitudes, exponents as printed
+def _amplitudes(columns: list[Floats], data: Floats) -> Floats:  # what multiplies columns, nearest to the data
     return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
 
 
@@ -288,7 +276,9 @@ def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[
     found = []
     for name, here in grids.items():
         found += _law_readings(plain.at(here), f"{choices}; {name}", exponent_free=True)
-    only = profiles_at(profiles, alpha)
+    rows = np.searchsorted(profiles.alpha, alpha)  # the same rings for some of the albedos only
+    names = ("alpha", "energy", "standard_error", "effective_samples", "beyond")
+    only = replace(profiles, **{name: getattr(profiles, name)[rows] for name in names})
     for protocol in PROTOCOLS:
         found += _law_readings(fit_coefficients(only, protocol), f"{protocol.describe(width)}; {last}")
     return found + _misprint_readings(plain.at(alpha), f"{choices}; {last}", only)
@@ -298,8 +288,8 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
     """Return the readings of laws through one set of coefficients, printed exponents fixed and perhaps free as well."""
     alpha, (a, b, c) = points.alpha, points.values.T
     a3, c2 = PUBLISHED["(11)"]["a3"], PUBLISHED["(15)"]["c2"]
-    a1, a2 = _held([alpha, 10.0 ** (a3 * (alpha - 1))], a)
-    c1, c3 = _held([np.exp(c2 * alpha), np.ones_like(alpha)], c)
+    a1, a2 = _amplitudes([alpha, 10.0 ** (a3 * (alpha - 1))], a)
+    c1, c3 = _amplitudes([np.exp(c2 * alpha), np.ones_like(alpha)], c)
     b_free = _fit("b", alpha, b, [0.08, 4.0, 0.3, 2.0, 1.0])
     corrected = {**PUBLISHED["(13)"], "b0": CORRECTED_B0}
     cases = [
@@ -312,16 +302,14 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
         a_free, c_free = _fit("a", alpha, a, [-0.005, 0.002, 20.0]), _fit("c", alpha, c, [0.02, 3.0, 0.1])
         cases.append(("(11)", "a", a, a_free, "exponent free", PUBLISHED["(11)"]))
         cases.append(("(15)", "c", c, c_free, "exponent free", PUBLISHED["(15)"]))
-    cuts = f"r'_max {points.cut.min():.2f} to {points.cut.max():.2f} l"
-    return [_law_reading(*case, alpha, choices, cuts) for case in cases]
-
-
-def _law_reading(equation, form, data, found, held, print_set, alpha, choices, cuts) -> Content:
-    constants, result = (found.parameters, found.result) if isinstance(found, Solution) else (found, CONVERGED)
-    law, printed = FORMS[form], np.array(list(print_set.values()))
-    ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
-    evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
-    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result)
+    cuts, found = f"r'_max {points.cut.min():.2f} to {points.cut.max():.2f} l", []
+    for equation, form, data, fit, held, print_set in cases:
+        constants, result = (fit.parameters, fit.result) if isinstance(fit, Solution) else (fit, CONVERGED)
+        law, printed = FORMS[form], np.array(list(print_set.values()))
+        ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
+        evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
+        found.append(_reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result))
+    return found
 
 
 def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Content]:
@@ -337,10 +325,8 @@ def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -
             f"cdf(r_max) of (17), which must be 1: {share.min():.3f} to {share.max():.3f}; r_max {r_max.min():.1f} to "
             f"{r_max.max():.1f} l; a of the same fits is {a_factor:.3f} of print: no factor missing"
         )
-        curves = (b, candidate * shape)
-        found.append(
-            _reading("(13) b0", f"{why}; {choices}", shape @ b / (shape @ shape), curves, evidence, {"b0": candidate})
-        )
+        b0, curves = shape @ b / (shape @ shape), (b, candidate * shape)
+        found.append(_reading("(13) b0", f"{why}; {choices}", b0, curves, evidence, {"b0": candidate}))
     return found
 
 
@@ -378,7 +364,12 @@ def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Cont
     by_share = [(even, np.interp(even, row, edges)) for row in rows]
     by_ring = [within(row, row <= 0.95) for row in rows]
     by_cut = [within(row, edges <= cut) for row, cut in zip(rows, cuts, strict=True)]
-    by_law = [_law_quantiles(float(a), even) for a in chosen]
+    by_law = []
+    for alpha in map(np.array, chosen.tolist()):  # the paper's own cdf (17) after (18)
+        a, b, _ = printed_coefficients(alpha, CORRECTED_B0)
+        r = np.linspace(0.0, -b / a, 4001)
+        energy = law_energy(r, alpha, CORRECTED_B0)
+        by_law.append((even, np.interp(even, energy / energy[-1], r)))
     cases = (
         ("rings to cdf = .95", by_ring, "r, relative"),
         ("xi even, .01 to .99", by_share, "xi"),
@@ -389,16 +380,13 @@ def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Cont
     return [_inverse_reading(chosen, points, residual, name) for name, points, residual in cases]
 
 
-def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
-    """Shares and radii of the paper's own cdf (17) after (18)."""
-    a, b, _ = printed_coefficients(np.array(alpha), CORRECTED_B0)
-    r = np.linspace(0.0, -b / a, 4001)
-    energy = law_energy(r, np.array(alpha), CORRECTED_B0)
-    return xi, np.interp(xi, energy / energy[-1], r)
-
-
 def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Content:
-    k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
+    amplitudes = []
+    for xi, r in points:  # k1, k2 [mfp] of (19), linear in both; a residual in xi is one in r times the density
+        shape = np.sqrt(xi) * np.log(1 + INVERSE_EPSILON - xi)
+        weight = {"r": np.ones_like(r), "r, relative": 1 / r, "xi": np.gradient(xi, r)}[residual]
+        amplitudes.append(_amplitudes([xi * shape * weight, -shape * weight], r * weight))
+    k1, k2 = np.stack(amplitudes).T
     fits = _fit("k1", alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit("k2", alpha, k2, [3.0, 2.5, 0.4])
     found = np.concatenate([one.parameters for one in fits])
     printed = _printed("(20)")  # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
@@ -415,13 +403,6 @@ def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
 def _bracket(p: Floats) -> Floats:  # k1 xi - k2 of (19), (alphas, shares)
     k1, k2 = _both_k(INVERSE_ALPHAS, p)
     return k1[:, None] * INVERSE_SHARES - k2[:, None]
-
-
-def _inverse_amplitudes(xi: Floats, r: Floats, residual: str) -> Floats:
-    """k1, k2 [mfp] of (19): linear in both; a residual in xi is one in r times the density."""
-    shape = np.sqrt(xi) * np.log(1 + INVERSE_EPSILON - xi)
-    weight = {"r": np.ones_like(r), "r, relative": 1 / r, "xi": np.gradient(xi, r)}[residual]
-    return _held([xi * shape * weight, -shape * weight], r * weight)
 
 
 # Table 1
@@ -476,15 +457,11 @@ def printed_halves() -> list[Content]:
 
     off  mean of the halves over the whole, less 1 [-]; second_half_needed  the second half that would make it 0
     """
-    return [
-        {
-            "material": material,
-            "model": model,
-            "off": (mse[0] + mse[1]) / 2 / mse[2] - 1,
-            "second_half_needed": 2 * mse[2] - mse[0],
-        }
-        for (material, model), (mse, _) in PRINTED.items()
-    ]
+    found = []
+    for (material, model), ((first, second, whole), _) in PRINTED.items():
+        off, needed = (first + second) / 2 / whole - 1, 2 * whole - first
+        found.append({"material": material, "model": model, "off": off, "second_half_needed": needed})
+    return found
 
 
 def mean_squared_errors(law: Floats, data: Floats) -> Triple:
@@ -508,8 +485,7 @@ def normalized_diffusion(r: Floats, reflectance: float, mfp: float) -> Floats:
 def rational(r: Floats, alpha: float, reflectance: float, mfp: float, b0: float, corrected: bool) -> Floats:
     """Return r R_d [1/length] of (7), zero beyond r_max, divided by cdf(r_max) of (18) if `corrected`."""
     a, b, c = printed_coefficients(np.array(alpha), b0)
-    x = r / mfp
-    value = np.maximum((a * x + b) / (x + c), 0.0) / mfp
+    value = np.maximum(FORMS["(7)"](r / mfp, (a, b, c)), 0.0) / mfp
     return value * reflectance / law_energy(-b / a, np.array(alpha), b0) if corrected else value
 
 
@@ -524,36 +500,26 @@ def _channel_rows(
     for model, (b0, corrected) in RATIONAL_MODELS.items():
         laws[model] = rational(r, alpha, reflectance, mfp, b0, corrected)
     laws |= {model: r * np.asarray(law.profile(r, alpha, mfp)) for model, law in regenerated.items()}
+    # Ranges r'_max [mm], whole or below 5 mm half; the nearest is that whose three MSEs of diffusion are so to print.
+    ends = np.append(np.arange(0.5, 5.0, 0.5), np.arange(5.0, 31.0))
+    ends, law, target = ends[ends <= r[-1]], laws[NORMALIZED_DIFFUSION], np.log(PRINTED[printed, "diffusion"][0])
+    misfits = [np.sum((np.log(mean_squared_errors(law[r <= e], data[r <= e])) - target) ** 2) for e in ends]
     ranges = {
         "(6) on r R_d": cut_radius(r, data, "walk"),
         "one stride before (6)": cut_radius(r, data, "stride before"),
-        "diffusion's MSE nearest to print": _nearest_range(r, laws[NORMALIZED_DIFFUSION], data, printed),
+        "diffusion's MSE nearest to print": float(ends[np.argmin(misfits)]),
     }
-    return [
-        _row(printed, material.name, CHANNELS[channel], model, choice, end, law[r <= end], data[r <= end])
-        for choice, end in ranges.items()
-        for model, law in laws.items()
-    ]
-
-
-def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Content:
-    mse, r2 = mean_squared_errors(law, data), r_squared(law, data)
-    printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
-    (first, second, whole), (a, b, c) = mse, printed_mse
-    gaps = {name: (x - u, y - v, z - w) for name, (x, y, z) in r2.items() for u, v, w in [printed_r2]}
-    return {
-        **{"material": material, "channel": channel, "model": model, "range_choice": choice, "range_mm": end},
-        **{"mse": mse, "r2": r2, "mse_over_printed": (first / a, second / b, whole / c), "r2_minus_printed": gaps},
-    }
-
-
-def _nearest_range(r: Floats, law: Floats, data: Floats, printed: str) -> float:
-    """Return the range r'_max [mm], whole or below 5 mm half, whose three diffusion MSEs are nearest to print."""
-    ends = np.append(np.arange(0.5, 5.0, 0.5), np.arange(5.0, 31.0))
-    ends = ends[ends <= r[-1]]
-    target = np.log(PRINTED[printed, "diffusion"][0])
-    misfits = [np.sum((np.log(mean_squared_errors(law[r <= e], data[r <= e])) - target) ** 2) for e in ends]
-    return float(ends[np.argmin(misfits)])
+    found = []
+    for (choice, end), (model, law) in product(ranges.items(), laws.items()):
+        values = law[r <= end], data[r <= end]
+        mse, r2 = mean_squared_errors(*values), r_squared(*values)
+        printed_mse, printed_r2 = PRINTED[printed, "diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
+        over = tuple(one / other for one, other in zip(mse, printed_mse, strict=True))
+        gaps = {name: tuple(x - y for x, y in zip(own, printed_r2, strict=True)) for name, own in r2.items()}
+        of: dict[str, Any] = {"material": material.name, "channel": CHANNELS[channel], "model": model}
+        of |= {"range_choice": choice, "range_mm": end}
+        found.append({**of, "mse": mse, "r2": r2, "mse_over_printed": over, "r2_minus_printed": gaps})
+    return found
 
 
 def _r_squared_of(law: Floats, data: Floats) -> dict[str, float]:

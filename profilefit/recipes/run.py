@@ -30,6 +30,7 @@ MAX_CHAIN = {"quick": 64_000, "full": 256_000}
 # Every law compiles a fit of its own for each setting: hundreds of memory maps, of which Linux gives a process 65
 # thousand, and tens of megabytes. No later part needs them.
 CLEARED = 8  # parts of a process after which compiled programs go
+UNUSED = " No photon is traced: the preset and number of photons that were given have no effect."
 _PARTS = itertools.count(1)  # of this process
 MAPS, LAWS, COMPARISONS = range(3)  # stages: a record reads those of earlier stages
 
@@ -117,10 +118,7 @@ class RecipeRun:
 
     def unused(self) -> str:
         """Return what a record of fixed data says of a preset or number of photons that was given."""
-        is_usual = self.preset == "quick" and self.photons is None
-        return (
-            "" if is_usual else " No photon is traced: the preset and number of photons that were given have no effect."
-        )
+        return "" if self.preset == "quick" and self.photons is None else UNUSED
 
     def part(self) -> RecipeRun:
         """Return this run as a part in another process has it, without the light."""

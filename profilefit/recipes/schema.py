@@ -89,137 +89,71 @@ ERRORS = {
     "misfit_error": "misfit",
     "jackknife_error": "jackknife",
 }
+
+
+def under(place: str, kinds: Mapping[str, FieldType]) -> dict[str, FieldType]:
+    """Return the fields of a table at a place: the table itself, and then each name of the texts in `kinds`."""
+    return {place: TABLE, **{f"{place}.{name}": kind for names, kind in kinds.items() for name in names.split()}}
+
+
 # What a law is made of.
 NAMED: Fields = {
-    "law": TEXT,
-    "pipeline": TEXT,
+    **dict.fromkeys(("law", "pipeline"), TEXT),
     "setting": TABLE,
-    "indices?": SPAN,
-    "cosines?": SPAN,
+    **dict.fromkeys(("indices?", "cosines?"), SPAN),
     "data_digest?": DIGEST,
 }
-CONSTANTS: Fields = {
-    "constants": TABLE,
-    "constants.*": TABLE,
-    "constants.*.regenerated": NUMBER,
-    **{f"constants.*.{name}?": MEASURE for name in ("published", *ERRORS)},
-}
+CONSTANTS: Fields = under(
+    "constants",
+    {"*": TABLE, "*.regenerated": NUMBER, " ".join(f"*.{name}?" for name in ("published", *ERRORS)): MEASURE},
+)
 # What is shown besides, of whatever pipeline.
 TOLD: Fields = {
-    "name": TEXT,
-    "title": TEXT,
-    "equations": TEXT,
-    "note?": TEXT,
+    **dict.fromkeys(("name", "title", "equations", "note?", "setting.illumination"), TEXT),
     "preset": FieldType("quick or full", lambda value: value in ("quick", "full")),
     "seed": COUNT,
-    "setting.illumination": TEXT,
-    "setting.n": NUMBER,
-    "setting.g": NUMBER,
-    "truth": TABLE,
-    "truth.kind?": TEXT,
-    "truth.photons?": COUNT,
-    "truth.grid_digest?": DIGEST,
-    "versions?": TABLE,
-    "versions?.*": TEXT,
+    **dict.fromkeys(("setting.n", "setting.g"), NUMBER),
+    **under("truth", {"kind?": TEXT, "photons?": COUNT, "grid_digest?": DIGEST}),
+    **under("versions?", {"*": TEXT}),
 }
 # A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
 BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
 HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "g", "rel", "ks", "largest", "delta_A")
-OF_MAP = {
-    "delta_A": NUMBER,
-    "delta_alpha": NUMBER,
-    "largest_s": NUMBER,
-    "monotone": FLAG,
-    "at_one": NUMBER,
-    "fold": NUMBER,
-}
+OF_MAP = {**dict.fromkeys(("delta_A", "delta_alpha", "largest_s", "at_one", "fold"), NUMBER), "monotone": FLAG}
 SETS = ("published", "corrected", "regenerated")
+QUANTITY = FieldType(
+    "radius or reflectance", lambda value: isinstance(value, str) and value in ("radius", "reflectance")
+)
 PARTS: Fields = {
-    "covariance?": TABLE,
-    "covariance?.names": TEXTS,
-    **{f"covariance?.{name}?": MATRIX for name in ("statistical", "misfit", "model")},
-    "left_out?": TABLE,
-    "left_out?.rings": COUNT,
-    "left_out?.albedos": COUNT,
-    "derived?": TABLE,
-    "derived?.quantity": FieldType(
-        "radius or reflectance", lambda value: isinstance(value, str) and value in ("radius", "reflectance")
-    ),
-    "derived?.alpha": NUMBERS,
-    **{f"derived?.{name}": MEASURES for name in ("value", "statistical", "model")},
-    "discrepancy?": TABLE,
-    **{f"discrepancy?.{name}": MEASURE for name in ("amplitude", "amplitude_error", "length_r", "length_s", "rms")},
-    "discrepancy?.result": TEXT,
-    "crosscheck?": TABLE,
-    "crosscheck?.constants": TABLE,
-    "crosscheck?.constants.*": TABLE,
-    **{f"crosscheck?.constants.*.{name}": MEASURE for name in ("exact", "photons", "statistical_error", "z")},
-    "crosscheck?.chi2": MEASURE,
-    "crosscheck?.rank": COUNT,
-    "crosscheck?.chance": MEASURE,
-    "crosscheck?.photons": COUNT,
-    "crosscheck?.result": TEXT,
-    "starts?": TABLE,
-    "starts?.count": COUNT,
-    "starts?.share_best": NUMBER,
-    "starts?.result": TEXT,
-    "starts?.rule": TEXT,
-    "starts?.others": COUNT,
-    "starts?.outcomes": LIST,
-    "starts?.outcomes.*": TABLE,
-    "starts?.outcomes.*.count": COUNT,
-    "starts?.outcomes.*.cost_ratio": MEASURE,
-    "starts?.outcomes.*.result": TEXT,
-    "starts?.outcomes.*.constants": TABLE,
+    **under("covariance?", {"names": TEXTS, "statistical? misfit? model?": MATRIX}),
+    **under("left_out?", {"rings albedos": COUNT}),
+    **under("derived?", {"quantity": QUANTITY, "alpha": NUMBERS, "value statistical model": MEASURES}),
+    **under("discrepancy?", {"amplitude amplitude_error length_r length_s rms": MEASURE, "result": TEXT}),
+    **under("crosscheck?", {"chi2 chance": MEASURE, "rank photons": COUNT, "result": TEXT, "constants": TABLE}),
+    **under("crosscheck?.constants.*", {"exact photons statistical_error z": MEASURE}),
+    **under("starts?", {"count others": COUNT, "share_best": NUMBER, "result rule": TEXT, "outcomes": LIST}),
+    **under("starts?.outcomes.*", {"count": COUNT, "cost_ratio": MEASURE, "result": TEXT, "constants": TABLE}),
 }
 PROTOCOL: Fields = {
-    "albedos": TABLE,
-    "albedos.low": NUMBER,
-    "albedos.high": NUMBER,
-    "albedos.count": COUNT,
-    "albedos.spacing": TEXT,
+    **under("albedos", {"low high": NUMBER, "count": COUNT, "spacing": TEXT}),
+    **under("rings?", {"dr first last epsilon": NUMBER, "count": COUNT, "trim": TEXT}),
     "rings?": FieldType("a table or null", lambda value: value is None or isinstance(value, dict)),
-    **{f"rings?.{name}": NUMBER for name in ("dr", "first", "last", "epsilon")},
-    "rings?.count": COUNT,
-    "rings?.trim": TEXT,
     "held?": TEXTS,
-    "indices?": NUMBERS,
-    "cosines?": NUMBERS,
-    "weighting": TABLE,
-    "weighting.objective": TEXT,
-    **{f"weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
+    **dict.fromkeys(("indices?", "cosines?"), NUMBERS),
+    **under("weighting", {"objective": TEXT, "energy_limit source_limit shares last_share": NUMBER}),
 }
 FIT: Fields = {
     **CONSTANTS,
     "constants.*.published": MEASURE,
     "constants.*.free?": FLAG,
-    "constants.*.intervals?": TABLE,
-    "constants.*.intervals?.*": TABLE,
-    "constants.*.intervals?.*.*": PAIR,
-    "protocol": TABLE,
-    **{f"protocol.{key}": kind for key, kind in PROTOCOL.items()},
-    "fit": TABLE,
-    "fit.result": TEXT,
-    "fit.steps": COUNT,
-    "fit.condition_number": MEASURE,
-    "fit.residuals": TABLE,
-    "fit.residuals.rms": MEASURE,
-    "fit.residuals.largest": MEASURE,
-    "fit.residuals.along_r": NUMBER,
-    "fit.residuals.along_alpha": NUMBER,
-    "fit.residuals.half_waves": NUMBER,
+    **under("constants.*.intervals?", {"*": TABLE, "*.*": PAIR}),
+    **under("protocol", PROTOCOL),
+    **under("fit", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE}),
+    **under("fit.residuals", {"rms largest": MEASURE, "along_r along_alpha half_waves": NUMBER}),
     "posterior": TABLE,
-    "posterior.*": TABLE,
-    "posterior.*.result": TEXT,
-    "posterior.*.steps": COUNT,
-    "posterior.*.walkers": COUNT,
-    "posterior.*.tau": MEASURE,
-    "posterior.*.acceptance": NUMBER,
-    "quality": TABLE,
-    "quality.regenerated": TABLE,
-    "quality.alpha?": NUMBERS,
-    "quality.by_index?": TABLE,
-    **{f"quality.by_index?.{name}?": NUMBERS for name in BY_INDEX},
+    **under("posterior.*", {"result": TEXT, "steps walkers": COUNT, "tau": MEASURE, "acceptance": NUMBER}),
+    **under("quality", {"regenerated": TABLE, "alpha?": NUMBERS}),
+    **under("quality.by_index?", {f"{name}?": NUMBERS for name in BY_INDEX}),
     **{f"quality.{one}?": TABLE for one in SETS},
     **{f"quality.{one}?.{name}?": NUMBERS for one in SETS for name in BY_ALBEDO},
     **{f"quality.{one}?.{name}?": HALVES for one in SETS for name in HALVED},
@@ -230,45 +164,30 @@ ALBEDO: Fields = {**FIT, **{f"quality.regenerated.{name}": kind for name, kind i
 INVERSE: Fields = {**FIT, "quality.alpha": NUMBERS, "quality.regenerated.inversion_error": NUMBERS}
 PROFILE: Fields = {
     **FIT,
-    "quality.alpha": NUMBERS,
-    **{f"quality.regenerated.{name}": NUMBERS for name in ("rel", "ks", "l1")},
+    **dict.fromkeys(("quality.alpha", *(f"quality.regenerated.{name}" for name in ("rel", "ks", "l1"))), NUMBERS),
 }
 STAGED: Fields = {
     **PROFILE,
-    "stages": TABLE,
-    "stages.coefficient_laws": TABLE,
-    "stages.coefficient_laws.*": TABLE,
-    "stages.coefficient_laws.*.constants": TABLE,
-    "stages.coefficient_laws.*.constants.*": NUMBER,
-    "stages.coefficient_laws.*.standard_error?": TABLE,
-    "stages.coefficient_laws.*.standard_error?.*": MEASURE,
-    "stages.coefficient_laws.*.result": TEXT,
-    "stages.coefficient_laws.*.condition_number": MEASURE,
-    "stages.per_albedo_failures?": TABLE,
-    "stages.per_albedo_failures?.*": COUNT,
-    "stages.length_exponents?": TABLE,
-    "stages.length_exponents?.*": NUMBER,
+    **under("stages", {"coefficient_laws": TABLE}),
+    **under("stages.coefficient_laws.*", {"result": TEXT, "condition_number": MEASURE}),
+    **under("stages.coefficient_laws.*.constants", {"*": NUMBER}),
+    **under("stages.coefficient_laws.*.standard_error?", {"*": MEASURE}),
+    **under("stages.per_albedo_failures?", {"*": COUNT}),
+    **under("stages.length_exponents?", {"*": NUMBER}),
 }
+OF_READING = {
+    "equation verdict choices evidence? result?": TEXT,
+    "curve_distance constant_distance": MEASURE,
+    "constants published": TABLE,
+    "constants.* published.*": NUMBER,
+}
+OF_ROW = {"material? model? channel? range_choice?": TEXT, "range_mm?": NUMBER, "mse_over_printed?": RATIOS}
 EVIDENCE: Fields = {
-    "protocol?": TABLE,
-    **{f"protocol?.{key}": kind for key, kind in PROTOCOL.items()},
-    "readings": LIST,
-    "readings.*": TABLE,
-    **{f"readings.*.{name}": TEXT for name in ("equation", "verdict", "choices")},
-    **{f"readings.*.{name}?": TEXT for name in ("evidence", "result")},
-    **{f"readings.*.{name}": MEASURE for name in ("curve_distance", "constant_distance")},
-    **{f"readings.*.{name}": TABLE for name in ("constants", "published")},
-    **{f"readings.*.{name}.*": NUMBER for name in ("constants", "published")},
-    "table1": LIST,
-    "table1.*": TABLE,
-    **{f"table1.*.{name}?": TEXT for name in ("material", "model", "channel", "range_choice")},
-    "table1.*.range_mm?": NUMBER,
-    "table1.*.mse_over_printed?": RATIOS,
-    "halves?": LIST,
-    "halves?.*": TABLE,
-    "halves?.*.material?": TEXT,
-    "halves?.*.model?": TEXT,
-    "halves?.*.off?": MEASURE,
+    **under("protocol?", PROTOCOL),
+    **dict.fromkeys(("readings", "table1", "halves?"), LIST),
+    **under("readings.*", OF_READING),
+    **under("table1.*", OF_ROW),
+    **under("halves?.*", {"material? model?": TEXT, "off?": MEASURE}),
 }
 # Each pipeline: the objectives that its recipes can make small, and what its records hold.
 PIPELINES: dict[str, tuple[tuple[str, ...], Fields]] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -79,32 +79,30 @@ def law_class(recipe: Recipe) -> type[Constants]:
 
 def require_known(recipe: Recipe) -> None:
     """Raise RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
-    kind, objective = law_class(recipe), recipe.weighting.objective
+    if problem := next(_problems(recipe, law_class(recipe)), None):
+        raise RecipeError(f"{recipe.path}: {problem}")
+
+
+def _problems(recipe: Recipe, kind: type[Constants]) -> Iterator[str]:
+    law, entry, objective = recipe.law, kind.entry, recipe.weighting.objective
     if objective and not kind.seen_by(objective):
         seeing = [name for name, one in _laws(recipe).items() if one.seen_by(objective) and ":" not in name]
-        got = f"must be {' or '.join(seeing)}, got {recipe.law!r}"
-        raise RecipeError(f"{recipe.path}: law of pipeline {recipe.pipeline!r} {got}")
+        yield f"law of pipeline {recipe.pipeline!r} must be {' or '.join(seeing)}, got {law!r}"
     if not _start_constants(recipe) and recipe.pipeline != "evidence":
-        accepted = [*_published_names(kind.entry), *([OWN_START] if kind.entry.start else [])]
-        raise RecipeError(
-            f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
-        )
+        accepted = [*_published_names(entry), *([OWN_START] if entry.start else [])]
+        yield f"start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
     if recipe.pipeline == "evidence" and recipe.truth != "exact":
-        raise RecipeError(f"{recipe.path}: truth of pipeline 'evidence' must be 'exact', got {recipe.truth!r}")
-    spans = kind.at_one_index() != kind.constant_names()
-    if recipe.indices and not spans:
-        raise RecipeError(
-            f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}"
-        )
-    if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
-        raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
-    if recipe.cosines and not kind.entry.g.holds(recipe.setting.g):
-        raise RecipeError(f"{recipe.path}: cosines are for a law with g, got {recipe.law!r}")
+        yield f"truth of pipeline 'evidence' must be 'exact', got {recipe.truth!r}"
+    if recipe.indices and kind.at_one_index() == kind.constant_names():
+        yield f"indices are for a law that spans them, got {law!r} at n = {recipe.setting.n:g}"
+    if beyond := [n for n in recipe.indices if not entry.n.holds(n)]:
+        yield f"indices of {law} must be in {entry.n}, got {beyond[0]:g}"
+    if recipe.cosines and not entry.g.holds(recipe.setting.g):
+        yield f"cosines are for a law with g, got {law!r}"
     if objective and not free(recipe, kind):
-        raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
-    unknown = [name for name in recipe.held if name not in kind.constant_names()]
-    if unknown:
-        raise RecipeError(f"{recipe.path}: held must name constants of {recipe.law}, got {', '.join(unknown)}")
+        yield f"held leaves no constant of {law} free"
+    if unknown := [name for name in recipe.held if name not in kind.constant_names()]:
+        yield f"held must name constants of {law}, got {', '.join(unknown)}"
 
 
 def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:

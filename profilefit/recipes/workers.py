@@ -21,7 +21,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
-from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"  # read by JAX when a process starts
@@ -38,17 +37,17 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Workers:
+class Workers(ExitStack):
     """Pool of processes; with fewer than two, jobs are done in this process.
 
     Leaving ends the processes at once, whatever they do: what they write must be whole or absent at any moment.
     """
 
     def __init__(self, processes: int) -> None:
+        super().__init__()
         self._processes = processes if processes > 1 else 0
 
     def __enter__(self) -> Self:
-        self._left = ExitStack()
         if self._processes:
             context = get_context("spawn")
             watched, held = context.Pipe(duplex=False)
@@ -56,16 +55,13 @@ class Workers:
             known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
             for number in range(self._processes):
                 shares.put(known[number :: self._processes] if len(known) >= self._processes else [])
-            self._left.enter_context(_sharing_programs())
+            self.enter_context(_sharing_programs())
             self._pool = ProcessPoolExecutor(self._processes, context, _begin, (watched, shares))
-            self._left.callback(self._pool.shutdown, cancel_futures=True)
+            self.callback(self._pool.shutdown, cancel_futures=True)
             if sys.version_info < (3, 11, 5):  # else a job that is on its way to nobody is waited for (CPython 94777)
-                self._left.callback(cast("Any", self._pool)._call_queue._reader.close)
-            self._left.callback(held.close)  # first of all: by this the processes end
+                self.callback(cast("Any", self._pool)._call_queue._reader.close)
+            self.callback(held.close)  # first of all: by this the processes end
         return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._left.close()
 
     def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
         """Yield the number of each job and what `task` makes of it, as they come; jobs begin in their order.

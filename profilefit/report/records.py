@@ -19,8 +19,10 @@ from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
 from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
+from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
+from profilefit.recipes.targets import albedo_values
 
 Content = Mapping[str, Any]
 ADDED = ("statistical", "discretisation", "model", "jackknife")  # errors, of which the larger of the last two counts
@@ -113,6 +115,13 @@ class Fitted:
     @property
     def converged(self) -> bool:
         return converged(self.content)
+
+    @property
+    def albedos(self) -> Floats:
+        """Single-scattering albedos that were fitted (n,) [-]; RecordError where the protocol gives none."""
+        file = f"{self.content['name']}.json: protocol.albedos"
+        declared = Albedos.of(file, self.content["protocol"]["albedos"], RecordError)
+        return albedo_values(declared, self.law.setting)
 
     def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "misfit") -> tuple[Floats, Floats] | None:
         """Return the 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.

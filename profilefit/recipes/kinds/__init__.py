@@ -83,7 +83,7 @@ class Kind:
 
     def requests(self) -> list[str]:
         """Return the names of what ships to regenerate its records from."""
-        return sorted(path.stem for path in (fits_folder() / self.folder).glob(f"*.{self.ending}"))
+        return sorted(available(fits_folder() / self.folder, self.ending))
 
     def find(self, name: str, fits: Path | None = None, **options: Any) -> Any | None:
         """Return what a name is made into, None if it is of another kind; InputError on an option that says nothing."""

@@ -20,10 +20,9 @@ from profilefit.laws.gaussians import DEFAULT, MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import SUMS
-from profilefit.recipes.kinds import stack as stack_kind
-from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack
+from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack, request
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields
+from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
@@ -54,19 +53,12 @@ USED: Fields = {
     "data_digest": DIGEST,
 }
 OF_LIGHT: Fields = {
-    **dict.fromkeys(("reflectance", "share"), NUMBERS),
+    "reflectance share": NUMBERS,
     "by_count": LIST,
-    "by_count.*": TABLE,
-    "by_count.*.result": TEXT,
-    "by_count.*.steps": COUNT,
-    "by_count.*.condition_number": MEASURE,
-    **{f"by_count.*.{name}": NUMBERS for name in MEASURED},
+    **under("by_count.*", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE, " ".join(MEASURED): NUMBERS}),
 }
-SHOWN: Fields = {
-    **USED,
-    **{f"sums.{light}": TABLE for light in ILLUMINATIONS},
-    **{f"sums.{light}.{key}": kind for light in ILLUMINATIONS for key, kind in OF_LIGHT.items()},
-}
+SUMS_SHOWN = {key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()}
+SHOWN: Fields = {**USED, **SUMS_SHOWN}
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 
@@ -113,11 +105,6 @@ def find(name: str, folder: Path) -> SumRecord | None:
     return None if path is None else load(path)
 
 
-def request(name: str) -> StackRequest | None:
-    """Return the stack of a file of layers or of a shipped one by its name, None if it is of something else."""
-    return stack_kind.request(name)
-
-
 def fit(of: StackRequest, run: RecipeRun) -> Work:
     """Return the record to be made of a stack in both lights, in one part: a minute. InputError if no law fits."""
     for medium in of.media:
@@ -145,9 +132,7 @@ def beside(stack: Path) -> Path | None:
 
 def load(path: Path) -> SumRecord:
     """Return a record; RecordError in one line on one that is damaged."""
-    content = record.read_of(path, PIPELINE, "sums of Gaussians", SHOWN)
-    if text := _mismatched(content):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    content = record.read_of(path, PIPELINE, "a record of sums of Gaussians", SHOWN, _mismatched)
     record.record_setting(content)
     with damage(path):
         return SumRecord(recorded_stack(str(path), content, USED), content, path)
@@ -177,9 +162,7 @@ def _of_light(media: tuple[Medium, ...], illumination: str, tracing: Tracing) ->
         own = [(light, gaussians.joint([light], count)) for light in lights]
         by_count.append(
             {
-                "result": fitted.best.result,
-                "steps": fitted.best.steps,
-                "condition_number": fitted.best.condition_number,
+                **{key: getattr(fitted.best, key) for key in ("result", "steps", "condition_number")},
                 **{key: [one[key] for one in each] for key in ("rel", "rms", "ks")},
                 # rel where a colour has variances of its own.
                 "alone": [quality(light, one.variances, one.weights[0])["rel"] for light, one in own],

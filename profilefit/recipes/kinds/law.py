@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -9,26 +10,13 @@ from typing import Any
 import numpy as np
 
 from mcml_sim import Orders
-from profilefit.errors import RecipeError
+from mcml_sim.media.arrays import Floats
 from profilefit.fitting import staged
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue, pipelines
 from profilefit.recipes.catalogue import find_law as find
-from profilefit.recipes.pipelines import (
-    QUALITY_ALBEDOS,
-    Pipeline,
-    by_index,
-    curves,
-    described_fit,
-    description,
-    errors_by_name,
-    fit_from,
-    inversion_error,
-    judged,
-    printed_laws,
-    read,
-)
+from profilefit.recipes.pipelines import QUALITY_ALBEDOS, Pipeline, curves, described_fit, judged, printed_laws, read
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.record import Records
 from profilefit.recipes.reproduction import printed_halves, readings, table1
@@ -45,7 +33,7 @@ def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
     for name, one in {**printed_laws(recipe, run), "regenerated": law}.items():
         measured = asdict(profile_quality(one, alpha))
         table[name] = {key: value for key, value in measured.items() if key != "alpha"}
-    return table | ({"by_index": by_index(law, judged(recipe))} if recipe.indices else {})
+    return table | ({"by_index": pipelines.by_index(law, judged(recipe))} if recipe.indices else {})
 
 
 def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
@@ -61,33 +49,29 @@ def _inverse(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordCont
     laws = {"regenerated": result.law}
     if printed := printed_laws(recipe, run).get("published"):  # corrections are of the profile, not of its inverse
         laws["published"] = printed
-    measured = {name: {"inversion_error": inversion_error(law, alpha)} for name, law in laws.items()}
+    measured = {name: {"inversion_error": pipelines.inversion_error(law, alpha)} for name, law in laws.items()}
     content["quality"] = {"alpha": alpha, **measured}
     return content, arrays | curves(profiles) | {"shares": np.asarray(result.rings.xi)}
 
 
 def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
     rings = recipe.rings
-    if rings is None:
-        raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
+    assert rings is not None  # a recipe of this pipeline has them
     start = starting_law(recipe, run.out)
     truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
     points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
     profiles, unit = truths[1.0], points[1.0]
     laws = staged.fit_coefficient_laws(unit, start, recipe.held)
-    by_stage = {
-        name: float(value)
-        for law in laws.values()
-        for name, value in zip(law.names, law.solution.parameters, strict=True)
-    }
+    staged_constants = {letter: _by_name(law.names, law.solution.parameters) for letter, law in laws.items()}
+    by_stage = {name: value for one in staged_constants.values() for name, value in one.items()}
     used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
-    result = fit_from(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
-    content, arrays = description(recipe, run, profiles, result)
+    result = pipelines.fit_from(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
+    content, arrays = pipelines.description(recipe, run, profiles, result)
     content["stages"] = {
         "coefficient_laws": {
             letter: {
-                "constants": dict(zip(law.names, law.solution.parameters, strict=True)),
-                "standard_error": errors_by_name(law.names, law.covariance),
+                "constants": staged_constants[letter],
+                "standard_error": {} if (v := law.covariance) is None else _by_name(law.names, np.sqrt(np.diag(v))),
                 "result": law.solution.result,
                 "condition_number": law.solution.condition_number,
             }
@@ -102,15 +86,14 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
     return content, arrays | curves(profiles)
 
 
+def _by_name(names: Sequence[str], values: Floats) -> dict[str, float]:
+    """Return values by their names."""
+    return dict(zip(names, values.tolist(), strict=True))
+
+
 def _evidence(recipe: Recipe, run: RecipeRun, light: Orders | None) -> RecordContent:
-    laws = _compared_laws(run)
-    found = {"readings": readings(), "table1": table1(laws), "halves": printed_halves()}
-    return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
-
-
-def _compared_laws(run: RecipeRun) -> dict[str, ProfileLaw]:
-    """Return the laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
-    laws, records = {}, Records(run.out)
+    """Compare readings of the paper, and its table with laws of the run's records, else the shipped ones."""
+    laws, records = dict[str, ProfileLaw](), Records(run.out)
     for label, law, name in (
         ("normalized diffusion, regenerated", "burley", "burley-whole"),
         ("paper, regenerated as published", "liang", "liang-as-published"),
@@ -120,7 +103,8 @@ def _compared_laws(run: RecipeRun) -> dict[str, ProfileLaw]:
         if path.parent != run.out:
             run.say(f"compared with the shipped record {name}: {run.out} has none")
         laws[label] = catalogue.load(law, str(path), folder=records)
-    return laws
+    found = {"readings": readings(), "table1": table1(laws), "halves": printed_halves()}
+    return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 
 PIPELINES: dict[str, Pipeline] = {

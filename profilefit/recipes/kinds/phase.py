@@ -13,13 +13,13 @@ import numpy as np
 from mcml_sim import Setting
 from mcml_sim.media.checks import shown
 from mcml_sim.media.phase import Phase
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record, schema
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
 from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
 from profilefit.recipes.run import LAWS, RecipeRun, Work
-from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS, Fields
+from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TEXT, TEXTS, Fields, under
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -35,36 +35,25 @@ NEAR_ONE = 0.1
 SMALLEST = 1e-4  # share that is printed
 USUAL = RecipeRun("quick", SEED, Path(), None, None)  # of a table that is fitted without a record
 OF_FIT: Fields = {
-    "": TABLE,
-    ".held": TEXTS,
-    ".result": TEXT,
-    ".steps": COUNT,
-    ".condition_number": MEASURE,
-    **dict.fromkeys((".rms", ".mean_cosine", ".backscattered", ".second"), NUMBER),
-    ".bands": MEASURES,
+    **{"held": TEXTS, "result": TEXT, "steps": COUNT, "condition_number": MEASURE},
+    **{"rms mean_cosine backscattered second": NUMBER, "bands": MEASURES},
 }
+OF_DATA: Fields = {
+    **{"source": TEXT, "rows": COUNT, "integral mean_cosine backscattered second": NUMBER, "angles": MEASURES},
+    **{"unit?": TEXT, "spans?": LIST},  # of no older records
+}
+OF_FORM: Fields = {key: one for how in (FREE, HELD) for key, one in under(how, OF_FIT).items()}
 SHOWN: Fields = {
     **dict.fromkeys(("title", "equations", "note", "data_digest"), TEXT),
-    **{"data": TABLE, "data.source": TEXT, "data.rows": COUNT, "phases": TABLE},
-    **dict.fromkeys(("data.integral", "data.mean_cosine", "data.backscattered", "data.second"), NUMBER),
-    "data.angles": MEASURES,
-    # Of no older records.
-    **{"data.unit?": TEXT, "data.spans?": LIST, "data.spans?.*": TABLE},
-    **dict.fromkeys((f"data.spans?.*.{name}" for name in ("low", "high", "share", "other")), NUMBER),
-    **dict.fromkeys(("data.spans?.*.rule", "data.spans?.*.other_rule"), TEXT),
-    **{f"phases.{form}": TABLE for form in FORMS},
-    **{f"phases.{form}.{how}{key}": kind for form in FORMS for how in (FREE, HELD) for key, kind in OF_FIT.items()},
+    **under("data", OF_DATA),
+    **under("data.spans?.*", {"low high share other": NUMBER, "rule other_rule": TEXT}),
+    **under("phases", {key: one for form in FORMS for key, one in under(form, OF_FORM).items()}),
 }
 
 
 @dataclass(frozen=True)
 class PhaseRecord:
-    """Record of the fits to a table.
-
-    Attributes:
-        content: everything that the record says.
-        path: path of the record's file.
-    """
+    """Record of the fits to a table: all that it says, and its file."""
 
     content: Mapping[str, Any]
     path: Path
@@ -83,7 +72,7 @@ class PhaseRecord:
         try:
             return built(FORMS[form], np.array([own[name]["regenerated"] for name in FORMS[form].names]))
         except InputError as error:
-            raise RecordError(f"{self.path}: is damaged: {error}; regenerate it") from None
+            raise record.damaged(self.path, str(error)) from None
 
 
 def find(name: str, folder: Path) -> PhaseRecord | None:
@@ -130,11 +119,9 @@ def quality(fits: Sequence[PhaseFit]) -> dict[str, Any]:
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says; RecordError in one line on one that is damaged."""
-    content = record.read_of(path, PIPELINE, "phase functions", SHOWN)
     names = (f"{form}.{how}.{name}" for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
-    if text := schema.missing_constant(content, names):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return content
+    missing = partial(schema.missing_constant, names=names)
+    return record.read_of(path, PIPELINE, "a record of phase functions", SHOWN, missing)
 
 
 def load(path: Path) -> PhaseRecord:
@@ -176,14 +163,10 @@ def _percent(share: float) -> str:
 def described(data: PhaseData) -> dict[str, Any]:
     """Return the table `data` of a record."""
     return {
+        **{key: getattr(data, key) for key in ("integral", "unit", "spans", "mean_cosine", "backscattered")},
         "source": Path(data.source).name,
         "rows": data.angles.size,
         "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
-        "integral": data.integral,
-        "unit": data.unit,
-        "spans": data.spans,
-        "mean_cosine": data.mean_cosine,
-        "backscattered": data.backscattered,
         "second": float(data.table.moment(2)),
         "regression": regression(data.backscattered),
     }
@@ -202,15 +185,9 @@ def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun = USUAL) -
                 **{key: None if own is None else own[place] for key, own in each.errors.items()},
             }
         phases[each.form.name][how] = {
-            "held": list(each.held),
-            "result": each.result,
-            "steps": each.best.steps,
-            "condition_number": each.best.condition_number,
-            "rms": each.rms,
-            "bands": list(each.bands),
-            "mean_cosine": each.mean_cosine,
-            "backscattered": each.backscattered,
-            "second": float(each.phase.moment(2)),
+            **{key: getattr(each, key) for key in ("result", "rms", "mean_cosine", "backscattered")},
+            **{key: getattr(each.best, key) for key in ("steps", "condition_number")},
+            **{"held": list(each.held), "bands": list(each.bands), "second": float(each.phase.moment(2))},
         }
     return {
         "title": TITLE,

@@ -29,7 +29,7 @@ from profilefit.recipes import record, schema
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Table, Text, words
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, mistyped
+from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
 from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
@@ -53,35 +53,27 @@ QUALITY: Fields = {
 USED: Fields = {
     **dict.fromkeys(("unit", "equations", "note"), TEXT),
     "layers": LIST,
-    "half_spaces": TABLE,
-    **{f"half_spaces.{channel}": LIST for channel in CHANNELS},
+    **under("half_spaces", {" ".join(CHANNELS): LIST}),
     **QUALITY,
     "data_digest": DIGEST,
 }
 # Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
 BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")
 OF_INTERFACES: Fields = {
-    **dict.fromkeys(("quality", "fit", "starts"), LIST),
-    **dict.fromkeys(("quality.*", "fit.*", "starts.*"), TABLE),
-    **{f"quality.*.{name}": NUMBERS for name in BY_THICKNESS},
-    "fit.*.result": TEXT,
-    "fit.*.condition_number": MEASURE,
-    **dict.fromkeys(("fit.*.steps", "starts.*.as_good", "starts.*.count"), COUNT),
+    "quality fit starts": LIST,
+    **under("quality.*", {" ".join(BY_THICKNESS): NUMBERS}),
+    **under("fit.*", {"result": TEXT, "condition_number": MEASURE, "steps": COUNT}),
+    **under("starts.*", {"as_good count": COUNT}),
 }
 # What `profilefit report` shows of a stack.
 SHOWN: Fields = {
     **schema.TOLD,
     "unit": TEXT,
     "layers": LIST,
-    "layers.*": TABLE,
-    "layers.*.name": TEXT,
-    "layers.*.thickness": MEASURE,
-    **dict.fromkeys(("layers.*.n", "layers.*.g"), NUMBER),
-    **dict.fromkeys(("layers.*.mu_a", "layers.*.mu_s"), NUMBERS),
-    **dict.fromkeys(("quality", "quality.regenerated", "interfaces"), TABLE),
+    **under("layers.*", {"name": TEXT, "thickness": MEASURE, "n g": NUMBER, "mu_a mu_s": NUMBERS}),
+    **dict.fromkeys(("quality", "quality.regenerated"), TABLE),
     **QUALITY,
-    **{f"interfaces.{channel}": TABLE for channel in CHANNELS},
-    **{f"interfaces.{channel}.{key}": kind for channel in CHANNELS for key, kind in OF_INTERFACES.items()},
+    **under("interfaces", {key: one for name in CHANNELS for key, one in under(name, OF_INTERFACES).items()}),
 }
 EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
@@ -214,10 +206,9 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
     law, fitted = interface.law, interface.thicknesses
     d, illumination = np.sqrt(fitted[:-1] * fitted[1:]), law.setting.illumination
     if interface.is_traced:
-        measured = [
-            of_rings(law, at, stacks.rings_of(interface.medium, at, illumination, len(d) + 1 + number, tracing))
-            for number, at in enumerate(d)
-        ]
+        numbered = enumerate(d, start=len(d) + 1)  # after those that were fitted
+        rings = [stacks.rings_of(interface.medium, at, illumination, number, tracing) for number, at in numbered]
+        measured = [of_rings(law, at, own) for at, own in zip(d, rings, strict=True)]
     else:
         measured = [_of_exact(interface, float(at)) for at in d]
     rel, _, ks, delta_a = (list(values) for values in zip(*measured, strict=True))
@@ -226,10 +217,7 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says, of which a report makes no law; RecordError on one that is damaged."""
-    content = of_stack(path)
-    if text := mistyped(content, SHOWN) or _mismatched(content):
-        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return content
+    return record.read_of(path, PIPELINE, "the record of a stack", SHOWN, _mismatched)
 
 
 def load(path: Path) -> StackRecord:
@@ -268,10 +256,7 @@ def matching(of: StackRequest, folder: Path) -> StackRecord | None:
 
 def of_stack(path: Path) -> dict[str, Any]:
     """Return what a record says; RecordError on one that cannot be read or is of no stack."""
-    content = record.read(path)
-    if content["pipeline"] != PIPELINE:
-        raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
-    return content
+    return record.read_of(path, PIPELINE, "the record of a stack")
 
 
 @contextmanager
@@ -282,9 +267,9 @@ def damage(path: Path) -> Iterator[None]:
     except RecordError:
         raise
     except InputError as error:
-        raise RecordError(f"{path}: is damaged: {str(error).removeprefix(f'{path}: ')}; regenerate it") from None
+        raise record.damaged(path, str(error).removeprefix(f"{path}: ")) from None
     except KeyError as error:
-        raise RecordError(f"{path}: is damaged: {error} is missing; regenerate it") from None
+        raise record.damaged(path, f"{error} is missing") from None
 
 
 def interfaces(content: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
@@ -302,7 +287,13 @@ def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED)
             value = value[name]
         if not kind.accepts(value):
             raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
-    layers = [_recorded_layer(layer) for layer in content["layers"]]
+    layers = []
+    for layer in content["layers"]:
+        if not TABLE.accepts(layer):
+            raise InputError(f"layers must be tables, got {schema.shown(layer)}")
+        if not MEASURE.accepts(layer.get("thickness")):  # no image either: a record opens no other file
+            raise InputError(f"thickness must be {MEASURE.words}, got {schema.shown(layer['thickness'])}")
+        layers.append({key: value for key, value in layer.items() if value is not None})
     stack = read_layers(file, {"unit": content["unit"], "layers": layers})
     for medium in stack.media:
         stacks.require(medium)
@@ -408,15 +399,6 @@ def _content(of: StackRequest, run: RecipeRun, channels: Mapping[str, Mapping[st
     }
 
 
-def _recorded_layer(layer: Any) -> Table:
-    """Return a layer of a record as a file has it. Its thickness is no image: a record opens no other file."""
-    if not TABLE.accepts(layer):
-        raise InputError(f"layers must be tables, got {schema.shown(layer)}")
-    if not MEASURE.accepts(layer.get("thickness")):
-        raise InputError(f"thickness must be {MEASURE.words}, got {schema.shown(layer['thickness'])}")
-    return {key: value for key, value in layer.items() if value is not None}
-
-
 def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mapping[str, float]]) -> list[LayerLaw]:
     """Return the laws of the semi-infinite media that a medium's layers would be alone.
 
@@ -467,7 +449,5 @@ def _mismatched(content: Mapping[str, Any]) -> str | None:
                 return f"interfaces.{channel}.{key} must be {count}, one an interface, got {len(one[key])}"
         if any(len({len(each[name]) for name in BY_THICKNESS}) > 1 for each in one["quality"]):
             return f"interfaces.{channel}.quality must have {', '.join(BY_THICKNESS)} of one length"
-    names = (
-        f"{channel}.{number}.{name}" for channel, number in interfaces(content) for name in StackLaw.constant_names()
-    )
-    return schema.missing_constant(content, names)
+    own = StackLaw.constant_names()
+    return schema.missing_constant(content, (f"{place}.{n}.{name}" for place, n in interfaces(content) for name in own))

@@ -37,7 +37,6 @@ from PIL.ImageFile import ImageFile
 from PIL.PngImagePlugin import PngImageFile
 from PIL.TiffImagePlugin import BITSPERSAMPLE, PHOTOMETRIC_INTERPRETATION, SAMPLEFORMAT, TiffImageFile
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
@@ -53,7 +52,7 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.checks import is_number
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE, Material
-from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
+from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, at, words
 
 Floats = NDArray[np.float32]
 Three = tuple[float, float, float]
@@ -121,35 +120,24 @@ class LayerStack:
     @property
     def layers(self) -> list[dict[str, Any]]:
         """Plain data, a dict a layer: mu_a and mu_s three numbers each [1/unit]; thickness [unit], None if infinite."""
-        told = []
-        for name, source, *colours in zip(
-            self.names, self.sources, *(medium.layers for medium in self.media), strict=True
-        ):
-            first = colours[0]
-            told.append(
-                {
-                    "name": name,
-                    "n": first.n,
-                    "mu_a": [one.mu_a for one in colours],
-                    "mu_s": [one.mu_s for one in colours],
-                    "g": first.g,
-                    "thickness": first.thickness if math.isfinite(first.thickness) else None,
-                    "source": source,
-                }
-            )
-        return told
-
-
-def _three(value: Any) -> Any:
-    return [value] * 3 if is_number(value) else value
+        colours = (medium.layers for medium in self.media)
+        return [
+            {
+                **{"name": name, "n": red.n, "g": red.g, "source": source},
+                **{"mu_a": [red.mu_a, green.mu_a, blue.mu_a], "mu_s": [red.mu_s, green.mu_s, blue.mu_s]},
+                "thickness": red.thickness if math.isfinite(red.thickness) else None,
+            }
+            for name, source, red, green, blue in zip(self.names, self.sources, *colours, strict=True)
+        ]
 
 
 COLOURS = "a coefficient >= 0, or three of red, green and blue"
 ONE: Table = {"type": "number", "minimum": 0}
 THREE: Table = {"type": "array", "items": ONE, "minItems": 3, "maxItems": 3}
+THRICE = BeforeValidator(lambda value: [value] * 3 if is_number(value) else value)
 OF_COLOURS = WithJsonSchema({"accepted": COLOURS, "anyOf": [ONE, THREE]})
 Coefficient = Annotated[float, Field(ge=0.0)]
-Colours = Annotated[tuple[Coefficient, Coefficient, Coefficient], LISTED, BeforeValidator(_three), OF_COLOURS]
+Colours = Annotated[tuple[Coefficient, Coefficient, Coefficient], LISTED, THRICE, OF_COLOURS]
 
 
 class ImageTable(Declared):
@@ -230,19 +218,16 @@ def _media(layers: tuple[LayerTable, ...]) -> tuple[Medium, Medium, Medium]:
     return red, green, blue
 
 
-def _stacked(layers: tuple[LayerTable, ...]) -> tuple[LayerTable, ...]:
-    _media(layers)
-    return layers
-
-
 class Layered(Declared):
     """File with tables [[layers]], from the surface down, and the unit of its lengths."""
 
     unit: Text = UNIT
-    layers: Annotated[tuple[LayerTable, ...], LISTED, BeforeValidator(_few), AfterValidator(_stacked)]
+    layers: Annotated[tuple[LayerTable, ...], LISTED, BeforeValidator(_few)]
 
     @model_validator(mode="after")
-    def _in_millimetres(self) -> Self:
+    def _stacked(self) -> Self:
+        with at("layers"):
+            _media(self.layers)
         for number, layer in enumerate(self.layers):
             if layer.material is not None and self.unit != UNIT:
                 accepted = f'left out unless unit = "{UNIT}", that of its coefficients'
@@ -289,7 +274,12 @@ def _values(folder: Path, name: str) -> Floats:
     if isinstance(image, TiffImageFile) and image.info["compression"] != "raw":
         # libtiff unpacks those, which writes lines to stderr where a file is damaged.
         raise refused(f" packed by {image.info['compression']}", "uncompressed if it is a TIFF (a PNG may be packed)")
-    if not _is_grey(image):
+    is_grey = image.mode in GREY_PNG
+    if isinstance(image, TiffImageFile):
+        tags = image.tag_v2
+        kind_of = tags.get(PHOTOMETRIC_INTERPRETATION), tags.get(SAMPLEFORMAT, (1,)), tags.get(BITSPERSAMPLE)
+        is_grey = kind_of in GREY_TIFF
+    if not is_grey:
         raise refused(f" of another kind (Pillow's {image.mode})", "8- or 16-bit grey, or a TIFF of float32")
     with _sound(refused(", which is damaged")):
         found = np.asarray(image)
@@ -313,14 +303,6 @@ def _bytes(path: Path, refused: Refusal) -> bytes:
     if not 0 < status.st_size <= LARGEST_FILE * 2**20:  # of no bytes are the files of /proc, some of which never end
         raise refused(f" of {status.st_size} bytes", f"a file of at most {LARGEST_FILE} MiB")
     return read_whole(path, LARGEST_FILE * 2**20)
-
-
-def _is_grey(image: ImageFile) -> bool:
-    if not isinstance(image, TiffImageFile):
-        return image.mode in GREY_PNG
-    tags = image.tag_v2
-    kind = (tags.get(PHOTOMETRIC_INTERPRETATION), tags.get(SAMPLEFORMAT, (1,)), tags.get(BITSPERSAMPLE))
-    return kind in GREY_TIFF
 
 
 @contextmanager

@@ -117,14 +117,12 @@ def traced(
     tally = simulate(medium, grid, photons, seed, store, illumination=illumination, progress=False)
     found = tally.reflectance_r.scaled(tally.grid.r_areas)
     energy, error = np.asarray(found.value, float), np.asarray(found.standard_error, float)
-    whole = tally.diffuse_reflectance
-    counts = (energy > 0) & (np.cumsum(energy) <= TRACED_SHARE * float(whole.value)) & (np.arange(energy.size) > 0)
+    whole, deviation = (float(getattr(tally.diffuse_reflectance, name)) for name in ("value", "standard_error"))
+    counts = (energy > 0) & (np.cumsum(energy) <= TRACED_SHARE * whole) & (np.arange(energy.size) > 0)
     noise = np.where(counts, error / np.where(energy > 0, energy, 1.0), 0.0)
     weight = np.where(counts, 1.0 / np.hypot(RESOLVED, noise), 0.0)
     weight /= np.sqrt(np.sum(weight**2))
-    return TracedRings(
-        edges, np.where(counts, energy, 1.0), weight, noise, float(whole.value), float(whole.standard_error)
-    )
+    return TracedRings(edges, np.where(counts, energy, 1.0), weight, noise, whole, deviation)
 
 
 def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
@@ -132,6 +130,11 @@ def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
     near = NEAREST * first.similar.mfp
     rates = [max(float(half_space.decay_rate(one.similar.alpha)), SLOWEST) / one.similar.mfp for one in layers]
     return np.append(0.0, np.geomspace(near, TRACED_FARTHEST / min(rates), RINGS))
+
+
+def lowest(solutions: Sequence[Solution]) -> Solution:
+    """Return the solution of the lowest cost; one that is not finite comes last."""
+    return min(solutions, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
 def traced_half_space(layer: Layer, setting: Setting, tracing: Tracing = USUAL, offset: int = 0) -> LayerLaw:
@@ -148,8 +151,7 @@ def traced_half_space(layer: Layer, setting: Setting, tracing: Tracing = USUAL, 
         within = _half_space_of(own, similar.alpha, rings.whole, parameters).unscaled_energy(at, jnp.asarray(0.0))
         return weight * (jnp.diff(within) / energy - 1.0)
 
-    found: list[Solution] = [least_squares(residual, np.array(start), data) for start in HALF_SPACE_STARTS]
-    best = min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+    best = lowest([least_squares(residual, np.array(start), data) for start in HALF_SPACE_STARTS])
     with jax.enable_x64(True):
         law = jax.tree.map(float, _half_space_of(own, similar.alpha, rings.whole, jnp.asarray(best.parameters)))
     return LayerLaw(own, law, similar.alpha, similar.mfp)
@@ -161,6 +163,8 @@ def _half_space_of(setting: Setting, albedo: float, whole: float, parameters) ->
 
 
 RingData = tuple[Floats, ...] | TracedRings  # exact light at radii, or traced rings
+Lights = Sequence[RingData]  # of each thickness
+Below = LayerLaw | StackLaw  # what lies under an interface, or a whole stack
 
 
 class Interface(NamedTuple):
@@ -169,14 +173,12 @@ class Interface(NamedTuple):
     law        of the stack below the surface of its upper layer;  thicknesses  (m,) of that layer, fitted at [length]
     best       the optimum taken, in unbounded parameters;  solutions  those of every start
     lights     of each thickness radii [length], R_d, weights and A, or traced rings
-    is_below   whether layers lie above it
     """
 
     law: StackLaw
     medium: Medium
-    is_below: bool
     thicknesses: Floats
-    lights: list[RingData]
+    lights: Lights
     best: Solution
     solutions: tuple[Solution, ...]
 
@@ -186,7 +188,11 @@ class Interface(NamedTuple):
         return isinstance(self.lights[0], TracedRings)
 
 
-def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | LayerLaw:
+Interfaces = tuple[Interface, ...]
+Starts = Sequence[ArrayLike]
+
+
+def stack_law(medium: Medium, illumination: str = "searchlight") -> Below:
     """Fit the law of a stack of layers of one index to its light.
 
     medium        layers from the surface down, the last one infinite; one n in [1, 1.6] over that above, g in [0, 0.95]
@@ -201,8 +207,8 @@ def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | L
 
 
 def fitted(
-    medium: Medium, illumination: str, starts: Sequence[ArrayLike] = (), tracing: Tracing = USUAL
-) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    medium: Medium, illumination: str, starts: Starts = (), tracing: Tracing = USUAL
+) -> tuple[Below, Interfaces]:
     """Fit the law: it, and the fit at each interface from the surface down; none of a half space.
 
     starts  constants (9,) of each interface: the law is the optimum that a fit from there reaches, not the best one of
@@ -227,32 +233,28 @@ def isotropic_tops(medium: Medium, setting: Setting) -> list[LayerLaw]:
 
 
 def _fitted(
-    medium: Medium,
-    tops: list[LayerLaw],
-    tracing: Tracing,
-    initial_fits: tuple[Interface, ...] = (),
-    starts: Sequence[ArrayLike] = (),
-) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    medium: Medium, tops: list[LayerLaw], tracing: Tracing, initial_fits: Interfaces = (), starts: Starts = ()
+) -> tuple[Below, Interfaces]:
     """Fit interface after interface from the last layer up, over the half spaces of the layers.
 
     initial_fits  the interfaces of the similar stack, from whose constants those of traced light start
     """
-    law: StackLaw | LayerLaw = tops[-1]
+    law: Below = tops[-1]
     done: list[Interface] = []
     for place in reversed(range(len(tops) - 1)):
         layer, top, illumination = medium.layers[place], tops[place], tops[place].setting.illumination
         here = Medium(medium.layers[place:], medium.n_above)
         d = _thicknesses(layer.similar, is_below=place > 0)
-        lights: list[RingData] = []
+        lights: Lights
         if initial_fits:
-            lights += [rings_of(here, each, illumination, number, tracing) for number, each in enumerate(d)]
+            lights = [rings_of(here, each, illumination, number, tracing) for number, each in enumerate(d)]
             best = _solved(initial_fits[place].best.parameters, top, law, d, lights)
             found: tuple[Solution, ...] = (best,)
         else:
-            lights += [light_of(here, each, illumination) for each in d]
+            lights = [light_of(here, each, illumination) for each in d]
             best, found = _searched(top, law, d, lights, tracing.seed, starts[place] if starts else None)
         law = _law_of(best.parameters, top, law, layer.thickness)
-        done.insert(0, Interface(law, here, place > 0, d, lights, best, found))
+        done.insert(0, Interface(law, here, d, lights, best, found))
     return law, tuple(done)
 
 
@@ -273,27 +275,26 @@ def errors(interface: Interface) -> dict[str, dict[str, float | None]]:
     """
     top, below, thickness = interface.law.top, interface.law.below, interface.law.thickness
 
-    def refitted(d: Floats, lights: list[RingData]) -> Floats:
-        return _vector(
-            _law_of(_solved(interface.best.parameters, top, below, d, lights).parameters, top, below, thickness)
-        )
+    def refitted(lights: Lights) -> Floats:
+        best = _solved(interface.best.parameters, top, below, interface.thicknesses, lights)
+        return _vector(_law_of(best.parameters, top, below, thickness))
 
     own, fewer = _vector(interface.law), None
     if not interface.is_traced:
-        coarse: list[RingData] = []
-        coarse += [
-            light_of(interface.medium, d, interface.law.setting.illumination, NODES.fewer)
-            for d in interface.thicknesses
-        ]
-        fewer = refitted(interface.thicknesses, coarse)
-    count = len(interface.thicknesses)
-    left_out = np.array([refitted(interface.thicknesses, _without(interface.lights, i)) for i in range(count)])
-    jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
+        illumination = interface.law.setting.illumination
+        fewer = refitted([light_of(interface.medium, d, illumination, NODES.fewer) for d in interface.thicknesses])
+    left_out = []
+    for number, light in enumerate(interface.lights):
+        # It gets no weight: leaving it out would change the shape, and compile a program.
+        weight = 0.0 * np.asarray(light[2])
+        blind = light._replace(weight=weight) if isinstance(light, TracedRings) else (*light[:2], weight, *light[3:])
+        left_out.append(refitted([*interface.lights[:number], blind, *interface.lights[number + 1 :]]))
+    apart = np.array(left_out) - np.mean(left_out, axis=0)
+    jackknife = np.sqrt((len(left_out) - 1) * np.mean(apart**2, axis=0))
     with jax.enable_x64(True):
-        slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(
-            jnp.asarray(interface.best.parameters)
-        )
-    slopes, inverse = np.asarray(slopes), interface.best.covariance
+        best = jnp.asarray(interface.best.parameters)
+        slopes = np.asarray(jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(best))
+    inverse = interface.best.covariance
 
     def spread(covariance: Floats) -> Floats:
         return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
@@ -309,14 +310,6 @@ def errors(interface: Interface) -> dict[str, dict[str, float | None]]:
         name: {key: None if each is None else float(each[i]) for key, each in found.items()}
         for i, name in enumerate(StackLaw.constant_names())
     }
-
-
-def _without(lights: list[RingData], number: int) -> list[RingData]:
-    """Copy of the lights in which one has no weight: leaving it out would change the shape, and compile a program."""
-    light = lights[number]
-    weight = 0.0 * np.asarray(light[2])
-    blind = light._replace(weight=weight) if isinstance(light, TracedRings) else (*light[:2], weight, *light[3:])
-    return [*lights[:number], blind, *lights[number + 1 :]]
 
 
 def _noise(one: Interface) -> Floats:
@@ -368,10 +361,8 @@ def require(medium: Medium) -> None:
         if not layer.mu_t > 0:
             raise InputError(f"layers must scatter or absorb, got mu_a = mu_s = 0 in layer {number}")
         if not 0 <= layer.g <= MOST_FORWARD:
-            accepted = f"g in [0, {MOST_FORWARD:g}]"
-            raise InputError(
-                f"layers must scatter with {accepted} for a law of a stack, got {layer.g:g} in layer {number}"
-            )
+            accepted = f"g in [0, {MOST_FORWARD:g}] for a law of a stack"
+            raise InputError(f"layers must scatter with {accepted}, got {layer.g:g} in layer {number}")
         if not layer.mu_s > 0 and any(one.g > 0 for one in medium.layers):
             raise InputError(f"layers must scatter where one scatters forward, got mu_s = 0 in layer {number}")
         if layer.n != medium.layers[0].n:
@@ -402,12 +393,7 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 
 def _searched(
-    top: LayerLaw,
-    below: LayerLaw | StackLaw,
-    d: Floats,
-    lights: list[RingData],
-    seed: int,
-    given: ArrayLike | None = None,
+    top: LayerLaw, below: Below, d: Floats, lights: Lights, seed: int, given: ArrayLike | None = None
 ) -> tuple[Solution, tuple[Solution, ...]]:
     """Return the best optimum of several starts, or that of constants which are given; and all."""
     random = np.random.default_rng(seed)
@@ -415,12 +401,16 @@ def _searched(
     starts = [np.array(START), _as_slabs_add(top, below), *spread]
     found = tuple(_solved(start, top, below, d, lights) for start in starts)
     if given is not None:
-        own = _solved(_unbounded(np.asarray(given, float), top, below), top, below, d, lights)
+        # The parameters of `_made` that make these constants, u moved to where the law is defined.
+        w, u, *others = np.asarray(given, float)
+        least = LOWEST * _fading(top, below)
+        bounded = [np.log(w / (1.0 - w)), np.log(np.expm1(max(u + least, 0.01 * least))), *np.log(others)]
+        own = _solved(np.array(bounded), top, below, d, lights)
         return own, (own, *found)
-    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf), found
+    return lowest(found), found
 
 
-def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
+def _as_slabs_add(top: LayerLaw, below: Below) -> Floats:
     """Return a start whose A(d) is that of added slabs of isotropic light.
 
     A(d) is A_1 + T^2 A_2 / (1 - A_1 A_2), with u = 0 and w = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over a dark layer the A
@@ -431,18 +421,17 @@ def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
 
-def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[RingData]) -> Solution:
+def _solved(start, top: LayerLaw, below: Below, d: Floats, lights: Lights) -> Solution:
     """Return the optimum from a start; fits to traced light stay near it where nothing speaks against that."""
     if isinstance(lights[0], TracedRings):
         rings = [light for light in lights if isinstance(light, TracedRings)]
         arrays = tuple(np.stack([np.asarray(part) for part in column]) for column in zip(*rings, strict=True))
         return least_squares(_ring_residual, start, (*arrays, d, top, below, np.asarray(start)))
-    return least_squares(
-        _residual, start, (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below)
-    )
+    exactly = (np.stack(columns) for columns in zip(*lights, strict=True))
+    return least_squares(_residual, start, (*exactly, d, top, below))
 
 
-def _law_of(parameters: Floats, top: LayerLaw, below: LayerLaw | StackLaw, thickness: float) -> StackLaw:
+def _law_of(parameters: Floats, top: LayerLaw, below: Below, thickness: float) -> StackLaw:
     with jax.enable_x64(True):
         return jax.tree.map(float, _made(jnp.asarray(parameters), top, below, thickness))
 
@@ -469,14 +458,7 @@ def _counts(weight):
     return jnp.any(weight > 0, axis=1).astype(float)
 
 
-def _unbounded(constants: Floats, top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
-    """Return the parameters (9,) of `_made` that make constants, u moved to where the law is defined."""
-    w, u, *others = constants
-    least = LOWEST * _fading(top, below)
-    return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(max(u + least, 0.01 * least))), *np.log(others)])
-
-
-def _fading(top: LayerLaw, below: LayerLaw | StackLaw) -> float:
+def _fading(top: LayerLaw, below: Below) -> float:
     return 2.0 * float(_made(jnp.array(START), top, below, 0.0).fading()) * top.mfp
 
 

@@ -83,11 +83,10 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES,
         edges = fit.ring_edges(first, medium.layers)
         rings = tracing.rings(medium, illumination, edges, fit.STACK_PHOTONS, OFFSET)
         counts = rings.weight > 0
-        first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
-        inside = slice(first_ring, last_ring + 1)
-        weight = np.where(counts, 1.0, 0.0)[inside] / np.sqrt(np.count_nonzero(counts))
-        edges = rings.edges[first_ring : last_ring + 2] / unit
-        return SumLight(edges, rings.energy[inside], weight, rings.whole, rings.noise[inside], np.nan)
+        begin, end = np.flatnonzero(counts)[[0, -1]] + [0, 1]
+        weight = np.where(counts, 1.0, 0.0)[begin:end] / np.sqrt(np.count_nonzero(counts))
+        edges = rings.edges[begin : end + 1] / unit
+        return SumLight(edges, rings.energy[begin:end], weight, rings.whole, rings.noise[begin:end], np.nan)
     light, r = exact.solve(medium, illumination, nodes), fit.radii(medium)
     share = np.asarray(light.cdf(r))
     seen = share <= fit.LAST_SHARE
@@ -213,12 +212,11 @@ def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
+    one = np.full((1, variances.size), TO_ONE)
     found = []
     for light in lights:
         rings = ring_shares(light.edges, variances) * (light.weight * light.whole / light.energy)[:, None]
-        columns = np.vstack([rings, np.full(variances.size, TO_ONE)])
-        weights, _ = nnls(columns, np.append(light.weight, TO_ONE))
-        found.append(weights)
+        found.append(nnls(np.vstack([rings, one]), np.append(light.weight, TO_ONE))[0])
     return np.array(found)
 
 
@@ -276,7 +274,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
         found.append(solve(at, np.array(start), worth=SEARCH_WORTH))
-    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+    return fit.lowest(found)
 
 
 def shared_sum(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
@@ -396,12 +394,8 @@ def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], gain: Floats) -> Floats:
     """Covariance (p, p) of the parameters by the process that the residuals are a draw of; NaN where none fits."""
-    weight, noise, middle = (
-        np.concatenate(column)
-        for column in zip(
-            *((one.weight, one.noise, 0.5 * np.log(one.edges[1:] * one.edges[:-1])) for one in lights), strict=True
-        )
-    )
+    weight, noise = (np.concatenate([getattr(one, name) for one in lights]) for name in ("weight", "noise"))
+    middle = np.concatenate([0.5 * np.log(one.edges[1:] * one.edges[:-1]) for one in lights])
     counts = weight > 0
     of = np.repeat(np.arange(len(lights)), [len(light.energy) for light in lights])[counts]
     live = of == np.arange(len(lights))[:, None]  # (m, k): no ring of one light is one of another

@@ -17,8 +17,6 @@ from profilefit.fitting import discrepancy
 from profilefit.fitting.staged import COEFFICIENTS, CONSTANTS_OF
 from profilefit.recipes import catalogue
 from profilefit.recipes.pipelines import inversion_error
-from profilefit.recipes.recipe import Albedos
-from profilefit.recipes.targets import albedo_values
 from profilefit.report import records
 from profilefit.report.figures import canvas as pen
 from profilefit.report.figures.canvas import albedo_axis, canvas, draw_curves, legend_below, plain_log, save, styled
@@ -151,7 +149,7 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
     alpha = 1.0 - np.linspace(1.0, 1e-3, 500) ** 2
     exact_map = (np.asarray(exact.reflectance(alpha, setting=setting)), alpha)
     at = data.arrays.get("alpha")
-    fitted = albedo_values(Albedos(**data.content["protocol"]["albedos"])) if at is None else at
+    fitted = data.albedos if at is None else at
     points = fitted, data.arrays["reflectance"], data.arrays["reflectance_error"]
     even = np.linspace(0.0, 1.0, 1001)
     for ax in (panels["map"], panels["fold"]):

@@ -31,8 +31,6 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS
 from profilefit.recipes.kinds import gaussians
-from profilefit.recipes.recipe import Albedos
-from profilefit.recipes.targets import albedo_values
 from profilefit.recipes.workers import Workers
 from profilefit.report.figures import canvas as pen
 from profilefit.report.figures import paper_figures as paper
@@ -179,7 +177,7 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
 
 def _of_map(ax: Axes, fitted: Fitted) -> None:
     """Draw alpha at the data's A, or A at the data's alpha, of the fitted map, less that of the data."""
-    alpha = albedo_values(Albedos(**fitted.content["protocol"]["albedos"]), fitted.law.setting)
+    alpha = fitted.albedos
     law = fitted.law.in_reduced()  # as the data's albedos are
     reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
     if fitted.content["protocol"]["weighting"]["objective"] == "albedo":

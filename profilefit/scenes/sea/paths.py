@@ -7,7 +7,7 @@ of its closed forms. Lengths in metres, z up.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -192,7 +192,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
     facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
     seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
     below = 1.0 - np.sqrt(rng.random(len(way)))
-    new = np.column_stack(turn(*normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
+    new = np.column_stack(turn(normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
     factor = _sunward(light, beam, new, lambda ways: np.maximum(np.sum(ways * normal, axis=1), 0.0) / np.pi, rng)
     lifted = place.copy()
     lifted[:, 2] = world.floor.height(*place[:, :2].T) + ABOVE
@@ -251,11 +251,12 @@ def met(surface: Waves, place: Floats, way: Floats) -> Floats:
 def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
     """Return directions (n, 3) drawn around others."""
     below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
-    return np.column_stack(turn(*way.T, below, above, 2.0 * np.pi * rng.random(len(way))))
+    return np.column_stack(turn(way.T, below, above, 2.0 * np.pi * rng.random(len(way))))
 
 
-def turn(dx: Floats, dy: Floats, dz: Floats, below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
+def turn(way: Iterable[Floats], below: Floats, above: Floats, azimuth: Floats) -> tuple[Floats, ...]:
     """Return unit directions turned by angles of which 1 - c and 1 + c are given; sharp ones keep their precision."""
+    dx, dy, dz = way
     sine, cosine = np.sqrt(below * above), 1.0 - below
     across, along = sine * np.cos(azimuth), sine * np.sin(azimuth)
     # Two unit vectors across the direction (Duff et al., J. Comput. Graph. Tech. 6, 2017): no pole to divide by.

@@ -312,8 +312,9 @@ def _some(
     sides = ((side[:, None] / mfp[:, None]).reshape(-1, 3) for side in (across, along))
     own = own_share(curves, *sides).reshape(AT_ONCE, 3)
     with jax.enable_x64(True):
-        arrays = (full, around, curves.profile.reshape(AT_ONCE, 3, -1, 4), curves.kappa.reshape(AT_ONCE, 3), own)
-        points = _Points(scene.position[visible], *map(jnp.asarray, arrays), scene.irradiance[visible])
+        far = curves.profile.reshape(AT_ONCE, 3, -1, 4), curves.kappa.reshape(AT_ONCE, 3)
+        arrays = scene.position[visible], full, around, *far, own, scene.irradiance[visible]
+        points = _Points(*map(jnp.asarray, arrays))
         lit, share = (np.asarray(value) for value in _sums(scene, points, mfp))
     return (curves.reflectance.reshape(AT_ONCE, 3) * lit / share)[: len(chosen)], share[: len(chosen)]
 

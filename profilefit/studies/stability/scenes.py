@@ -13,6 +13,7 @@ from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import erf
 
 from mcml_sim.media.arrays import Floats
@@ -225,7 +226,7 @@ def of_shadow() -> Iterator[Cells]:
         yield Cells(name, own, SHADOW, arithmetic, axes, *judged, advice=OF_SHADOW)
 
 
-def by_acos(radius: Floats, aside: Floats) -> Floats:
+def by_acos(radius: NDArray, aside: NDArray) -> NDArray:
     """Return r0^2 (pi - acos(r0 / d)) + r0 sqrt(d^2 - r0^2) where d > r0, else pi r0^2."""
     one = radius.dtype.type
     with np.errstate(all="ignore"):

@@ -28,12 +28,11 @@ WHOLE = (0.6, 0.3)
 
 def lights_of(variances=VARIANCES, weights=WEIGHTS, noise=0.0, random=None):
     """Light that is a sum; a run's rings have independent noise, and its A is what leaves in all."""
-    found = []
+    found, weight = [], np.full(60, 60**-0.5)
     for own, whole in zip(weights, WHOLE, strict=False):
         energy = whole * (ring_shares(EDGES, variances) @ own)
         more = energy * noise * (0.0 if random is None else random.standard_normal(energy.size))
         inside = float(own @ -np.expm1(-0.5 * EDGES[0] ** 2 / variances))
-        weight = np.full(60, 60**-0.5)
         found.append(SumLight(EDGES, energy + more, weight, whole + more.sum(), np.full(60, noise), inside))
     return found
 
@@ -54,6 +53,9 @@ def test_a_sum_is_found_again():
     np.testing.assert_allclose(variances, VARIANCES, rtol=1e-4)
     np.testing.assert_allclose(weights, WEIGHTS[0], rtol=1e-4)
     assert fitted([light], 2).cost > 1e4 * best.cost  # two are not three
+    for count in (0, 9, True, 2.5):
+        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
+            gaussians.shared_gaussians((HEART,), "diffuse", count)
 
 
 @pytest.mark.slow
@@ -72,8 +74,8 @@ def test_more_of_them_are_nearer(illumination):
 def test_colours_share_their_variances():
     """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
     both = gaussians.shared_gaussians((HEART, BLUE), "diffuse", 4)
-    units = [medium.layers[0].mfp for medium in (HEART, BLUE)]
-    first, second = (np.array(one.variance) * unit**2 for one, unit in zip(both, units, strict=True))
+    pairs = zip(both, (HEART, BLUE), strict=True)
+    first, second = (np.array(one.variance) * medium.layers[0].mfp ** 2 for one, medium in pairs)
     np.testing.assert_allclose(first, second, rtol=1e-12)
     for light, one in zip(gaussians.lights_of((HEART, BLUE), "diffuse"), both, strict=True):
         alone = fitted([light], 4).cost
@@ -93,26 +95,6 @@ def test_many_fixed_ones_are_exact_light():
         assert np.abs(apart).max() < 3e-3
     six = joint(lights, 6)
     assert np.sqrt(np.mean(off(lights[0], six.variances, six.weights[0]) ** 2)) > 0.02
-
-
-def test_counts_are_checked():
-    for count in (0, 9, True, 2.5):
-        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
-            gaussians.shared_gaussians((HEART,), "diffuse", count)
-
-
-@pytest.mark.slow
-def test_light_that_is_traced():
-    """Of layers that scatter forward; the similar stack's sum is another."""
-    forward = Medium(tuple(Layer(1.4, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
-    light, similar = (gaussians.lights_of((medium,), "searchlight")[0] for medium in (forward, HEART))
-    assert np.mean(light.noise) < 0.05
-    best = fitted([light], 8)
-    counts = light.weight > 0
-    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
-    variances, (weights,) = shared_sum(fitted([similar], 8).parameters)
-    lost = ring_shares(light.edges, variances) @ weights * similar.whole / light.energy - 1.0
-    assert np.mean(np.abs(lost[counts])) > 0.5
 
 
 # Errors
@@ -148,9 +130,8 @@ def test_derivatives_are_those_of_the_formula():
         parameters = np.array([-1.0, 0.5, 0.3, -0.7])
         level, weights, slopes = gaussians._of(parameters, 2)
         np.testing.assert_allclose(np.append(level, weights), unbounded(jnp.asarray(parameters)), rtol=1e-12)
-        np.testing.assert_allclose(
-            slopes, jax.jit(jax.jacfwd(unbounded))(jnp.asarray(parameters)), rtol=1e-10, atol=1e-15
-        )
+        twin = jax.jit(jax.jacfwd(unbounded))(jnp.asarray(parameters))
+        np.testing.assert_allclose(slopes, twin, rtol=1e-10, atol=1e-15)
 
 
 @pytest.mark.slow
@@ -191,13 +172,10 @@ def test_a_sum_that_is_the_light_has_no_errors():
     known = gaussians.errors(failed, lights, MEDIA, lights)
     assert [name for name, one in known.items() if one is None] == ["statistical_error"]
     assert all(np.all(np.isnan(one)) for one in known.values() if one is not None)
-
-
-def test_the_discretisation_error_is_what_other_light_changes():
-    lights, other = lights_of(), lights_of(VARIANCES * 1.01)
-    known = gaussians.errors(joint(lights, 3), lights, MEDIA, other)["discretisation_error"]
-    np.testing.assert_allclose(known[:3], 0.01 * VARIANCES, rtol=0.01)  # of ln v, to first order
-    assert np.max(known[3:]) < 1e-6
+    # The discretisation error is what other light changes.
+    other = gaussians.errors(found, lights, MEDIA, lights_of(VARIANCES * 1.01))["discretisation_error"]
+    np.testing.assert_allclose(other[:3], 0.01 * VARIANCES, rtol=0.01)  # of ln v, to first order
+    assert np.max(other[3:]) < 1e-6
 
 
 def test_a_weight_that_would_be_negative_is_held_at_zero():
@@ -215,10 +193,9 @@ def test_a_weight_that_would_be_negative_is_held_at_zero():
     assert all(np.isnan(one[8]) and np.all(np.isfinite(one[:8])) for one in known.values() if one is not None)
     for share in (1e-4, 1e-3, 1e-2):
         moved = found.weights[1] * (1.0 - share) + share * np.array([0.0, 0.0, 1.0])
-        worse = 0.0
-        for own, light in zip((found.weights[0], moved), lights, strict=True):
-            worse += gaussians.quality(light, found.variances, own)["rms"] ** 2
-        assert worse > found.best.cost
+        pairs = zip(lights, (found.weights[0], moved), strict=True)
+        worse = [gaussians.quality(light, found.variances, own)["rms"] ** 2 for light, own in pairs]
+        assert sum(worse) > found.best.cost
     assert joint(lights_of(), 3).free.all()  # negative control
 
 
@@ -237,7 +214,17 @@ def test_quality_is_that_of_the_rings_and_of_what_is_inside():
 
 
 @pytest.mark.slow
-def test_traced_light_has_a_statistical_error_and_none_of_nodes():
+def test_light_that_is_traced():
+    """Of layers that scatter forward; the similar stack's sum is another, and no error is one of nodes."""
+    forward = Medium(tuple(Layer(1.4, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
+    light, similar = (gaussians.lights_of((medium,), "searchlight")[0] for medium in (forward, HEART))
+    assert np.mean(light.noise) < 0.05
+    best = fitted([light], 8)
+    counts = light.weight > 0
+    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
+    variances, (weights,) = shared_sum(fitted([similar], 8).parameters)
+    lost = ring_shares(light.edges, variances) @ weights * similar.whole / light.energy - 1.0
+    assert np.mean(np.abs(lost[counts])) > 0.5
     forward = Medium((Layer(1.38, 0.2, 22.0, 0.9, 0.3), Layer(1.38, 0.8, 12.0, 0.9)))
     lights = gaussians.lights_of((forward,), "diffuse")
     found = joint(lights, 4)

@@ -193,8 +193,7 @@ def test_a_mistake_is_one_line_that_names_file_and_key(refused, small, text, old
 
 @pytest.mark.slow
 def test_nothing_to_see_is_one_line(refused, small, opengl):
-    dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
-    small.write_text(SMALL + dark, encoding="utf-8")
+    small.write_text(f"{SMALL}height = 1\ntarget = [150, 0, 0]\n", encoding="utf-8")  # mm, beside the head
     refused(
         f"scene {small} --out drawn --quiet",
         "the view must show something that light scatters in, and light must reach it",

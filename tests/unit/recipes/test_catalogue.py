@@ -27,21 +27,21 @@ def make_record(folder, name, law, values, pipeline="profile", setting=None):
     return record.write(folder, name, content, {})
 
 
-@pytest.fixture
-def mine(tmp_path):
-    """A record of the printed constants of normalized diffusion."""
-    return make_record(tmp_path, "mine", "burley", constants_of("burley"))
-
-
 def test_names():
     assert {"liang", "burley", "gaussians"} <= set(profilefit.names())
     assert isinstance(profilefit.names(), tuple)
     assert not [name for name in profilefit.names() if ":" in name]
+    for name in ("liang", "rational"):
+        law = profilefit.albedo_law(name)
+        assert isinstance(law, AlbedoLaw)
+        # Equation (8) is right to .005 in alpha where A <= .75; the rational one to 1e-5.
+        assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name, kind in profile_classes().items() if kind.entry.records or not kind.constant_names()]
-)
+LOADED = [name for name, kind in profile_classes().items() if kind.entry.records or not kind.constant_names()]
+
+
+@pytest.mark.parametrize("name", LOADED)
 def test_every_law_loads_as_regenerated_and_is_a_law(name):
     law = profilefit.load(name)
     assert isinstance(law, ProfileLaw)
@@ -51,14 +51,6 @@ def test_every_law_loads_as_regenerated_and_is_a_law(name):
     if law.albedo is not None:  # a diffusion model has a reflectance of its own
         assert float(law.albedo.reflectance(0.8)) == pytest.approx(exact.reflectance(0.8), abs=1e-5)
     assert all(isinstance(sampler, Sampler) and sampler.law == law for sampler in law.samplers.values())
-
-
-@pytest.mark.parametrize("name", ["liang", "rational"])
-def test_every_map_loads_as_regenerated(name):
-    law = profilefit.albedo_law(name)
-    assert isinstance(law, AlbedoLaw)
-    # Equation (8) is right to .005 in alpha where A <= .75; the rational one to 1e-5.
-    assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
 
 
 def test_printed_sets_by_name():
@@ -82,15 +74,12 @@ def test_a_records_path(tmp_path):
     assert profilefit.albedo_law("liang", str(path)).constants() == MAP
     with pytest.raises(RecordError, match=r"holds constants of law 'albedo liang', got a request for 'liang'"):
         profilefit.load("liang", str(path))
-
-
-def test_regenerated_records_of_another_folder_come_first(tmp_path):
-    assert (FITS / "albedo-rational.json").is_file()
-    make_record(tmp_path, "burley-whole", "burley", FOUR)
-    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
-        here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
-    assert here.constants() == FOUR != shipped.constants()
-    assert here.albedo == shipped.albedo  # not in that folder: the installation's own
+    path = make_record(tmp_path, "other", "burley", constants_of("burley"), setting=DIFFUSE)
+    with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
+        profilefit.load("burley", str(path), Setting())
+    assert profilefit.load("burley", str(path)).setting == DIFFUSE
+    with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
+        profilefit.load("liang", str(path))
 
 
 @pytest.mark.parametrize(
@@ -123,72 +112,56 @@ def test_what_there_is_not_is_told_with_what_is_accepted(load, arguments, words)
         load(*arguments)
 
 
-def test_a_record_of_another_setting_or_law_is_refused(tmp_path, mine):
-    path = make_record(tmp_path, "other", "burley", constants_of("burley"), setting=DIFFUSE)
-    with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
-        profilefit.load("burley", str(path), Setting())
-    assert profilefit.load("burley", str(path)).setting == DIFFUSE
-    with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
-        profilefit.load("liang", str(mine))
+DAMAGE = [
+    *({"constants": {"s0": one}} for one in ({"published": 1.0}, {"regenerated": None}, {"regenerated": "much"})),
+    {"constants": {"s9": {"regenerated": 1.0}}},
+    {"setting": {"illumination": "searchlight", "colour": "red"}},
+    *({key: value} for key in ("law", "setting", "constants") for value in (None, ...)),
+]
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        {"constants": {"s0": {"published": 1.0}}},
-        {"constants": {"s0": {"regenerated": None}}},
-        {"constants": {"s0": {"regenerated": "much"}}},
-        {"constants": {"s9": {"regenerated": 1.0}}},
-        {"setting": {"illumination": "searchlight", "colour": "red"}},
-        *({key: value} for key in ("law", "setting", "constants") for value in (None, ...)),
-    ],
-    ids=str,
-)
-def test_damaged_records_are_told_in_one_line(mine, damage):
+@pytest.mark.parametrize("damage", DAMAGE, ids=str)
+def test_damaged_records_are_told_in_one_line(tmp_path, damage):
+    mine = make_record(tmp_path, "mine", "burley", constants_of("burley"))
     content = {**json.loads(mine.read_text()), **damage}
     mine.write_text(json.dumps({key: value for key, value in content.items() if value is not ...}))
     with pytest.raises(RecordError, match=r"mine"):
         profilefit.load("burley", str(mine))
 
 
-@pytest.mark.parametrize(
-    ("setting", "name"),
-    [
-        (Setting(), "map"),
-        (DIFFUSE, "map-diffuse"),
-        (REFRACTED, "map-n1.4"),
-        (Setting("diffuse", n=1.4), "map-diffuse-n1.4"),
-        (Setting(n=2), "map-n2"),
-        (Setting(n=1.3333333333333333), "map-n1.3333333333333333"),
-        (Setting(n=1.4, g=-0.5), "map-n1.4-g-0.5"),
-    ],
-    ids=str,
-)
-def test_the_record_of_a_setting_has_its_name(setting, name):
-    assert record_name("map", setting) == name
+BY_NAME = {
+    **{"map": Setting(), "map-diffuse": DIFFUSE, "map-n1.4": REFRACTED, "map-diffuse-n1.4": Setting("diffuse", n=1.4)},
+    **{"map-n2": Setting(n=2), "map-n1.3333333333333333": Setting(n=1.3333333333333333)},
+    "map-n1.4-g-0.5": Setting(n=1.4, g=-0.5),
+}
 
 
 SETTINGS = [Setting(illumination, n) for illumination in ("searchlight", "diffuse") for n in (1.0, 1.4)]
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_the_map_that_normalises_is_there_for_every_setting(setting):
-    law = catalogue.normalisation(setting)
-    assert law.setting == setting
-    assert law == profilefit.albedo_law("rational", setting=setting)
-
-
-def test_settings_without_a_record_are_told_which_there_are():
+def test_settings_have_records_by_their_names_or_are_told_which_there_are():
+    """The map that normalises is there for every setting."""
+    for name, setting in BY_NAME.items():
+        assert record_name("map", setting) == name
+    for setting in SETTINGS:
+        law = catalogue.normalisation(setting)
+        assert law.setting == setting
+        assert law == profilefit.albedo_law("rational", setting=setting)
     assert set(SETTINGS) <= set(Records(FITS).settings("albedo-rational"))
-    with pytest.raises(
-        SettingError, match=r"albedo-rational belongs to .*diffuse, n in \(1, 1\.6\], g = 0.*, n = 1\.7, g = 0$"
-    ):
+    words = r"albedo-rational belongs to .*diffuse, n in \(1, 1\.6\], g = 0.*, n = 1\.7, g = 0$"
+    with pytest.raises(SettingError, match=words):
         catalogue.normalisation(Setting(n=1.7))
     with pytest.raises(SettingError, match=r"got a request for searchlight, n = 1, g = 0\.8"):
         profilefit.albedo_law("rational", setting=Setting(g=0.8))
 
 
-def test_a_law_is_found_by_its_setting(tmp_path):
+def test_records_of_another_folder_come_first_and_by_their_setting(tmp_path):
+    make_record(tmp_path, "burley-whole", "burley", FOUR)
+    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
+        here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
+    assert here.constants() == FOUR != shipped.constants()
+    assert here.albedo == shipped.albedo  # not in that folder: the installation's own
+    (tmp_path / "burley-whole.json").unlink()
     make_record(tmp_path, "burley-whole-diffuse", "burley", FOUR, setting=DIFFUSE)
     with pytest.warns(ShippedMap, match="albedo-rational-diffuse"):
         law = profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)
@@ -204,14 +177,11 @@ def test_a_law_is_found_by_its_setting(tmp_path):
         profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)
 
 
-def test_a_law_without_constants_needs_no_record():
-    """Nor a map: n = 1.35 has none."""
+def test_laws_without_constants_and_with_a_number():
+    """A law without constants needs no record, nor a map: n = 1.35 has none."""
     for constants in ("regenerated", "published"):
         law = profilefit.load("dipole", constants, Setting(n=1.35))
         assert (law.constants(), law.setting) == ({}, Setting(n=1.35))
-
-
-def test_a_number_of_gaussians():
     assert profilefit.load("gaussians") == profilefit.load("gaussians:6")
     assert profilefit.load("gaussians:2").count() == 2
     six = str(FITS / "gaussians-6.json")
@@ -223,27 +193,30 @@ def test_a_number_of_gaussians():
 # By the name that a user has for it
 
 
-@pytest.mark.parametrize(
-    ("name", "constants", "law", "setting", "records"),
-    [
-        ("hazard-diffuse-refracting", None, "hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-refracting",)),
-        ("liang-whole", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
-        ("liang-as-published", None, "liang", Setting(), ("liang-as-published",)),
-        ("albedo-rational-refracting", None, "rational", REFRACTED, ("albedo-rational-refracting",)),
-        ("liang", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
-        ("gaussians", None, "gaussians:6", Setting(), ("gaussians-6",)),
-        ("burley", "published:diffuse", "burley", DIFFUSE, ()),
-        ("dipole", None, "dipole", Setting(), ()),
-        ("burley_diffuse_mfp", None, "burley_diffuse_mfp", Setting(), ()),
-        ("rational", None, "rational", Setting(), ("albedo-rational",)),
-        ("albedo liang", None, "liang", Setting(), ("albedo-liang",)),
-        ("van_de_hulst", None, "van_de_hulst", DIFFUSE, ()),
-        ("chiang", "published", "chiang", DIFFUSE, ()),
-    ],
-)
-def test_a_record_or_a_law_by_its_name(name, constants, law, setting, records):
-    found = find(name, FITS, constants)
-    assert (found.name, found.setting, found.records) == (law, setting, records)
+WHOLE = ("liang-whole", "liang-inverse-whole")
+FOUND = {
+    "hazard-diffuse-refracting": ("hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-refracting",)),
+    "liang-whole": ("liang", Setting(), WHOLE),
+    "liang-as-published": ("liang", Setting(), ("liang-as-published",)),
+    "albedo-rational-refracting": ("rational", REFRACTED, ("albedo-rational-refracting",)),
+    "liang": ("liang", Setting(), WHOLE),
+    "gaussians": ("gaussians:6", Setting(), ("gaussians-6",)),
+    "burley, published:diffuse": ("burley", DIFFUSE, ()),
+    "dipole": ("dipole", Setting(), ()),
+    "burley_diffuse_mfp": ("burley_diffuse_mfp", Setting(), ()),
+    "rational": ("rational", Setting(), ("albedo-rational",)),
+    "albedo liang": ("liang", Setting(), ("albedo-liang",)),
+    "van_de_hulst": ("van_de_hulst", DIFFUSE, ()),
+    "chiang, published": ("chiang", DIFFUSE, ()),
+}
+
+
+@pytest.mark.parametrize("words", FOUND)
+def test_a_record_or_a_law_by_its_name(words):
+    name, _, constants = words.partition(", ")
+    found = find(name, FITS, constants or None)
+    assert (found.name, found.setting, found.records) == FOUND[words]
+    assert found.constants == "published" or name not in ("burley_diffuse_mfp", "van_de_hulst")  # the only printed ones
 
 
 @pytest.mark.slow
@@ -255,17 +228,15 @@ def test_every_record_of_a_fit_is_found_and_is_what_it_says():
             assert again.setting == one.setting
 
 
-@pytest.mark.parametrize(
-    ("name", "n", "g", "record"),
-    [
-        ("hazard-diffuse", 1.0, None, "hazard-diffuse"),
-        ("hazard-diffuse", 1.001, None, "hazard-diffuse-refracting"),
-        ("hazard-diffuse", 1.37, None, "hazard-diffuse-refracting"),
-        ("hazard", 1.4, 0.0, "hazard-refracting"),
-        ("hazard", 1.4, 0.3, "hazard-forward"),
-        ("hazard", 1.4, 0.95, "hazard-forward"),
-    ],
-)
+SPANNED = [
+    ("hazard-diffuse", 1.0, None, "hazard-diffuse"),
+    *(("hazard-diffuse", n, None, "hazard-diffuse-refracting") for n in (1.001, 1.37)),
+    ("hazard", 1.4, 0.0, "hazard-refracting"),
+    *(("hazard", 1.4, g, "hazard-forward") for g in (0.3, 0.95)),
+]
+
+
+@pytest.mark.parametrize(("name", "n", "g", "record"), SPANNED)
 def test_a_law_that_spans_indices_and_g_is_found_at_each(name, n, g, record):
     found = find(name, FITS, n=n, g=g)
     light = "diffuse" if "diffuse" in name else "searchlight"
@@ -303,7 +274,3 @@ def test_what_is_not_there_is_named_in_one_short_line(name, options, error, word
         find(name, FITS, **options)
     assert error is SettingError or len(str(told.value)) < 200
     assert "\n" not in str(told.value)
-
-
-def test_what_was_not_regenerated_has_its_only_printed_constants():
-    assert find("burley_diffuse_mfp", FITS).constants == find("van_de_hulst", FITS).constants == "published"

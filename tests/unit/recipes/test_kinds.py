@@ -32,22 +32,18 @@ TOY = '''\
 
 from functools import partial
 from pathlib import Path
-
 from mcml_sim import Setting
 from profilefit.recipes import record
 from profilefit.recipes.record import read
 from profilefit.recipes.run import Work
 from rich.text import Text
 
-
 def find(name, folder):
     path = record.named(name, folder / "dice", "dice")
     return None if path is None else read(path)
 
-
 def request(name):
     return Path(name) if name.endswith(".dice") else None
-
 
 def fit(path, run):
     throws = [float(line) for line in path.read_text().split()]
@@ -61,14 +57,11 @@ def fit(path, run):
 
     return Work(f"dice/{path.stem}", (partial(sum, throws),), content)
 
-
 def quality(mean):
     return {"regenerated": {"rel": [abs(mean / 3.5 - 1)]}}
 
-
 def source(found, lang="glsl", name=None):
     return f"const float {name or 'dice'}_mean = {found['constants']['m']['regenerated']};\\n"
-
 
 def tables(content, path):
     return [Text(f"{path.stem}: mean {content['constants']['m']['regenerated']}")]
@@ -85,52 +78,41 @@ def test_every_kind_has_the_functions_of_the_shelf(kind):
     assert list(inspect.signature(kind.module.find).parameters)[:2] == ["name", "folder"]
 
 
-@pytest.mark.parametrize(
-    ("name", "key"),
-    [
-        *((name, "law") for name in ("hazard", "dipole", "liang-inverse-whole")),
-        *(("skin", "stack"), ("petzold", "phase")),
-        *((name, "albedo_map") for name in ("albedo liang", "chiang", "albedo-rational-diffuse")),
-    ],
-)
+FIRST = dict.fromkeys(("hazard", "dipole", "liang-inverse-whole"), "law") | {"skin": "stack", "petzold": "phase"}
+FIRST |= dict.fromkeys(("albedo liang", "chiang", "albedo-rational-diffuse"), "albedo_map")
+
+
+@pytest.mark.parametrize(("name", "key"), FIRST.items())
 def test_a_name_is_that_of_the_first_kind_that_has_it(name, key):
-    assert next(kind.key for kind in KINDS if kind.find(name) is not None) == key
+    first = next(kind for kind in KINDS if kind.find(name) is not None)
+    assert first.key == key
+    if key in ("stack", "phase"):
+        words = {"stack": "a stack", "phase": "a phase function"}[key]
+        with pytest.raises(InputError, match=rf"^n must be left out where NAME is {words}, got '{name}'"):
+            first.find(name, n=1.4)
 
 
-def test_a_record_by_its_path_is_of_its_own_kind():
+def test_records_of_paths_and_names_are_of_their_own_kinds(tmp_path):
+    """A name means the first record of it, and those beside that."""
     for folder, key in (("stacks", "stack"), ("gaussians", "gaussians"), ("phases", "phase")):
         path = next((fits_folder() / folder).glob("*.json"))
         assert [kind.key for kind in KINDS if kind.find(str(path)) is not None] == [key]
-
-
-def test_every_name_that_ships_is_requested_of_its_kinds():
+    assert BY_KEY["law"].find("hazard", n=1.4).setting.n == 1.4
+    found = records_of(["skin", "hazard", "petzold"])
+    keys = [("stack", "skin"), ("gaussians", "skin"), ("law", "hazard"), ("phase", "petzold")]
+    assert [(kind.key, name) for kind, name, _ in found] == keys
+    with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
+        records_of(["petzhold"])
+    with pytest.raises(RecordError, match="has no records"):
+        records_of(["skin"], tmp_path)
+    # Every name that ships is requested of its kinds.
     found = requests_of()
     keys = {key: [request for kind, request in found if kind.key == key] for key in BY_KEY}
     assert {kind.key for kind, _ in found} == set(BY_KEY)
     assert [one.name for one in keys["stack"]] == [one.name for one in keys["gaussians"]]
     assert {one.pipeline for one in keys["albedo_map"]} == {"albedo"}
-    assert len(found) == sum(len(list(fits_folder().glob(f"{place}*.json"))) for place in ("", "*/")) - len(
-        list((fits_folder() / "evidence").glob("*.json"))
-    )
-
-
-def test_options_that_say_nothing_of_a_kind_are_refused():
-    for name, words in (("skin", "a stack"), ("petzold", "a phase function")):
-        with pytest.raises(InputError, match=rf"^n must be left out where NAME is {words}, got '{name}'"):
-            next(kind for kind in KINDS if kind.find(name) is not None).find(name, n=1.4)
-    assert BY_KEY["law"].find("hazard", n=1.4).setting.n == 1.4
-
-
-def test_records_of_names_are_those_beside_the_first(tmp_path):
-    found = records_of(["skin", "hazard", "petzold"])
-    keys = ["stack", "gaussians", "law", "phase"]
-    assert [(kind.key, name) for kind, name, _ in found] == list(
-        zip(keys, ["skin", "skin", "hazard", "petzold"], strict=True)
-    )
-    with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
-        records_of(["petzhold"])
-    with pytest.raises(RecordError, match="has no records"):
-        records_of(["skin"], tmp_path)
+    shipped = [path for place in ("", "*/") for path in fits_folder().glob(f"{place}*.json")]
+    assert len(found) == len([path for path in shipped if path.parent.name != "evidence"])
 
 
 TRACED = Medium((Layer(1.4, 0.1, 10.0, 0.8, 0.5), Layer(1.4, 0.5, 5.0, 0.5, np.inf)))
@@ -147,23 +129,17 @@ def test_seed_preset_and_store_are_of_every_kind(monkeypatch):
         request = module.request(name)
         for run, notes in ((GIVEN, " No photon is traced: the preset and number"), (RUN, None)):
             work = module.fit(request, run)
-            content, _ = work.finish(results_of(module, work))
+            if module is gaussians:  # whose fits take a minute
+                results = [{light: made_sums(request.stack.media, light) for light in ILLUMINATIONS}]
+            else:
+                results = [part() for part in work.parts]
+            content, _ = work.finish([[]] if module is phase else results)
             assert (content["preset"], content["seed"]) == (run.preset, seed + run.seed - 7)
             assert (notes or module.NOTE) in content["note"]
     tracing = [given[-1] for given in calls if isinstance(given[-1], Tracing)]
     assert {one.seed for one in tracing} == {1, 7}
     assert {str(one.store) for one in tracing} == {"None", *(f"photons/stacks/heart-{i}" for i in range(3))}
     assert {given[-1] for given in calls if not isinstance(given[-1], Tracing)} == {1, 7}
-
-
-def results_of(module, work):
-    """What the parts give, but sums, whose fits take a minute."""
-    if module is phase:
-        work.parts[0]()
-        return [[]]
-    if module is stack:
-        return [part() for part in work.parts]
-    return [{light: made_sums(gaussians.request("heart").stack.media, light) for light in ILLUMINATIONS}]
 
 
 def test_traced_light_is_that_of_its_run(monkeypatch):
@@ -196,18 +172,14 @@ def test_traced_light_resumes(tmp_path):
         np.testing.assert_array_equal(one.energy, first.energy)
 
 
-@pytest.fixture
-def sixth(monkeypatch, tmp_path):
+def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(command, monkeypatch, tmp_path):
     """Two files are touched: the toy's own, and a line of the table of kinds."""
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "dice.py").write_text(TOY)
     monkeypatch.setattr(kinds, "__path__", [*kinds.__path__, str(tmp_path / "more")])
     monkeypatch.setattr(kinds, "KINDS", (*KINDS, Kind("dice", "a die", "dice", "dice", plural="dice")))
-    yield
-    sys.modules.pop("profilefit.recipes.kinds.dice", None)
-
-
-def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(sixth, command, monkeypatch):
+    monkeypatch.setitem(sys.modules, "profilefit.recipes.kinds.dice", None)  # so that it is gone afterwards
+    monkeypatch.delitem(sys.modules, "profilefit.recipes.kinds.dice")
     monkeypatch.setattr("profilefit.recipes.workers.cores", lambda: 1)
     Path("fair.dice").write_text("1\n2\n3\n4\n5\n6\n")
     status, out, err = command("regenerate", "fair.dice", "--seed", "7", "--out", "mine", "--json", "--quiet")
@@ -239,5 +211,5 @@ def test_an_exported_law_is_found_without_a_walk_through_other_kinds():
         export_subject("hazard")
     finally:
         sys.setprofile(None)
-    assert len(entered) <= 17
+    assert len(entered) <= 15
     assert not [path for path in entered if Path(path).stem in ("stack", "gaussians", "phase", "albedo_map")]

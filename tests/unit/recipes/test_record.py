@@ -1,17 +1,23 @@
-"""Records: what is written is read, the same twice, whole or not at all."""
+"""Records: what is written is read, the same twice, whole or not at all; and what measurements say of records."""
 
 import json
 import os
+import shutil
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from mcml_sim import __version__
 from mcml_sim.files.text_file import MOST_JSON
 from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record, schema
-from profilefit.recipes.catalogue import fits_folder
+from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
+from profilefit.recipes.folder import fits_folder
+from tests.unit.recipes.stack.test_record import GONE, spoil
 
 NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
 CONTENT = {**NAMED, "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}
@@ -26,10 +32,7 @@ def test_round_trip(tmp_path):
     assert sorted(arrays) == ["alpha", "samples"]
     np.testing.assert_array_equal(arrays["samples"], ARRAYS["samples"])
     assert record.available(path.parent) == {"mine": path}
-
-
-def test_the_same_content_is_the_same_bytes(tmp_path):
-    """Whatever the order of keys, and whenever it is written."""
+    # The same content is the same bytes, whatever the order of keys, and whenever it is written.
     turned = {**dict(reversed(CONTENT.items())), "constants": dict(reversed(CONTENT["constants"].items()))}
     first, again = (record.write(tmp_path / d, "mine", c, ARRAYS) for d, c in (("a", CONTENT), ("b", turned)))
     os.utime(first, (0, 0))
@@ -57,80 +60,61 @@ def test_numbers_to_twelve_digits_and_nan_to_null(tmp_path):
 
 
 def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch):
-    path = record.write(tmp_path, "mine", CONTENT, ARRAYS)
-    before = {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)}
-
-    def full_disk(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
-        record.write(tmp_path, "mine", {"law": "other"}, {})
-    assert {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)} == before
-    assert record.read(path)["law"] == "liang"
-
-
-def test_an_interruption_leaves_nothing_behind(tmp_path, monkeypatch):
-    def control_c(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "replace", control_c)
-    with pytest.raises(KeyboardInterrupt):
-        record.write(tmp_path, "mine", CONTENT, ARRAYS)
-    assert os.listdir(tmp_path) == []
-
-
-def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    path = record.write(tmp_path / "old", "mine", CONTENT, ARRAYS)
+    before = {one.name: one.read_bytes() for one in path.parent.iterdir()}
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(OutputError, match=r"cannot write into .*file: "):
         record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
+    with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
+        record.write(path.parent, "mine", {"law": "other"}, {})
+    assert {one.name: one.read_bytes() for one in path.parent.iterdir()} == before
+    assert record.read(path)["law"] == "liang"
+    monkeypatch.undo()
+    monkeypatch.setattr(os, "replace", Mock(side_effect=KeyboardInterrupt))
+    (tmp_path / "new").mkdir()
+    with pytest.raises(KeyboardInterrupt):
+        record.write(tmp_path / "new", "mine", CONTENT, ARRAYS)
+    assert os.listdir(tmp_path / "new") == []
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", r"mine\.json: is not a record"),
-        ("{", r"mine\.json: is not a record"),
-        ("[1, 2]", r"mine\.json: is not a record of format 1 or 2, got 'list'"),
-        ("{}", r"mine\.json: is not a record of format 1 or 2, got null"),
-        ('{"format": 99}', r"mine\.json: is not a record of format 1 or 2, got 99"),
-    ],
-)
-def test_what_is_no_record_is_named(tmp_path, text, words):
+NOT_READ = [
+    *((content, "is not a record") for content in (b"", b"{", b"\xff\xfe\x00")),
+    *(
+        (content, f"is not a record of format 1 or 2, got {got}")
+        for content, got in ((b"[1, 2]", "'list'"), (b"{}", "null"), (b'{"format": 99}', "99"))
+    ),
+    (None, "there is no such record; `profilefit regenerate` makes them"),
+    ("a folder", "cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("content", "words"), NOT_READ, ids=[str(content) for content, _ in NOT_READ])
+def test_what_is_no_record_is_named(tmp_path, content, words):
     path = tmp_path / "mine.json"
-    path.write_text(text)
-    with pytest.raises(RecordError, match=words):
+    if content == "a folder":
+        path.mkdir()
+    elif content is not None:
+        path.write_bytes(content)
+    with pytest.raises(RecordError, match=rf"mine\.json: {words}") as caught:
         record.read(path)
+    assert isinstance(caught.value, InputError)
 
 
-def changed(tmp_path, name, change):
-    """The path of a copy of a shipped record that a function has changed."""
-    content = json.loads((fits_folder() / f"{name}.json").read_text())
-    change(content)
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(content))
-    return path
+@pytest.fixture
+def spoilt(tmp_path):
+    """Copies a shipped record in which something stands at a place, names with slashes between, or is lost."""
+
+    def copy(name, place, value=GONE):
+        path = Path(shutil.copy(fits_folder() / f"{name}.json", tmp_path / "mine.json"))
+        spoil(path, place, value)
+        return path
+
+    return copy
 
 
 ALWAYS = {**schema.NAMED, **schema.CONSTANTS}
 PROFILE_KEYS = {**ALWAYS, **schema.TOLD, **schema.PROFILE}
-
-
-def _spoiled(tmp_path, key, spoil):
-    """A shipped record of which the value at a dotted key is lost, or made true."""
-    names = key.split(".")
-
-    def change(content):
-        for place, name in enumerate(names):
-            names[place] = next(iter(content)) if name == "*" else name
-            if place < len(names) - 1:
-                content = content[names[place]]
-        if spoil == "lost":
-            del content[names[-1]]
-        else:
-            content[names[-1]] = True
-
-    return changed(tmp_path, "liang-whole", change), names[-1]
 
 
 @pytest.mark.parametrize("path", record.available(fits_folder()).values(), ids=lambda path: path.stem)
@@ -161,54 +145,67 @@ def test_format_1_is_read_in_the_words_of_format_2(tmp_path):
 
 
 @pytest.mark.parametrize("key", [key for key in PROFILE_KEYS if not key.endswith("*") and "?" not in key])
-@pytest.mark.parametrize("spoil", ["lost", "another type"])
-def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
-    path, last = _spoiled(tmp_path, key, spoil)
-    got = "nothing" if spoil == "lost" else "true"
-    if key in ALWAYS or (spoil != "lost" and f"{key}?" in ALWAYS):
-        with pytest.raises(
-            RecordError, match=rf"mine\.json: is damaged: .*{last} must be .*, got {got}; regenerate it"
-        ):
+@pytest.mark.parametrize("value", [GONE, True], ids=["lost", "another type"])
+def test_what_a_record_lacks_is_named(spoilt, key, value):
+    content, place = json.loads((fits_folder() / "liang-whole.json").read_text()), []
+    for name in key.split("."):
+        place.append(next(iter(content)) if name == "*" else name)
+        content = content[place[-1]]
+    path, got = spoilt("liang-whole", "/".join(place), value), "nothing" if value is GONE else "true"
+    words = rf"mine\.json: is damaged: .*{place[-1]} must be .*, got {got}; regenerate it"
+    if key in ALWAYS or (value is True and f"{key}?" in ALWAYS):
+        with pytest.raises(RecordError, match=words):
             record.read(path)
     else:
         assert record.read(path)["law"] == "liang", "enough to make a law from"
-    with pytest.raises(RecordError, match=rf"mine\.json: is damaged: .*{last} must be .*, got {got}; regenerate it"):
+    with pytest.raises(RecordError, match=words):
         record.read(path, whole=True)
+
+
+DAMAGED = [
+    ("liang-whole", "pipeline", "magic", 'pipeline must be one of albedo, profile, .*, got "magic"'),
+    ("liang-whole", "pipeline", ["x"], r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
+    ("liang-whole", "constants", {"a1": 3.0}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
+    ("liang-as-published", "stages", [], r"stages must be a table, got \[\]"),
+    ("hazard", "preset", "; rm x", r'preset must be quick or full, got "; rm x"'),
+    ("reproduction", "readings", {}, r"readings must be a list, got {}"),
+    ("reproduction", "table1", ["skin"], r'table1\.0 must be a table, got "skin"'),
+    *(
+        ("albedo-rational-diffuse", *row)
+        for row in (
+            ("crosscheck/chi2", "much", r'crosscheck\.chi2 must be a number or null, got "much"'),
+            ("crosscheck/constants", {"b": 1.0}, r"crosscheck\.constants\.b must be a table, got 1\.0"),
+            ("starts/share_best", None, r"starts\.share_best must be a number, got null"),
+            ("starts/outcomes", [{}], r"starts\.outcomes\.0\.count must be a whole number, got nothing"),
+        )
+    ),
+    # Lists that belong together are of one length.
+    ("burley-whole", "quality/regenerated/rel/0", GONE, ".*rel must be as long as quality.alpha"),
+    ("burley-whole", "covariance/model/0", GONE, "covariance.model must be a square matrix"),
+    ("burley-whole", "covariance/names", lambda names: [*names, "zz"], ".*names must be of its constants, got 'zz'"),
+    ("burley-whole", "derived/value/0", GONE, "derived.value must be as long as derived.alpha"),
+    ("burley-whole", "quality/published/ks", GONE, "quality.published.ks must be there"),
+    ("hazard-refracting", "quality/by_index/rel/0", GONE, ".*by_index.rel must be as long as .*.n"),
+]
+# Its own index and g, of which it is exported, are among those that a law spans.
+OUTSIDE = [
+    ("refracting", "setting/n", 1.7, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
+    ("refracting", "setting/n", 1.0, r"setting.n must be in \(1, 1.6\]"),
+    ("refracting", "indices", [None, 1.6], "indices must be a list of two numbers"),
+    *(("forward", "setting/g", g, f".*g must be in .*, as its cosines are, got {g:g}") for g in (0, 0.96)),
+]
 
 
 @pytest.mark.parametrize(
-    ("name", "change", "words"),
-    [
-        ("liang-whole", {"pipeline": "magic"}, 'pipeline must be one of albedo, profile, .*, got "magic"'),
-        ("liang-whole", {"pipeline": ["x"]}, r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
-        ("liang-whole", {"constants": {"a1": 3.0}}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
-        ("liang-as-published", {"stages": []}, r"stages must be a table, got \[\]"),
-        ("hazard", {"preset": "; rm x"}, r'preset must be quick or full, got "; rm x"'),
-        ("reproduction", {"readings": {}}, r"readings must be a list, got {}"),
-        ("reproduction", {"table1": ["skin"]}, r'table1\.0 must be a table, got "skin"'),
-    ],
+    ("name", "place", "value", "words", "whole"),
+    [*((*row, True) for row in DAMAGED), *((f"hazard-{name}", *row, False) for name, *row in OUTSIDE)],
 )
-def test_each_pipeline_has_its_own_needs(tmp_path, name, change, words):
-    path = changed(tmp_path, name, lambda content: content.update(change))
+def test_what_a_pipeline_needs_is_named(spoilt, name, place, value, words, whole):
     with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
-        record.read(path, whole=True)
-
-
-@pytest.mark.parametrize(
-    ("part", "key", "value", "words"),
-    [
-        ("crosscheck", "chi2", "much", r'crosscheck\.chi2 must be a number or null, got "much"'),
-        ("crosscheck", "constants", {"b": 1.0}, r"crosscheck\.constants\.b must be a table, got 1\.0"),
-        ("starts", "share_best", None, r"starts\.share_best must be a number, got null"),
-        ("starts", "outcomes", [{}], r"starts\.outcomes\.0\.count must be a whole number, got nothing"),
-    ],
-)
-def test_what_a_recipe_may_ask_for_is_whole_if_it_is_there(tmp_path, part, key, value, words):
-    path = changed(tmp_path, "albedo-rational-diffuse", lambda content: content[part].update({key: value}))
-    with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
-        record.read(path, whole=True)
-    path = changed(tmp_path, "albedo-rational-diffuse", lambda content: content.pop(part))
-    assert record.read(path, whole=True)["law"] == "rational"
+        record.read(spoilt(name, place, value), whole=whole)
+    part = place.partition("/")[0]
+    if part in ("crosscheck", "starts"):  # which a recipe may ask for, or not
+        assert record.read(spoilt(name, part), whole=True)["law"] == "rational"
 
 
 STRANGE = ["\x1b[31m", "\x00", "\x9b", "\u202e", "\u2066", "\ud800", "x" * 1001]
@@ -217,44 +214,37 @@ BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u202
 
 @pytest.mark.parametrize("place", ["title", "equations", "law", "a key"])
 @pytest.mark.parametrize("strange", [*BREAKS, *STRANGE], ids=ascii)
-def test_text_that_is_no_printable_line_is_refused(tmp_path, place, strange):
+def test_text_that_is_no_printable_line_is_refused(spoilt, place, strange):
     """It would become a comment in code, and would be shown on a terminal."""
-
-    def spoilt(content):
-        if place == "a key":
-            content["constants"][f"a{strange}"] = {"regenerated": 1.0}
-        else:
-            content[place] += f"{strange}import os"
-
-    path = changed(tmp_path, "hazard", spoilt)
-    with pytest.raises(
-        RecordError, match=r"mine\.json: is (damaged: .*one line of printable text|not a record: .*surrogates)"
-    ) as caught:
+    if place == "a key":
+        path = spoilt("hazard", "constants", lambda own: {**own, f"a{strange}": {"regenerated": 1.0}})
+    else:
+        path = spoilt("hazard", place, lambda text: f"{text}{strange}import os")
+    words = "damaged: .*one line of printable text|not a record: .*surrogates"
+    with pytest.raises(RecordError, match=rf"mine\.json: is ({words})") as caught:
         record.read(path)
     assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ('"data_digest": "0"', r"data_digest must be 64 hexadecimal digits, got \"0\""),
-        (
-            '"constants": {"s0": {"regenerated": "1; evil()"}}',
-            r'constants\.s0\.regenerated must be a number, got "1; ev',
-        ),
-        ('"constants": {"s0": {"regenerated": 1e400}}', r"is not a record: the number 1e400, beyond floating point"),
-        (
-            '"constants": {"s0": {"regenerated": 1, "model_error": "x"}}',
-            r'model_error must be a number or null, got "x"',
-        ),
-        ('"constants": {"s0": {"regenerated": NaN}}', r"is not a record: NaN, which is no number"),
-        ('"constants": {"s0": {"regenerated": ' + "9" * 5000 + "}}", r"is not a record: a whole number of 5000 digits"),
-        ('"note": ' + "[" * 20 + "]" * 20, r"note.* must not nest deeper than 12 tables and lists"),
-        ('"note": ' + "[" * 100_000 + "]" * 100_000, r"is not a record: "),
-        ('"note": "' + "x" * MOST_JSON + '"', r"is not a record: more than 2097152 bytes"),
-    ],
-    ids=range(9),
-)
+UNSAFE = [
+    ('"data_digest": "0"', r"data_digest must be 64 hexadecimal digits, got \"0\""),
+    *(
+        (f'"constants": {{"s0": {{"regenerated": {text}}}}}', words)
+        for text, words in (
+            ('"1; evil()"', r'constants\.s0\.regenerated must be a number, got "1; ev'),
+            ("1e400", r"is not a record: the number 1e400, beyond floating point"),
+            ('1, "model_error": "x"', r'model_error must be a number or null, got "x"'),
+            ("NaN", r"is not a record: NaN, which is no number"),
+            ("9" * 5000, r"is not a record: a whole number of 5000 digits"),
+        )
+    ),
+    (f'"note": {"[" * 20}{"]" * 20}', r"note.* must not nest deeper than 12 tables and lists"),
+    (f'"note": {"[" * 100_000}{"]" * 100_000}', r"is not a record: "),
+    (f'"note": "{"x" * MOST_JSON}"', r"is not a record: more than 2097152 bytes"),
+]
+
+
+@pytest.mark.parametrize(("change", "words"), UNSAFE, ids=[change[:30] for change, _ in UNSAFE])
 def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
     rest = json.dumps({"format": record.FORMAT, **NAMED, **({} if "constants" in change else {"constants": {}})})[1:]
     path = tmp_path / "mine.json"
@@ -264,65 +254,13 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
     assert len(str(caught.value)) < 300 + len(str(tmp_path))
 
 
-@pytest.mark.parametrize(
-    ("name", "change", "words"),
-    [
-        ("burley-whole", lambda c: c["quality"]["regenerated"]["rel"].pop(), "rel must be as long as quality.alpha"),
-        ("burley-whole", lambda c: c["covariance"]["model"].pop(), "covariance.model must be a square matrix"),
-        ("burley-whole", lambda c: c["covariance"]["names"].append("zz"), "names must be of its constants, got 'zz'"),
-        ("burley-whole", lambda c: c["derived"]["value"].pop(), "derived.value must be as long as derived.alpha"),
-        ("burley-whole", lambda c: c["quality"]["published"].pop("ks"), "quality.published.ks must be there"),
-        ("hazard-refracting", lambda c: c["quality"]["by_index"]["rel"].pop(), "by_index.rel must be as long as .*.n"),
-    ],
-)
-def test_lists_that_belong_together_are_of_one_length(tmp_path, name, change, words):
-    with pytest.raises(RecordError, match=words):
-        record.read(changed(tmp_path, name, change), whole=True)
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "words"),
-    [
-        ("refracting", {"setting": {"n": 1.7}}, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
-        ("refracting", {"setting": {"n": 1.0}}, r"setting.n must be in \(1, 1.6\]"),
-        ("refracting", {"indices": [None, 1.6]}, "indices must be a list of two numbers"),
-        *(("forward", {"setting": {"g": g}}, rf"g must be in .*, as its cosines are, got {g:g}") for g in (0, 0.96)),
-    ],
-)
-def test_what_a_law_of_many_indices_and_g_needs(tmp_path, name, change, words):
-    """Its own index and g, of which it is exported, are among those."""
-
-    def own(content):
-        content |= {**change, "setting": {**content["setting"], **change.get("setting", {})}}
-
-    with pytest.raises(RecordError, match=words):
-        record.read(changed(tmp_path, f"hazard-{name}", own))
-
-
-def test_records_that_cannot_be_read_are_named(tmp_path):
-    with pytest.raises(RecordError, match=r"gone\.json: there is no such record; `profilefit regenerate` makes them"):
-        record.read(tmp_path / "gone.json")
-    (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(RecordError, match=r"binary\.json: is not a record"):
-        record.read(tmp_path / "binary.json")
-    (tmp_path / "folder.json").mkdir()
-    with pytest.raises(RecordError, match=r"folder\.json: cannot be read"):
-        record.read(tmp_path / "folder.json")
-
-
 @pytest.mark.parametrize("damage", ["missing", "empty", "text", "cut short", "a byte flipped"])
 def test_damaged_arrays_are_named(tmp_path, damage):
     path = record.write(tmp_path, "mine", CONTENT, {"noise": np.random.default_rng(0).standard_normal(1000)})
     file = path.with_suffix(".npz")
-    whole = file.read_bytes()
-    flipped = bytearray(whole)
-    flipped[len(whole) // 2] ^= 0xFF
-    pieces = {
-        "empty": b"",
-        "text": b"no arrays",
-        "cut short": whole[: len(whole) // 2],
-        "a byte flipped": bytes(flipped),
-    }
+    whole, half = file.read_bytes(), len(file.read_bytes()) // 2
+    pieces = {"empty": b"", "text": b"no arrays", "cut short": whole[:half]}
+    pieces["a byte flipped"] = whole[:half] + bytes([whole[half] ^ 0xFF]) + whole[half + 1 :]
     file.unlink()
     if damage in pieces:
         file.write_bytes(pieces[damage])
@@ -347,17 +285,57 @@ def test_no_flipped_byte_gets_past_as_another_error(tmp_path):
     assert named > len(whole) / 2
 
 
-def test_digest_tells_numbers_apart():
+def test_digest_tells_numbers_apart_and_versions_name_what_decides_them():
     a, b = np.arange(4.0), np.array([1.0, 2.0])
     assert record.digest(a, b) == record.digest(a[::-1][::-1], b)
     assert record.digest(a, b) != record.digest(a, b + 1e-15)
     assert len(record.digest()) == 64
-
-
-def test_versions_name_what_decides_the_numbers():
     assert {"profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy"} == set(record.versions())
 
 
-def test_a_record_error_is_an_input_error():
-    assert issubclass(RecordError, InputError)
-    assert json.loads(json.dumps(record.plain({"a": np.nan}))) == {"a": None}
+# What a measured thing says of itself, and when it no longer holds
+
+
+def test_a_measurement_tells_of_its_records_and_is_stale_once_one_changes_comes_or_goes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "records").mkdir()
+    for name in ("albedo-rational", "hazard"):
+        shutil.copy(fits_folder() / f"{name}.json", tmp_path / "records")
+    records = tmp_path / "records"
+    told = measurement_origin("profilefit check hazard", records)
+    assert list(told) == ["command", "version", "date", "machine", "sha256"]
+    assert (told["command"], told["version"]) == ("profilefit check hazard", __version__)
+    assert abs(datetime.now(UTC) - datetime.fromisoformat(told["date"])) < timedelta(minutes=1)
+    assert told["machine"]["processor"] == processor() != ""
+    assert told["machine"]["cores"] >= 1
+    assert told["sha256"] == digest(records)
+    shutil.copytree(records, tmp_path / "copy")
+    (records / "notes.txt").write_text("no record")
+    assert not stale(told, records)
+    assert not stale(told, tmp_path / "copy"), "where they lie does not matter"
+    assert stale({**told, "version": "0.0.1"}, records)
+    assert stale({}, records)
+    hazard, whole = records / "hazard.json", (records / "hazard.json").read_bytes()
+    hazard.write_bytes(whole.replace(b"1", b"2", 1))
+    assert stale(told, records)
+    hazard.write_bytes(whole)
+    moved = hazard.rename(records / "hazzard.json")
+    assert stale(told, records)
+    assert not stale(told, moved.rename(hazard).parent)
+    hazard.unlink()
+    assert stale(told, records)
+    # The same bytes in a row, cut elsewhere, are other records.
+    for place, cut in (("a", 1), ("b", 2)):
+        (tmp_path / place).mkdir()
+        for name, text in (("one", "xyz"[:cut]), ("two", "xyz"[cut:])):
+            (tmp_path / place / f"{name}.json").write_text(text)
+    assert digest(tmp_path / "a") != digest(tmp_path / "b")
+    # Measurements do not lie among records.
+    for out in (records, tmp_path / "records" / ".." / "records", Path("fits")):
+        with pytest.raises(InputError, match="out must be another folder than that of the records, got"):
+            require_apart(out, records)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"cannot write into .*file"):
+        require_apart(tmp_path / "file", records)
+    require_apart(tmp_path / "new", records)
+    assert (tmp_path / "new").is_dir()

@@ -1,10 +1,16 @@
-"""Running recipes: checks before, what is traced, the order of records; and records made again, compared."""
+"""Running recipes: checks before, what is traced, processes side by side; and records made again, compared."""
 
 import json
+import math
+import multiprocessing
+import operator
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +23,7 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import KINDS, albedo_map, law
 from profilefit.recipes.regenerate import compared, regenerate, reproduction, requests_of, stated_error
 from profilefit.recipes.run import PHOTONS, REFRACTED_PHOTONS, RecipeRun
+from profilefit.recipes.workers import Workers, cores
 from tests.fixtures import slow
 
 FITS = fits_folder()
@@ -33,11 +40,6 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     assert not Path(tmp_path / "store").exists()
 
 
-def of_recipes(*recipes):
-    by_key = {kind.key: kind for kind in KINDS}
-    return [(by_key["albedo_map" if one.pipeline == "albedo" else "law"], one) for one in recipes]
-
-
 def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, tmp_path):
     made = []
 
@@ -48,8 +50,7 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     said: list[str] = []
     run = RecipeRun("quick", 0, tmp_path / "out", None, 1000, said.append, False)
     refracted, diffuse = Setting(n=1.4), Setting("diffuse")
-    profile = recipe.find("burley-whole", FITS)
-    exactly = recipe.find("albedo-rational", FITS).changed(check="")
+    profile, exactly = recipe.find("burley-whole", FITS), recipe.find("albedo-rational", FITS).changed(check="")
     recipes = (
         profile.changed("profile-n1.4.toml", setting_table={"n": 1.4}),
         profile.changed("profile-diffuse.toml", truth="exact", setting_table={"illumination": "diffuse"}),
@@ -59,22 +60,16 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(monkeypatch, 
     )
     monkeypatch.setitem(albedo_map.PIPELINES, "albedo", pipeline)
     monkeypatch.setitem(law.PIPELINES, "profile", pipeline)
-    written = regenerate(of_recipes(*recipes), run)
+    by_key = {kind.key: kind for kind in KINDS}
+    keys = {"albedo": "albedo_map", "profile": "law"}
+    written = regenerate([(by_key[keys[one.pipeline]], one) for one in recipes], run)
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
-    assert made == [
-        ("albedo-n1.4", refracted),
-        ("albedo-rational", None),
-        ("checked", diffuse),
-        ("profile-n1.4", refracted),
-        ("profile-diffuse", None),
-    ]
-    assert [step.name for step in written] == [
-        f"photons: {refracted}",
-        f"photons: {diffuse}",
-        *(name for name, _ in made),
-    ]
-    assert [step.path.stem for step in written[2:]] == [name for name, _ in made]
-    assert [line.split(":")[0] for line in said[2:]] == [name for name, _ in made]
+    maps = [("albedo-n1.4", refracted), ("albedo-rational", None), ("checked", diffuse)]
+    assert made == [*maps, ("profile-n1.4", refracted), ("profile-diffuse", None)]
+    names = [name for name, _ in made]
+    assert [step.name for step in written] == [f"photons: {refracted}", f"photons: {diffuse}", *names]
+    assert [step.path.stem for step in written[2:]] == names
+    assert [line.split(":")[0] for line in said[2:]] == names
 
 
 @pytest.mark.slow
@@ -94,22 +89,13 @@ def test_records_are_the_same_bytes_whatever_the_processes(tmp_path):
 
 # Photons of each setting
 
-SETTINGS = {
-    Setting(): "",
-    Setting("diffuse"): "diffuse",
-    Setting(n=1.4): "n1.4",
-    Setting("diffuse", n=1.4): "diffuse-n1.4",
-}
-
-
-@pytest.fixture
-def run(tmp_path):
-    said: list[str] = []
-    return RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
+SETTINGS = {Setting(): "", Setting("diffuse"): "diffuse"}
+SETTINGS |= {Setting(n=1.4): "n1.4", Setting("diffuse", n=1.4): "diffuse-n1.4"}
 
 
 @pytest.mark.slow
-def test_every_setting_has_its_own_store_and_resumes(run):
+def test_every_setting_has_its_own_store_and_resumes(tmp_path):
+    run = RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, progress=False)
     for setting, folder in SETTINGS.items():
         light = run.light(setting)
         assert (light.setting, light.photons, light.seed) == (setting, 2000, 3)
@@ -144,14 +130,18 @@ def made(tmp_path_factory, request):
     return folder / f"{request.param}.json"
 
 
-def test_a_small_record_is_reproduced(made):
+def test_a_small_record_is_reproduced_and_compared_with_its_own_kind(made, tmp_path):
     found = reproduction(made, made.stem)
-    assert found.is_reproduced
-    assert found.constants == NAMES[made.stem]
+    assert (found.is_reproduced, found.constants) == (True, NAMES[made.stem])
     # Processors and the order of sums move a constant by 1e-5 of itself at most: its error is a hundredth of it.
     assert found.moved < 1e-3
     assert found.relative < 1e-5
     assert found.intervals < 1.0
+    path, name = Path(shutil.copy(made, tmp_path)), made.stem
+    path.write_text(json.dumps({**(of := json.loads(path.read_text())), "seed": of["seed"] + 1}))
+    assert reproduction(path, name) is None
+    assert reproduction(path, "nothing-of-this-name") is None
+    assert reproduction(FITS / made.name, name) is None
 
 
 @pytest.mark.parametrize(("share", "passes"), [(0.04, True), (0.06, False)])
@@ -174,16 +164,15 @@ def content(value=1.0, error=0.1, **more):
     return {"constants": {"a": {"regenerated": value, "model_error": error, **more}}, "fit": {"result": "converged"}}
 
 
-def test_a_constant_that_was_not_fitted_must_be_equal():
-    same = compared("one", content(error=None), content(error=None), {}, {})
-    assert same.is_reproduced
-    moved = compared("one", content(error=None), content(1 + 1e-10, error=None), {}, {})
-    assert "a was not fitted and is" in moved.problem
+def problem(shipped, other, chains=(), others=()):
+    return compared("one", shipped, other, dict(chains), dict(others)).problem
 
 
-def test_a_fit_that_fails_is_not_reproduced():
-    other = {**content(), "fit": {"result": "degenerate"}}
-    assert "'degenerate' in place of 'converged'" in compared("one", content(), other, {}, {}).problem
+def test_what_is_not_reproduced_is_named():
+    """A constant that was not fitted must be equal."""
+    assert compared("one", content(error=None), content(error=None), {}, {}).is_reproduced
+    assert "a was not fitted and is" in problem(content(error=None), content(1 + 1e-10, error=None))
+    assert "'degenerate' in place of 'converged'" in problem(content(), {**content(), "fit": {"result": "degenerate"}})
 
 
 def of_chain(draws):
@@ -201,19 +190,97 @@ def test_intervals_of_two_right_chains_agree_and_of_a_shifted_one_do_not():
     assert np.mean(np.array(found) > 1.0) <= 0.01
     assert np.median(found) > 0.2  # the allowance is no wider than the noise asks for
     (one, draws), (other, again) = of_chain(random.standard_normal(1000)), of_chain(random.standard_normal(1000) + 0.4)
-    assert "the interval of a, misfit" in compared("one", one, other, draws, again).problem
+    assert "the interval of a, misfit" in problem(one, other, draws, again)
+    assert "the chain of misfit is in one record only" in problem(one, content(), draws)
 
 
-def test_a_chain_that_is_missing_is_named():
-    one, draws = of_chain(np.random.default_rng(5).standard_normal(1000))
-    assert "the chain of misfit is in one record only" in compared("one", one, content(), draws, {}).problem
+# Processes side by side: what they give, what they say, and that none is left behind
+
+# Starts two processes that would sleep for a minute, prints their numbers, and waits for them.
+SLEEPERS = """
+import multiprocessing, signal, time
+from profilefit.recipes.workers import Workers
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & has ignored
+    with Workers(2) as workers:
+        begun = workers.each(time.sleep, [0.01, 0.01, 60, 60])
+        next(begun)
+        print(*(process.pid for process in multiprocessing.active_children()), flush=True)
+        list(begun)
+"""
 
 
-def test_records_of_other_photons_are_not_compared(made, tmp_path):
-    path, name = Path(shutil.copy(made, tmp_path)), made.stem
-    content = json.loads(path.read_text())
-    content["seed"] += 1
-    path.write_text(json.dumps(content))
-    assert reproduction(path, name) is None
-    assert reproduction(path, "nothing-of-this-name") is None
-    assert reproduction(fits_folder() / made.name, name) is None
+# Sleeps, so that no process does all the jobs, and gives something of its own.
+OF_PROCESS = "__import__('time').sleep(0.2) or __import__('os').%s"
+
+
+@pytest.mark.parametrize("processes", [0, 1, 2, 3])
+def test_every_job_is_done_once_whatever_the_processes(processes):
+    with Workers(processes) as workers:
+        assert dict(workers.each(math.factorial, range(8))) == dict(enumerate(map(math.factorial, range(8))))
+        assert list(workers.each(operator.neg, [5])) == [(0, -5)]
+        assert list(workers.each(operator.neg, [])) == []
+        numbers = {number for _, number in workers.each(eval, [OF_PROCESS % "getpid()"] * 2 * processes)}
+        assert len(numbers) == processes
+        assert (os.getpid() in numbers) == (processes == 1)
+    assert 1 <= cores() <= os.cpu_count()
+    assert not any(map(_is_alive, numbers - {os.getpid()}))
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_errors_and_warnings_come_here(processes):
+    with Workers(processes) as workers:
+        with pytest.warns(UserWarning, match="from a job"):
+            list(workers.each(warnings.warn, ["from a job"]))
+        with pytest.raises(OverflowError, match="math range error"):
+            list(workers.each(math.exp, [1.0, 1e9, 2.0]))
+        if processes > 1:
+            with pytest.raises(ChildProcessError, match="ended from outside"):
+                list(workers.each(os._exit, [9, 9]))
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("by", ["SIGKILL", *slow("SIGINT", "SIGTERM")])
+def test_no_process_outlives_the_one_that_started_it(by):
+    """Ctrl-C reaches all of them, a kill only the first."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    with subprocess.Popen([sys.executable, "-c", SLEEPERS], **pipes) as one:
+        started = list(map(int, one.stdout.readline().split()))
+        assert len(started) == 2
+        time.sleep(1.0)
+        (os.killpg if by == "SIGINT" else os.kill)(one.pid, signal.Signals[by])
+        _, said = one.communicate(timeout=20)
+    assert one.returncode != 0
+    assert said.count("Traceback") == (by == "SIGINT")  # that of the first
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline and any(map(_is_alive, started)):
+        time.sleep(0.05)
+    assert not any(map(_is_alive, started))
+
+
+def _is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system has no shares of cores")
+def test_each_process_has_cores_of_its_own():
+    """Of two or more, though a worker of the tests has one."""
+    own = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count()))
+    try:
+        if cores() < 2:
+            pytest.skip("shares of two cores or more")
+        with Workers(2) as workers:
+            shares = workers.each(eval, [OF_PROCESS % "sched_getaffinity(0)"] * 4)
+            first, second = {frozenset(share) for _, share in shares}
+        assert first.isdisjoint(second)
+        assert first | second <= os.sched_getaffinity(0)
+        assert len(first) < cores()
+    finally:
+        os.sched_setaffinity(0, own)

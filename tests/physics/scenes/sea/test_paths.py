@@ -67,7 +67,7 @@ def test_turned_directions():
     begin /= np.linalg.norm(begin, axis=0)
     begin[:, :2] = [[0, 0], [0, 0], [1, -1]]
     below = 10 ** random.uniform(-9, np.log10(2), count)
-    end = np.array(turn(*begin, below, 2 - below, random.uniform(0, 2 * np.pi, count)))
+    end = np.array(turn(begin, below, 2 - below, random.uniform(0, 2 * np.pi, count)))
     np.testing.assert_allclose(np.sum(end**2, axis=0), 1.0, rtol=1e-12)
     # |a - b|^2 = 2 (1 - cos), which keeps digits that 1 - a b has lost
     np.testing.assert_allclose(0.5 * np.sum((end - begin) ** 2, axis=0), below, rtol=1e-4, atol=1e-15)

@@ -19,7 +19,7 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds import stack as stacks
-from profilefit.recipes.kinds.stack import StackRequest, find, load, matching, read, request
+from profilefit.recipes.kinds.stack import find, load, matching, read, request
 from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
 from tests.fixtures import recorded, slow
@@ -45,21 +45,22 @@ mu_a = [0.20, 0.80, 1.2]
 mu_s = [1.13, 1.2, 1.3]
 g = 0.0
 """
+LAYERS = STACK[STACK.index("[[layers]]") :]
 VEIL = """\
 [[layers]]
-name = "veil"
 n = 1.38
 mu_a = 0.1
 mu_s = [3, 4, 5]
 g = 0.0
 thickness = 0.05
-
 """
-THREE = VEIL + STACK[STACK.index("[[layers]]") :]
+THREE = VEIL + LAYERS
 LAST = "mu_s = [1.13, 1.2, 1.3]\ng = 0.0"
 # Near what a fit of heart muscle gives for its interface; each channel and interface here has its own.
 CONSTANTS = {"w": 0.171, "u": -0.189, "g1": 1.03, "g2": 1.49, "b1": 0.027, "b2": 0.0075, "h0": 0.81, "h1": 1.08}
 CONSTANTS |= {"k0": 1 / 7}  # of more digits than a record has
+FITTED = {"published": None, "free": True, "statistical_error": None, "discretisation_error": 1e-5, "model_error": None}
+FITTED |= {"misfit_error": 2e-3, "jackknife_error": 3e-2}
 DIGEST = "0123456789abcdef" * 4
 RADII, THICKNESSES = np.geomspace(0.01, 10.0, 20)[:, None], np.array([0.0, 0.1, 0.5])  # [mm]
 
@@ -73,17 +74,10 @@ def constants(medium, number):
 def made(illumination, medium, starts=(), tracing=None):
     """What `_channel` gives after a minute, at once: exact light has no photons, and nothing was fitted."""
     setting = Setting(illumination, n=medium.layers[0].n)
-    own = catalogue.load("hazard", setting=setting).constants()
-    number = len(medium.layers) - 1
-    errors = {"statistical_error": None, "discretisation_error": 1e-5, "model_error": None}
-    errors |= {"misfit_error": 2e-3, "jackknife_error": 3e-2}
-    told = {"published": None, "free": True, **errors}
+    own, number = catalogue.load("hazard", setting=setting).constants(), len(medium.layers) - 1
+    named = {f"{i + 1}.{name}": one for i in range(number) for name, one in constants(medium, i).items()}
     return {
-        "constants": {
-            f"{i + 1}.{name}": {**told, "regenerated": value}
-            for i in range(number)
-            for name, value in constants(medium, i).items()
-        },
+        "constants": {name: {**FITTED, "regenerated": value} for name, value in named.items()},
         "half_spaces": [own] * len(medium.layers),
         "thicknesses": [np.array([0.1, 0.3])] * number,
         "quality": [{"thickness": [0.2], "rel": [0.012], "ks": [0.003], "delta_A": [-0.0015]}] * number,
@@ -94,8 +88,11 @@ def made(illumination, medium, starts=(), tracing=None):
 
 
 @pytest.fixture
-def at_once(monkeypatch):
-    monkeypatch.setattr(stacks, "_channel", made)
+def asked(monkeypatch):
+    """What fits of colours, which take no time, were asked for."""
+    given: list[tuple] = []
+    monkeypatch.setattr(stacks, "_channel", lambda *one: given.append(one) or made(*one))
+    return given
 
 
 @pytest.fixture
@@ -114,24 +111,13 @@ def file(tmp_path):
 
 
 @pytest.fixture
-def written(at_once, file, tmp_path):
+def written(asked, file, tmp_path):
     """The record of the stack above."""
     return recorded(stacks.fit(request(file()), RUN), tmp_path / "mine")
 
 
-def by_hand(of: StackRequest, channel: int) -> StackLaw:
-    medium = of.stack.media[channel]
-    setting = Setting(of.illumination, n=medium.layers[0].n)
-    own = catalogue.load("hazard", setting=setting)
-    *tops, law = (LayerLaw(setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
-    for number in reversed(range(len(tops))):
-        rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
-        law = StackLaw(setting, tops[number], law, medium.layers[number].thickness, **rounded)
-    return law
-
-
 @pytest.mark.parametrize("text", [STACK, *slow(THREE)], ids=["two layers", "three"])
-def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path, text):
+def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, text):
     said: list[str] = []
     of = request(file(text=text))
     path = recorded(stacks.fit(of, RUN), tmp_path / "mine", say=said.append)
@@ -143,10 +129,14 @@ def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path,
     assert found.setting == Setting("diffuse", n=1.38)
     assert found.digest == hashlib.sha256(path.read_bytes()).hexdigest()
     assert found.content["title"] == of.title
-    for channel, law in enumerate(found.laws):
-        known = by_hand(of, channel)
+    own = catalogue.load("hazard", setting=found.setting)
+    for law, medium in zip(found.laws, of.stack.media, strict=True):
+        *tops, known = (LayerLaw(found.setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
+        for number in reversed(range(len(tops))):
+            rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
+            known = StackLaw(found.setting, tops[number], known, medium.layers[number].thickness, **rounded)
         assert law.constants() == known.constants()
-        assert law.thickness == of.stack.media[channel].layers[0].thickness
+        assert law.thickness == medium.layers[0].thickness
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
@@ -154,43 +144,16 @@ def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path,
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_grey_layers_are_fitted_once(monkeypatch, file, tmp_path):
-    asked = []
-    monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
-    grey = [("[0.05, 0.20, 0.35]", "0.2"), ("[1.8, 2.2, 2.6]", "2"), ("[0.20, 0.80, 1.2]", "0.8")]
-    grey += [("[1.13, 1.2, 1.3]", "1.2")]
-    path = recorded(stacks.fit(request(file(*(one for pair in grey for one in pair))), RUN), tmp_path)
+def test_grey_layers_are_fitted_once_and_starts_are_those_of_their_colours(asked, file, tmp_path):
+    grey = ("[0.05, 0.20, 0.35]", "0.2", "[1.8, 2.2, 2.6]", "2", "[0.20, 0.80, 1.2]", "0.8", "[1.13, 1.2, 1.3]", "1.2")
+    path = recorded(stacks.fit(request(file(*grey)), RUN), tmp_path)
     assert len(asked) == 1
     red, green, blue = load(path).laws
     assert red.constants() == green.constants() == blue.constants()
-
-
-def test_starts_of_the_file_are_those_of_its_colours(monkeypatch, file, tmp_path):
-    asked = []
-    monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
     rows = {name: [0.2, -0.1, *[1.0] * 6, float(place)] for place, name in enumerate(CHANNELS, start=1)}
     text = "\n[start]\n" + "\n".join(f"{name} = [{row}]" for name, row in rows.items())
     recorded(stacks.fit(request(file(text=STACK + text)), RUN), tmp_path)
-    assert [given[2][0].tolist() for given in asked] == list(rows.values())
-
-
-def test_the_record_says_what_it_is_worth(written):
-    content = record.read(written)
-    assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
-    assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
-    assert content["fit"]["result"] == "converged"
-    assert content["layers"] == load(written).stack.layers
-    assert len(content["constants"]) == 3 * len(CONSTANTS)
-    assert content["constants"]["green.1.w"] == {
-        "published": None,
-        "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}"),
-        "free": True,
-        "statistical_error": None,
-        "discretisation_error": 1e-5,
-        "model_error": None,
-        "misfit_error": 2e-3,
-        "jackknife_error": 3e-2,
-    }
+    assert [given[2][0].tolist() for given in asked[1:]] == list(rows.values())
 
 
 GONE = object()
@@ -221,9 +184,7 @@ def refused(reader, path, message):
     assert not text.startswith(f"{path}: is damaged") or text.endswith("; regenerate it")
 
 
-IMAGE = {"image": "thickness.png", "range": [0.1, 0.2]}
 DAMAGE = [
-    ("pipeline", "profile", r"must be the record of a stack, got pipeline 'profile'"),
     ("format", 9, r"is not a record of format 1 or 2, got 9"),
     ("constants/red.1.w", GONE, r"'red.1.w' is missing"),
     ("constants/red.1.w/regenerated", "x", r"constants.red.1.w.regenerated must be a number, got \"x\""),
@@ -247,8 +208,7 @@ DAMAGE = [
     ("layers/1/n", 1.5, r"layers must have one n for a law of a stack"),
     ("setting/n", 1.5, r"setting.n must be that of its layers, got 1.5"),
     # Whatever is at that place: a record is no reason to open another file.
-    ("layers/0/thickness", IMAGE, r"thickness must be a number or null, got \{\"image\""),
-    ("unit", 3, r"unit must be one line of printable text, .*, got 3"),
+    ("layers/0/thickness", {"image": "thickness.png"}, r"thickness must be a number or null, got \{\"image\""),
     ("note", GONE, r"'note' is missing"),
     ("quality", GONE, r"'quality' is missing"),
     ("quality/regenerated/rel", [], r"quality.regenerated.rel must be a list of numbers, got \[\]"),
@@ -258,10 +218,10 @@ DAMAGE = [
 ]
 
 
+PROFILE = ("pipeline", "profile", r"must be the record of a stack, got pipeline 'profile'")
+EITHER = [PROFILE, ("unit", 3, r"unit must be one line of printable text, .*, got 3")]
 # What a report cannot show.
 NOT_SHOWN = [
-    ("pipeline", "profile", r"must be the record of a stack, got pipeline 'profile'"),
-    ("unit", 3, r"unit must be one line of printable text, .*, got 3"),
     ("interfaces", GONE, r"interfaces must be a table, got nothing"),
     ("interfaces/green", GONE, r"interfaces.green must be a table, got nothing"),
     ("interfaces/blue/quality/0/rel", GONE, r"interfaces.blue.quality.0.rel must be a list of numbers, got nothing"),
@@ -275,7 +235,8 @@ NOT_SHOWN = [
 
 
 @pytest.mark.parametrize(
-    ("reader", "place", "value", "message"), [*((load, *row) for row in DAMAGE), *((read, *row) for row in NOT_SHOWN)]
+    ("reader", "place", "value", "message"),
+    [(reader, *row) for reader, rows in ((load, DAMAGE + EITHER), (read, NOT_SHOWN + EITHER)) for row in rows],
 )
 def test_a_damaged_record_is_one_line(written, reader, place, value, message):
     assert reader(written)
@@ -283,63 +244,53 @@ def test_a_damaged_record_is_one_line(written, reader, place, value, message):
     refused(reader, written, message)
 
 
-def test_a_record_of_another_law_is_none_of_a_stack(tmp_path):
-    with pytest.raises(RecordError, match=r"hazard\.json: must be the record of a stack, got pipeline 'profile'"):
-        load(fits_folder() / "hazard.json")
-    with pytest.raises(RecordError, match="there is no such record"):
-        load(tmp_path / "heart.json")
-
-
-def test_what_is_a_stack(file, tmp_path):
-    recipe = tmp_path / "recipe.toml"
-    recipe.write_text((fits_folder() / "hazard.toml").read_text())
-    assert request(file())
-    assert request("heart")
+def test_what_is_a_stack_and_what_its_file_says(file, tmp_path):
+    (tmp_path / "recipe.toml").write_text((fits_folder() / "hazard.toml").read_text())
     assert request("heart").stack.names == ("epicardium", "heart muscle")
-    for name in (str(recipe), "hazard", "nothing", str(tmp_path / "nothing.toml"), "a" * 300, "a" * 300 + ".toml"):
+    others = ("hazard", "nothing", "a" * 300, "a" * 300 + ".toml")
+    for name in (*others, str(tmp_path / "recipe.toml"), str(tmp_path / "nothing.toml")):
         assert not request(name)
-
-
-def test_what_a_file_says(file):
     of = request(file(name="mine"))
     assert (of.name, of.title, of.illumination) == ("mine", "Muscle under its skin", "diffuse")
-    plain = request(file('title = "Muscle under its skin"\nillumination = "diffuse"\n', ""))
+    plain = request(file(STACK.partition("\n[[layers]]")[0], ""))
     assert (plain.title, plain.illumination) == (stacks.TITLE, "diffuse")
     # A scene's file is one of a stack: what draws it is not looked at.
     drawn = request(file('[[layers]]\nname = "epi', 'scene = "layers"\npose = 3\n[[layers]]\nname = "epi'))
     assert drawn.stack.media == of.stack.media
+    path, other = file(), tmp_path / "other" / "heart.toml"
+    other.parent.mkdir()
+    other.write_text(STACK)
+    assert [kind.key for kind, _ in requests_of([path, "skin", path])] == ["stack", "gaussians"] * 2
+    with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
+        requests_of([path, "skin", str(other)])
 
 
+LIGHT, TITLE = 'illumination = "diffuse"', '"Muscle under its skin"'
+IN_START = [
+    ("violet = [[1]]", "keys must be of red, green, blue, got 'violet'"),
+    ("red = [[1, 2]]", r"red must be lists of w, u, .* one an interface.*, got \[\[1.0, 2.0\]\]"),
+    ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", "red must be .* all but u > 0, got"),
+    ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"red must be .* w in \(0, 1\)"),
+    ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", "green must be .*, got nothing"),
+    ('red = [["0.5", 0, 1, 1, 1, 1, 1, 1, 1]]', "red must be "),
+    ("red = [[0.5, inf, 1, 1, 1, 1, 1, 1, 1]]", "red must be "),
+    ("red = 0.5", "red must be .*, got 0.5"),
+]
 REFUSED = [
-    (
-        ('illumination = "diffuse"', 'colour = "red"'),
-        r"keys must be of unit, layers, title, illumination, start, got 'colour'",
-    ),
-    (('"diffuse"', '"sun"'), r"illumination must be one of searchlight, diffuse, got 'sun'"),
-    (('"diffuse"', "3"), r"illumination must be one of searchlight, diffuse, got 3"),
-    (('illumination = "diffuse"', "start = 1"), r"start must be a table \[start\], got 1"),
-    *(
-        ((LAST, f"{LAST}\n[start]\n{text}"), message)
-        for text, message in (
-            ("violet = [[1]]", r"\[start\] keys must be of red, green, blue, got 'violet'"),
-            ("red = [[1, 2]]", r"\[start\] red must be lists of w, u, .* one an interface.*, got \[\[1.0, 2.0\]\]"),
-            ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", r"\[start\] red must be .* all but u > 0, got"),
-            ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be .* w in \(0, 1\)"),
-            ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] green must be .*, got nothing"),
-            ('red = [["0.5", 0, 1, 1, 1, 1, 1, 1, 1]]', r"\[start\] red must be "),
-            ("red = [[0.5, inf, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be "),
-            ("red = 0.5", r"\[start\] red must be .*, got 0.5"),
-        )
-    ),
-    (('"Muscle under its skin"', "7"), r"title must be a text of 60 characters at most, got 7"),
-    ((STACK[STACK.rindex("[[layers]]") :], ""), r"layers must be two layers or more: .*, got 1"),
-    ((STACK[STACK.index("[[layers]]") :], ""), r"table \[\[layers\]\] is missing"),
+    (LIGHT, 'colour = "red"', r"keys must be of unit, layers, title, illumination, start, got 'colour'"),
+    ('"diffuse"', '"sun"', r"illumination must be one of searchlight, diffuse, got 'sun'"),
+    ('"diffuse"', "3", r"illumination must be one of searchlight, diffuse, got 3"),
+    (LIGHT, "start = 1", r"start must be a table \[start\], got 1"),
+    *((LAST, f"{LAST}\n[start]\n{text}", rf"\[start\] {message}") for text, message in IN_START),
+    (TITLE, "7", r"title must be a text of 60 characters at most, got 7"),
+    (STACK[STACK.rindex("[[layers]]") :], "", r"layers must be two layers or more: .*, got 1"),
+    (LAYERS, "", r"table \[\[layers\]\] is missing"),
 ]
 
 
-@pytest.mark.parametrize(("pieces", "message"), REFUSED)
-def test_a_mistake_in_a_file_is_one_line(file, tmp_path, pieces, message):
-    path = file(*pieces)
+@pytest.mark.parametrize(("old", "new", "message"), REFUSED)
+def test_a_mistake_in_a_file_is_one_line(file, old, new, message):
+    path = file(old, new)
     with pytest.raises(InputError, match=message) as caught:
         stacks.requested(path, read_toml(Path(path)))
     assert str(caught.value).startswith(f"{path}: ")
@@ -347,21 +298,21 @@ def test_a_mistake_in_a_file_is_one_line(file, tmp_path, pieces, message):
 
 
 @pytest.mark.parametrize(
-    ("pieces", "message"),
+    ("old", "new", "message"),
     [
-        (("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), "layers must have one n for a law of a stack"),
-        (("mu_s = [1.13, 1.2, 1.3]\ng = 0.0", "mu_s = [1.13, 1.2, 1.3]\ng = 0.99"), r"layers must scatter with g in"),
+        ("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20", "layers must have one n for a law of a stack"),
+        (LAST, LAST.replace("g = 0.0", "g = 0.99"), r"layers must scatter with g in"),
     ],
 )
-def test_what_no_law_is_for_is_refused_before_any_fit(monkeypatch, file, tmp_path, pieces, message):
-    monkeypatch.setattr(stacks, "_channel", lambda *_: pytest.fail("nothing is to be fitted"))
-    of = request(file(*pieces))
+def test_what_no_law_is_for_is_refused_before_any_fit(asked, file, tmp_path, old, new, message):
+    of = request(file(old, new))
     with pytest.raises(InputError, match=message):
         recorded(stacks.fit(of, RUN), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
+    assert not asked
 
 
-def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
+def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, asked, file, tmp_path):
     """Not after two colours, either; and an old record stays as it was."""
 
     def fails(illumination, medium, starts, tracing):
@@ -370,34 +321,45 @@ def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
         return made(illumination, medium)
 
     of = request(file())
-    monkeypatch.setattr(stacks, "_channel", fails)
-    with pytest.raises(FloatingPointError, match="blue diverges"):
-        recorded(stacks.fit(of, RUN), tmp_path / "mine")
+
+    def failing(of):
+        with monkeypatch.context() as patched:
+            patched.setattr(stacks, "_channel", fails)
+            with pytest.raises(FloatingPointError, match="blue diverges"):
+                recorded(stacks.fit(of, RUN), tmp_path / "mine")
+
+    failing(of)
     assert not (tmp_path / "mine").exists()
-    monkeypatch.setattr(stacks, "_channel", made)
     path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
     before = path.read_bytes()
-    monkeypatch.setattr(stacks, "_channel", fails)
-    with pytest.raises(FloatingPointError, match="blue diverges"):
-        recorded(stacks.fit(of.changed(title="another"), RUN), tmp_path / "mine")
+    failing(of.changed(title="another"))
     assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
     (tmp_path / "full").write_text("in the way")
-    monkeypatch.setattr(stacks, "_channel", made)
     with pytest.raises(OutputError, match=r"cannot write into .*full"):
         recorded(stacks.fit(of, RUN), tmp_path / "full")
 
 
-def test_a_record_is_found_by_path_and_by_name(written, tmp_path):
+def test_a_record_says_what_it_is_worth_and_is_found_by_path_and_by_name(written, tmp_path):
+    content = record.read(written)
+    assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
+    assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
+    assert content["fit"]["result"] == "converged"
+    assert content["layers"] == load(written).stack.layers
+    assert len(content["constants"]) == 3 * len(CONSTANTS)
+    assert content["constants"]["green.1.w"] == {**FITTED, "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}")}
     folder = tmp_path / "mine"
     digest = hashlib.sha256(written.read_bytes()).hexdigest()
     assert find(str(written), tmp_path).digest == find("heart", folder).digest == digest
     for name in ("skin", "hazard", str(fits_folder() / "hazard.json"), str(tmp_path / "nothing.json"), "a" * 300):
         assert find(name, folder) is None
     assert find("heart", tmp_path) is None
-    damaged = tmp_path / "damaged.json"
-    damaged.write_text("{")
+    (tmp_path / "damaged.json").write_text("{")
     with pytest.raises(RecordError, match=r"damaged\.json: is not a record"):
-        find(str(damaged), folder)
+        find(str(tmp_path / "damaged.json"), folder)
+    with pytest.raises(RecordError, match=r"hazard\.json: must be the record of a stack, got pipeline 'profile'"):
+        load(fits_folder() / "hazard.json")
+    with pytest.raises(RecordError, match="there is no such record"):
+        load(tmp_path / "heart.json")
 
 
 def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
@@ -411,12 +373,27 @@ def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
     for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
         assert matching(request(file(*pieces, name="x")), folder) is None
     assert matching(same, tmp_path) is None
+    # An image's mean thickness has more digits than a record.
+    Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
+    of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
+    mean = of.stack.media[0].layers[0].thickness
+    assert mean != float(f"{mean:.12g}")
+    path = recorded(stacks.fit(of, RUN), tmp_path / "image")
+    found = matching(of, tmp_path / "image")
+    assert found is not None
+    assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
+    assert load(path).stack.map is None
+    # The one that is asked for must be whole: its layers say which one it is, and to go on without it would hide that.
+    spoil(written, "half_spaces/green/1/a00", lambda a: 1.001 * a)
+    with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
+        matching(request(file()), folder)
+    assert matching(request(file("0.3\n", "0.31\n")), folder) is None
 
 
 CAUSES = [
     (None, "{", r"is not a record: "),
     (None, "[]", r"is not a record of format 1 or 2, got 'list'"),
-    ("pipeline", "profile", r"must be the record of a stack, got pipeline 'profile'"),
+    PROFILE,
     ("layers", GONE, r"'layers' is missing"),
     ("layers/0", 3, r"layers must be tables, got 3"),
     ("setting/illumination", "sun", r"record 'heart' is damaged: it has no valid setting"),
@@ -437,27 +414,6 @@ def test_a_damaged_record_of_something_else_stops_nothing(written, file, tmp_pat
         assert str(said[0].message).isprintable()
 
 
-def test_the_record_that_is_asked_for_must_be_whole(written, file, tmp_path):
-    """Its layers say which one it is: to go on without it would hide that."""
-    spoil(written, "half_spaces/green/1/a00", lambda a: 1.001 * a)
-    with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
-        matching(request(file()), tmp_path / "mine")
-    assert matching(request(file("0.3\n", "0.31\n")), tmp_path / "mine") is None
-
-
-def test_a_record_matches_an_image_of_thicknesses(at_once, file, tmp_path):
-    """Whose mean has more digits than a record."""
-    Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
-    of = request(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
-    mean = of.stack.media[0].layers[0].thickness
-    assert mean != float(f"{mean:.12g}")
-    path = recorded(stacks.fit(of, RUN), tmp_path / "mine")
-    found = matching(of, tmp_path / "mine")
-    assert found is not None
-    assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
-    assert load(path).stack.map is None
-
-
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 
 
@@ -471,12 +427,3 @@ def test_a_shipped_stack_has_its_record(name):
     for channel, law in enumerate(found.laws):
         ends = sorted([law.top.reflectance, law.below.reflectance])
         assert ends[0] <= law.total(0.2) <= ends[1], channel
-
-
-def test_stacks_of_one_name_would_write_one_record(file, tmp_path):
-    path, other = file(), tmp_path / "other" / "heart.toml"
-    other.parent.mkdir()
-    other.write_text(STACK)
-    assert [kind.key for kind, _ in requests_of([path, "skin", path])] == ["stack", "gaussians"] * 2
-    with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
-        requests_of([path, "skin", str(other)])

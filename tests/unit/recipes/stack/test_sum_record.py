@@ -1,5 +1,7 @@
 """Records of sums of Gaussians: read as the laws that were written, refused in one line, and what those shipped say."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -33,14 +35,10 @@ def made_sums(media, illumination, tracing=None):
         measured = {key: [place / count for place in (0.1, 0.2, 0.3)] for key in sums.MEASURED}
         by_count.append({"result": "converged", "steps": 9, "condition_number": 3.0, **measured})
     whole = [0.5, 0.4, 0.3][: len(media)]
-    energy = np.full(5, 0.05)
-    arrays = {
-        f"{channel}_{key}": value
-        for channel, a in zip(CHANNELS, whole, strict=True)
-        for key, value in zip(
-            sums.ARRAYS, (EDGES * shift, energy * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])), strict=True
-        )
-    }
+    arrays = {}
+    for channel, a in zip(CHANNELS, whole, strict=True):
+        light = EDGES * shift, np.full(5, 0.05) * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])
+        arrays |= {f"{channel}_{key}": value for key, value in zip(sums.ARRAYS, light, strict=True)}
     return {"constants": constants, "reflectance": whole, "share": [0.25] * 3, "by_count": by_count, "arrays": arrays}
 
 
@@ -56,28 +54,25 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
     assert written == tmp_path / "mine" / "gaussians" / "heart.json"
     found, of = load(written), request(str(tmp_path / "heart.toml"))
     assert found.stack.media == of.stack.media
-    for light in ILLUMINATIONS:
+    for light, count in product(ILLUMINATIONS, COUNTS):
         known = made_sums(of.stack.media, light)
-        for count in COUNTS:
-            for channel, law, medium in zip(CHANNELS, found.laws(light, count), of.stack.media, strict=True):
-                assert law.setting == Setting(light, n=1.38)
-                assert law.total_reflectance == known["reflectance"][CHANNELS.index(channel)]
-                unit = medium.layers[0].mfp
-                variance = [known["constants"][f"{count}.v{i + 1}"]["regenerated"] / unit**2 for i in range(count)]
-                weight = [known["constants"][f"{count}.{channel}.w{i + 1}"]["regenerated"] for i in range(count)]
-                np.testing.assert_allclose(law.variance, variance, rtol=1e-11)
-                np.testing.assert_allclose(law.weight, weight, rtol=1e-11)
+        values = {name: one["regenerated"] for name, one in known["constants"].items()}
+        for place, (channel, law) in enumerate(zip(CHANNELS, found.laws(light, count), strict=True)):
+            assert law.setting == Setting(light, n=1.38)
+            assert law.total_reflectance == known["reflectance"][place]
+            unit = of.stack.media[place].layers[0].mfp
+            variance = [values[f"{count}.v{i + 1}"] / unit**2 for i in range(count)]
+            weight = [values[f"{count}.{channel}.w{i + 1}"] for i in range(count)]
+            np.testing.assert_allclose(law.variance, variance, rtol=1e-11)
+            np.testing.assert_allclose(law.weight, weight, rtol=1e-11)
         for channel, one in zip(CHANNELS, found.lights(light), strict=True):
             np.testing.assert_array_equal(one.edges, known["arrays"][f"{channel}_edges"])
             assert [one.whole, one.inside] == known["arrays"][f"{channel}_ends"].tolist()
     first, second = (found.laws(light)[0].variance for light in ILLUMINATIONS)
     assert first != second
     again = recorded(sums.fit(of, RUN), tmp_path / "again")
-    assert again.read_bytes() == written.read_bytes()
-    assert again.with_suffix(".npz").read_bytes() == written.with_suffix(".npz").read_bytes()
-
-
-def test_it_belongs_to_the_record_of_its_stack(written, tmp_path):
+    for ending in (".json", ".npz"):
+        assert again.with_suffix(ending).read_bytes() == written.with_suffix(ending).read_bytes()
     assert find("heart", tmp_path / "mine").path == written
     assert find("skin", tmp_path / "mine") is None
 
@@ -110,16 +105,11 @@ def test_a_damaged_record_is_one_line(written, place, value, message):
     refused(load, written, message)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("red_edges", None),
-        ("red_edges", EDGES[::-1]),
-        ("red_energy", np.ones(4)),
-        ("blue_ends", np.array([0.5])),
-        ("green_weight", np.ones((5, 1))),
-    ],
-)
+SHORT = {"red_energy": np.ones(4), "blue_ends": np.array([0.5]), "green_weight": np.ones((5, 1))}
+NO_LIGHT = [("red_edges", None), ("red_edges", EDGES[::-1]), *SHORT.items()]
+
+
+@pytest.mark.parametrize(("name", "value"), NO_LIGHT)
 def test_damaged_arrays_are_one_line(written, name, value):
     file = written.with_suffix(".npz")
     arrays = record.read_arrays(written)
@@ -149,7 +139,11 @@ def shipped():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_stack_has_its_sums(shipped, name):
-    """Of the layers that its file has; all fits converged, each error there where it applies."""
+    """Of the layers that its file has; all fits converged, each error there where it applies.
+
+    It is as far from its light as it says, by the laws that it makes, in their own lengths; those of another colour are
+    farther.
+    """
     found = shipped[name]
     assert record.plain(found.stack.media) == record.plain(request(name).stack.media)
     assert found.content["fit"]["result"] == "converged"
@@ -159,32 +153,23 @@ def test_a_shipped_stack_has_its_sums(shipped, name):
         assert one["free"] or one["regenerated"] in (0, 1), place
         assert all(one[key] > 0 for key in known), place
 
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_a_shipped_record_is_as_far_from_its_light_as_it_says(shipped, name):
-    """By the laws that it makes, in their own lengths; those of another colour are farther."""
-    found = shipped[name]
     units = [medium.layers[0].mfp for medium in found.stack.media]
 
-    def within(laws, units, rings):
-        for law, unit, one in zip(laws, units, rings, strict=True):
-            yield np.asarray(law.cdf(one.edges / unit, 0.5), float)
+    for light, count in product(ILLUMINATIONS, (2, 6)):
+        rings, laws = found.lights(light), list(zip(found.laws(light, count), units, strict=True))
 
-    def rel(shares, rings):
-        pairs = zip(shares, rings, strict=True)
-        return [np.mean(np.abs(np.diff(share) * one.whole / one.energy - 1.0)) for share, one in pairs]
+        def measured(laws, rings=rings):
+            """Measure rel and ks of each colour."""
+            for (law, unit), one in zip(laws, rings, strict=True):
+                share = np.asarray(law.cdf(one.edges / unit, 0.5), float)
+                data = one.inside + np.append(0.0, np.cumsum(one.energy)) / one.whole
+                yield np.mean(np.abs(np.diff(share) * one.whole / one.energy - 1.0)), np.max(np.abs(share - data))
 
-    for light in ILLUMINATIONS:
-        rings = found.lights(light)
-        data = [one.inside + np.append(0.0, np.cumsum(one.energy)) / one.whole for one in rings]
-        for count in (2, 6):
-            laws, told = found.laws(light, count), found.content["sums"][light]["by_count"][count - 1]
-            shares = list(within(laws, units, rings))
-            np.testing.assert_allclose(rel(shares, rings), told["rel"], rtol=1e-3)  # float32
-            ks = [np.max(np.abs(share - one)) for share, one in zip(shares, data, strict=True)]
-            np.testing.assert_allclose(ks, told["ks"], rtol=1e-3)
-            swapped = within((*laws[1:], laws[0]), (*units[1:], units[0]), rings)
-            assert np.mean(rel(swapped, rings)) > 1.02 * np.mean(told["rel"])
+        told = found.content["sums"][light]["by_count"][count - 1]
+        rel, ks = zip(*measured(laws), strict=True)
+        np.testing.assert_allclose(rel, told["rel"], rtol=1e-3)  # float32
+        np.testing.assert_allclose(ks, told["ks"], rtol=1e-3)
+        assert np.mean([rel for rel, _ in measured([*laws[1:], laws[0]])]) > 1.02 * np.mean(told["rel"])
 
 
 def test_what_six_cost(shipped):
@@ -192,9 +177,8 @@ def test_what_six_cost(shipped):
     six = [shipped[name].content["sums"][light]["by_count"][5] for name in ("heart", "skin") for light in ILLUMINATIONS]
     assert 0.15 < max(max(one["alone"]) for one in six) <= 0.16
     assert 0.16 < max(max(one["rel"]) for one in six) < 0.17
-    for name in SHIPPED:
-        for light in ILLUMINATIONS:
-            by_count = shipped[name].content["sums"][light]["by_count"]
-            rms = np.array([one["rms"] for one in by_count])
-            assert np.all(np.diff(np.sum(rms**2, axis=1)) < 0)  # what the fit makes small
-            assert all(np.mean(one["alone"]) <= 1.02 * np.mean(one["rel"]) for one in by_count)
+    for name, light in product(SHIPPED, ILLUMINATIONS):
+        by_count = shipped[name].content["sums"][light]["by_count"]
+        rms = np.array([one["rms"] for one in by_count])
+        assert np.all(np.diff(np.sum(rms**2, axis=1)) < 0)  # what the fit makes small
+        assert all(np.mean(one["alone"]) <= 1.02 * np.mean(one["rel"]) for one in by_count)
