@@ -24,18 +24,20 @@ from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.fresnel import fresnel
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
+from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.judge import EXPOSURE
 from profilefit.scenes.stage.picture import to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import alone
+from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
 
@@ -68,10 +70,10 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     rows = []
     media, light = request.media, request.illumination
     plates = [plate_of(medium, light) for medium in media]
-    others = {TABLE: alone(TABLE, of_table(table, plates), request.mfp)}
+    others = {TABLE: NamedTechnique(TABLE, of_table(table, plates), request.mfp)}
     for count in (4, 6):
         sums = [shared_gaussians((medium,), light, count)[0] for medium in media]
-        others[f"gaussians:{count}"] = alone(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
+        others[f"gaussians:{count}"] = NamedTechnique(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:
             for kind, found in chart.ways(stage, request.changed(pose=pose), table, WAYS, others).items():
@@ -82,6 +84,21 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     return rows
 
 
+def split(medium: Medium, illumination: str) -> tuple[float, float, float]:
+    """Return shares of light that comes back scattered once, scattered more often, and mirrored by the surface [-].
+
+    Exact, of a stack of one index, along the normal or diffuse; of g > 0 the similar stack's whole.
+    """
+    similar = Medium(tuple(layer.similar for layer in medium.layers), medium.n_above)
+    light = exact.solve(similar, illumination)
+    if illumination == "diffuse":
+        first, mirror = diffusely_once(medium), light.specular
+    else:
+        first = float(once(medium, np.array([1.0]))[0])
+        mirror = float(fresnel(medium.n_above, medium.layers[0].n, 1.0)[0])
+    return first, max(light.reflectance - first, 0.0), mirror
+
+
 def shares() -> list[tuple[str, ...]]:
     """Yield single : multiple : specular light of the stacks, by colour, isotropic and with g = 0.9."""
     rows = []
@@ -89,7 +106,7 @@ def shares() -> list[tuple[str, ...]]:
         for name, medium in stacks(channel).items():
             for g in (0.0, 0.9):
                 own = medium if g == 0 else forward(medium, g)
-                found = [chart.split(own, light) for light in ("searchlight", "diffuse")]
+                found = [split(own, light) for light in ("searchlight", "diffuse")]
                 cells = (f"{100 * value:.2g}" for one in found for value in one)
                 rows.append((f"{name}, {CHANNELS[channel]}", f"{g:g}", *cells))
     return rows

@@ -177,8 +177,8 @@ def splats() -> Rows:
 def over_maps(drawn: SeaRender) -> Rows:
     """Return errors of the request's picture by each splat and by numbers of maps in depths, and milliseconds."""
     of, named, splats = drawn.request, drawn.request.technique, (Splat.POINTS, Splat.FACES, Splat.CELLS)
-    cases = [(f"{one.value}, {named.slices} slices", (one, one), named.slices) for one in splats]
-    cases += [(f"{of.splats[1].value}, {one} slices", of.splats, one) for one in SLICES]
+    cases = [(f"{one.value}, {named.slices} slices", one, named.slices) for one in splats]
+    cases += [(f"{of.splat.value}, {one} slices", of.splat, one) for one in SLICES]
     rows: Rows = []
     for name, by, count in cases:
         with Renderer(drawn.passes.renderer.context, of.size) as maps:

@@ -21,7 +21,7 @@ from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes.run import silent, written
 from profilefit.recipes.workers import Workers
-from profilefit.scenes.stage import gather
+from profilefit.scenes.stage import technique
 from profilefit.scenes.stage.stage import Stage
 from profilefit.shader.context import open_context
 
@@ -194,9 +194,17 @@ def context(shared_context):
 
 
 @pytest.fixture
-def stage(context):
-    """128 x 128 pixels."""
-    with Stage(context, (128, 128), shadow_side=16) as stage:
+def stage(context, request):
+    """A stage as a module's STAGE says, columns and rows and the side of its shadow map; else of 128 x 128 pixels."""
+    size, shadow_side = getattr(request.module, "STAGE", ((128, 128), 16))
+    with Stage(context, size, shadow_side) as stage:
+        yield stage
+
+
+@pytest.fixture
+def small(context, request):
+    """A stage beside it, of a module's SMALL columns and rows."""
+    with Stage(context, request.module.SMALL, shadow_side=16) as stage:
         yield stage
 
 
@@ -205,8 +213,8 @@ def alter(monkeypatch):
     """alter(old, new) changes a line of scatter.frag, for stages that are made afterwards; old is what stands there."""
 
     def change(old, new):
-        before = gather.text_beside
-        assert before(gather.__name__, "glsl/scatter.frag").count(old) == 1
-        monkeypatch.setattr(gather, "text_beside", lambda *place: before(*place).replace(old, new))
+        before = technique.text_beside
+        assert before(technique.__name__, "glsl/scatter.frag").count(old) == 1
+        monkeypatch.setattr(technique, "text_beside", lambda *place: before(*place).replace(old, new))
 
     return change

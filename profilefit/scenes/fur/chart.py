@@ -11,7 +11,7 @@ from mcml_sim.media.arrays import Floats
 from profilefit.scenes.fur.ball import FurView
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch, cast, random_patch
-from profilefit.scenes.fur.ways import WAYS, LayerTechnique
+from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.renderer import Renderer
 
@@ -35,13 +35,7 @@ def patch_view(patch: Patch, theta: float, size: tuple[int, int]) -> tuple[FurVi
 
 
 def over_layers(
-    context: moderngl.Context,
-    patch: Patch,
-    theta: float,
-    layers: Sequence[int],
-    size: tuple[int, int],
-    turns: int,
-    ways: Sequence[LayerTechnique] = WAYS,
+    context: moderngl.Context, patch: Patch, theta: float, layers: Sequence[int], size: tuple[int, int], turns: int
 ) -> list[ChartPoint]:
     """Return the root mean square error of the heights of first hits over the length, and milliseconds, of each way.
 
@@ -49,7 +43,7 @@ def over_layers(
     """
     view, start = patch_view(patch, theta, size)
     true, surface = cast(patch, theta, start) / patch.length, FurSurface.of_patch(patch)
-    each = [(way, surface.layered(view, way, count)) for way in ways for count in layers]
+    each = [(way, surface.layered(view, way, count)) for way in WAYS for count in layers]
     with Renderer(context, size) as renderer:
         heights = [np.maximum(renderer.image(one)[..., 3].ravel(), 0.0) for _, one in each]
         times = [[renderer.time(one) for _, one in each] for _ in range(turns)]

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
-from profilefit.errors import InputError
+from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require, require_one_shape, shown
 from profilefit.shader import emit
 from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
@@ -75,11 +74,9 @@ def visibility(
     require_one_shape(**numbers)
     count, tall, height = (checked_numbers(name, numbers[name], "a number >= 0") for name in ("density", "length", "z"))
     for name, value in (("density", count), ("z", height)):
-        if not np.all((value >= 0) & np.isfinite(value)):
-            raise InputError(f"{name} must be a finite number >= 0, got {shown(numbers[name])}")
+        require(np.all((value >= 0) & np.isfinite(value)), name, "a finite number >= 0", numbers[name])
     area = shadow(radius, length, theta, lean)
-    if not np.all(height <= tall):
-        raise InputError(f"z must be at most the length, {shown(length)}, got {shown(z)}")
+    require(np.all(height <= tall), "z", f"at most the length, {shown(length)}", z)
     return np.exp(-count * (1.0 - height / tall) ** 2 * area)[()]
 
 
@@ -92,8 +89,7 @@ def shell_shadow(
     the largest of straight lines, whose envelope is a convex hull.
     """
     count = checked_whole("layers", layers, 1, MOST_LAYERS)
-    if not (is_number(exponent) and 0 < exponent < np.inf):
-        raise InputError(f"exponent must be a finite number > 0, got {shown(exponent)}")
+    require(is_number(exponent) and 0 < exponent < np.inf, "exponent", "a finite number > 0", exponent)
     whole = float(shadow(radius, length, theta, lean))
     t = np.arange(count) / count
     aside = float(length * np.hypot(np.tan(theta) - lean[0], lean[1]))
@@ -107,8 +103,8 @@ def best_exponent(x: ArrayLike) -> Any:
     own.
     """
     number = checked_numbers("x", x, f"a number in [{LEAST_X:g}, {MOST_X:g}]")
-    if not np.all((number >= LEAST_X) & (number <= MOST_X)):
-        raise InputError(f"x = N r0 / L must be in [{LEAST_X:g}, {MOST_X:g}], got {shown(x)}")
+    fitted = np.all((number >= LEAST_X) & (number <= MOST_X))
+    require(fitted, "x = N r0 / L", f"in [{LEAST_X:g}, {MOST_X:g}]", x)
     return (1.0 + FITTED.size * number**FITTED.power)[()]
 
 
@@ -128,8 +124,7 @@ def occlusion(density: float, radius: float, length: float, z: float, lean: floa
 def lobe_mean(exponent: ArrayLike) -> Any:
     """Return the mean of sin^p over all directions [-], by which a Kajiya-Kay lobe is as bright for every p >= 0."""
     p = checked_numbers("exponent", exponent, "a number >= 0")
-    if not np.all((p >= 0) & np.isfinite(p)):
-        raise InputError(f"exponent must be a finite number >= 0, got {shown(exponent)}")
+    require(np.all((p >= 0) & np.isfinite(p)), "exponent", "a finite number >= 0", exponent)
     return (0.5 * np.sqrt(np.pi) * np.exp(gammaln(0.5 * p + 1.0) - gammaln(0.5 * p + 1.5)))[()]
 
 
@@ -172,8 +167,7 @@ def _checked(**values: ArrayLike) -> list[Floats]:
         accepted = "an angle in [0, pi / 2) radians" if name == "theta" else "a finite number > 0"
         numbers = checked_numbers(name, value, accepted)
         good = (numbers >= 0) & (numbers < 0.5 * np.pi) if name == "theta" else (numbers > 0) & np.isfinite(numbers)
-        if not np.all(good):
-            raise InputError(f"{name} must be {accepted}, got {shown(value)}")
+        require(np.all(good), name, accepted, value)
         found.append(numbers)
     require_one_shape(**values)
     return found

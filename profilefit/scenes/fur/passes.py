@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.checks import checked_whole
+from profilefit.recipes.declared import LISTED, Declared, words
 from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import LayerTechnique
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance
 from profilefit.scenes.stage.technique import RADIANCE
 from profilefit.scenes.stage.world import Light, Rgb, unit
 from profilefit.shader.emit import read_text, text_beside
@@ -24,7 +26,10 @@ FINE = 8.0  # texels of a strand's radius in the maps of nearest feet
 MOST_TEXELS = 2048
 HEIGHTS, LEANS = 64, 12  # of the table of occlusion
 BACKGROUND = (0.02, 0.02, 0.02)
-EXPONENTS, SHIFTS, STRENGTHS, RIM = (60.0, 12.0), (-0.1, 0.2), (0.1, 0.15), (0.0, 0.5, 4.0)
+
+Exponent = Annotated[float, Field(ge=0.0, le=1e4)]
+Shift = Annotated[float, Field(ge=-1.0, le=1.0)]
+Rim = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
 class FurSurface(NamedTuple):
@@ -69,20 +74,24 @@ class FurSurface(NamedTuple):
         return Pass("fur", {"nearest_map": nearest, "next_map": following}, HITS, source, given)
 
 
-@dataclass(frozen=True)
-class Shading:
-    """Reflection of strands after Fang et al.: two lobes of Kajiya and Kay, and a rim.
+def pair(least: float, most: float) -> Any:
+    """Return an annotation of two numbers, of the first lobe and the other."""
+    return words(f"two numbers in {least:g} ... {most:g}, of the first lobe and the other")
+
+
+class ShadingTable(Declared):
+    """Table [shading]: reflection of strands after Fang et al., two lobes of Kajiya and Kay, and a rim.
 
     exponents, shifts, strengths  of the two lobes [-]: shift is the tangent of the angle by which one is turned
     normalised  whether a lobe's mean over all half vectors is its strength; else that is its peak, as published
     rim         bias, scale and power
     """
 
-    exponents: tuple[float, float] = EXPONENTS
-    shifts: tuple[float, float] = SHIFTS
-    strengths: tuple[float, float] = STRENGTHS
+    exponents: Annotated[tuple[Exponent, Exponent], LISTED, pair(0.0, 1e4)] = (60.0, 12.0)
+    shifts: Annotated[tuple[Shift, Shift], LISTED, pair(-1.0, 1.0)] = (-0.1, 0.2)
+    strengths: Annotated[tuple[Irradiance, Irradiance], LISTED, pair(0.0, MOST_LIGHT)] = (0.1, 0.15)
     normalised: bool = True
-    rim: Rgb = RIM
+    rim: Annotated[tuple[Rim, Rim, Rim], LISTED] = (0.0, 0.5, 4.0)
 
 
 class Coat(NamedTuple):
@@ -94,7 +103,7 @@ class Coat(NamedTuple):
     skin: Rgb
     light: Light
     ambient: Rgb
-    shading: Shading
+    shading: ShadingTable
 
     def shade(self, view: FurView) -> Pass:
         """Return the pass from `HITS` to the radiance that the eye sees, linear."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from functools import partial
+from typing import Annotated, Literal, NamedTuple, Self
 
 import moderngl
 import numpy as np
@@ -14,12 +15,12 @@ from pydantic import Field, model_validator
 from mcml_sim.media.arrays import Floats
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, Tolerance, words
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
-from profilefit.scenes.fur.passes import EXPONENTS, HITS, RIM, SHIFTS, STRENGTHS, Coat, FurSurface, Shading
+from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
 from profilefit.scenes.stage.judge import TURNS, Judge
 from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, averaged
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance, Samples, TechniqueTable, Viewpoint, ViewRequest
+from profilefit.scenes.stage.request import Samples, TechniqueTable, Viewpoint, ViewRequest
 
 KINDS = ("swept", "shells")
 VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
@@ -32,14 +33,6 @@ WHITE = 0.99  # of the ball's pixels, the brightest of which becomes white
 
 Length = Annotated[float, Field(gt=0.0, le=LARGEST)]
 Force = Annotated[float, Field(ge=-MOST_FORCE, le=MOST_FORCE)]
-Exponent = Annotated[float, Field(ge=0.0, le=1e4)]
-Shift = Annotated[float, Field(ge=-1.0, le=1.0)]
-Rim = Annotated[float, Field(ge=0.0, le=100.0)]
-
-
-def pair(least: float, most: float) -> Any:
-    """Return an annotation of two numbers, of the first lobe and the other."""
-    return words(f"two numbers in {least:g} ... {most:g}, of the first lobe and the other")
 
 
 class FurTable(Declared):
@@ -83,21 +76,6 @@ class FurTable(Declared):
             accepted = f"three numbers whose root of squares is {MOST_FORCE:g} at most"
             raise Refused(accepted, list(self.force), "force")
         return self
-
-
-class ShadingTable(Declared):
-    """Table [shading]: two lobes of the strands, and the light of their rim."""
-
-    exponents: Annotated[tuple[Exponent, Exponent], LISTED, pair(0.0, 1e4)] = EXPONENTS
-    shifts: Annotated[tuple[Shift, Shift], LISTED, pair(-1.0, 1.0)] = SHIFTS
-    strengths: Annotated[tuple[Irradiance, Irradiance], LISTED, pair(0.0, MOST_LIGHT)] = STRENGTHS
-    normalised: bool = True
-    rim: Annotated[tuple[Rim, Rim, Rim], LISTED] = RIM
-
-    @property
-    def shading(self) -> Shading:
-        """Shading of these numbers."""
-        return Shading(self.exponents, self.shifts, self.strengths, self.normalised, self.rim)
 
 
 class FurTechnique(TechniqueTable):
@@ -189,10 +167,7 @@ class FurRender(NamedTuple):
 
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
-        draw, time = (
-            (lambda count: self.picture(by, count)),
-            (lambda count: self.renderer.time(*self._passes(by, count))),
-        )
+        draw, time = partial(self.picture, by), lambda count: self.renderer.time(*self._passes(by, count))
         return self.judge.points(by.name, layers, draw, time, turns)
 
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:
@@ -205,7 +180,7 @@ def reference_render(context: moderngl.Context, of: FurRequest) -> Iterator[FurR
     fur, each = of.fur, of.technique.supersampling
     ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.force, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
-    shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table.shading).shade(view)
+    shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table).shade(view)
     with Renderer(context, size) as renderer:
         hits = ball.cast(view, size)
         renderer.write(HITS, hits)

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, is_number, shown
-from profilefit.errors import InputError
+from mcml_sim.media.checks import checked_whole, is_number, require
 from profilefit.scenes.fur.law import MOST_LAYERS
 
 MOST_STRANDS = 1 << 20
@@ -50,8 +49,8 @@ def random_patch(
 
 def strand_count(density: float, side: float) -> int:
     """Return the number of strands on a square, 1 at least: density [1/area] times side [length] squared."""
-    if not (is_number(density) and 0 < density < np.inf and 0 < density * side * side <= MOST_STRANDS):
-        raise InputError(f"density must be a number > 0 of {MOST_STRANDS} strands at most, got {shown(density)}")
+    holds = is_number(density) and 0 < density < np.inf and 0 < density * side * side <= MOST_STRANDS
+    require(holds, "density", f"a number > 0 of {MOST_STRANDS} strands at most", density)
     return max(round(density * side * side), 1)
 
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, shown
-from profilefit.errors import InputError
+from mcml_sim.media.checks import is_number, require
 from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
 
@@ -82,8 +81,7 @@ def least_layers(error: Callable[[int], float], goal: float, most: int = MOST, c
     By doubling, and then where a power of N through both ends has it: where an error rises again with N, as that of
     quadratic shells does, the first place. InputError on a goal that is not > 0.
     """
-    if not (is_number(goal) and goal > 0):
-        raise InputError(f"goal must be a number > 0, got {shown(goal)}")
+    require(is_number(goal) and goal > 0, "goal", "a number > 0", goal)
     low, high = 0, 1
     before, after = np.inf, error(high)
     while after > goal:

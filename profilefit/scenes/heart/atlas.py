@@ -24,6 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import require
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements
@@ -49,8 +50,7 @@ class Atlas(GpuOwner):
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], margin: int):
         """Take a context, columns and rows, and the margin around charts, which blurs reach into [texels]."""
-        if not 0 < 2 * margin < min(size):
-            raise InputError(f"margin must be texels from 1 to less than half of {min(size)}, got {margin!r}")
+        require(0 < 2 * margin < min(size), "margin", f"texels from 1 to less than half of {min(size)}", margin)
         self.size, self.margin = size, margin
         self.renderer = Renderer(context, size)
         self._links: Singles | None = None

@@ -26,16 +26,9 @@ def ways(
     Times are of all passes after the G-buffer: of an atlas, to draw it, to blur it and to read it.
     """
     return {
-        kind: points(drawn.stage, drawn.judge, drawn.pair(kind), request.sampling, numbers, turns)
+        kind: points(drawn.stage, drawn.judge, drawn.named(kind), request.sampling, numbers, turns)
         for kind, numbers in samples.items()
     }
-
-
-def frames(drawn: HeartRender, kinds: Sequence[str], turns: int = TURNS, sampling: Sampling = SURE) -> dict[str, float]:
-    """Return the least milliseconds of a whole frame by each kind, taken in turns."""
-    pairs = [drawn.pair(kind) for kind in kinds]
-    times = [[drawn.stage.time(one.by, one.mfp, sampling, 1, "frame")[0] for one in pairs] for _ in range(turns)]
-    return dict(zip(kinds, np.min(times, axis=0).tolist(), strict=True))
 
 
 def error(drawn: HeartRender, kind: str) -> float:

@@ -12,9 +12,8 @@ from mcml_sim.media.arrays import Floats
 from profilefit.laws.gaussians import MediumGaussians
 from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel, split
-from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.renderer import Pass, Read
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, Unwraps, maps, through_text
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, Unwraps, maps
 from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 from profilefit.shader.stack_text import gaussians_text
@@ -76,7 +75,7 @@ class Balanced(Technique):
         near, far = (gather_of(part, mfp) if part.variances.size else None for part in parts)
         seen = SCREEN if far is None else threshold  # no light is 0 times the screen's
         energies = np.array([np.broadcast_to(part.energy, 3) for part in parts])
-        return cls(near, far if threshold < ATLAS else None, energies, atlas, part, parts.far, seen)
+        return cls(near, far if threshold < ATLAS else None, energies, atlas, part, parts[1], seen)
 
     def before(self, stage: Unwraps) -> None:
         if self.kernel.variances.size and self.threshold > SCREEN:
@@ -96,4 +95,4 @@ class Balanced(Technique):
         return [*found, Pass("balance", reads, EXITANCE, text_beside(__name__, "glsl/balance.frag"), uniforms)]
 
     def through(self) -> LawText:
-        return LawText("heart", through_text("1.0"))
+        return LawText.of_share("heart", "1.0")

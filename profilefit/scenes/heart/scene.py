@@ -35,7 +35,7 @@ from profilefit.scenes.stage.picture import RenderResult, TruthError
 from profilefit.scenes.stage.request import TechniqueTable, Viewpoint, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import evenly, world
-from profilefit.scenes.stage.technique import Lambert, Technique, TechniquePair, alone
+from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
 from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
@@ -132,7 +132,7 @@ read = HeartRequest.of
 def draw(context: moderngl.Context, of: HeartRequest) -> RenderResult:
     """Draw the picture beside its reference: a minute, half of it for exact light if no record has these layers."""
     with reference_render(context, of, light_of(of, of.technique.gaussians)) as drawn:
-        return request.rendered(drawn.stage, drawn.judge, of, drawn.pair(of.technique.kind))
+        return request.rendered(drawn.stage, drawn.judge, of, drawn.named(of.technique.kind))
 
 
 @dataclass(frozen=True)
@@ -153,9 +153,9 @@ class HeartRender:
         at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel))
         return Balanced.of(self.atlas, self.part, self.light.kernel, at, ATLAS, self.light.mfp)
 
-    def pair(self, kind: str) -> TechniquePair:
+    def named(self, kind: str) -> NamedTechnique:
         """Return that technique with what the stage takes."""
-        return alone(kind, self.technique(kind), self.light.mfp)
+        return NamedTechnique(kind, self.technique(kind), self.light.mfp)
 
     @contextmanager
     def with_texels(self, texel: float) -> Iterator[HeartRender]:
@@ -172,8 +172,7 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
     part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.surface.roughness)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
-        stage.draw(Scene((part,), of.light, of.ambient, of.camera, f0))
-        request.require_lit(of.file, stage.buffers())
+        request.draw_lit(stage, Scene((part,), of.light, of.ambient, of.camera, f0), of.file)
         yield stage, part
 
 

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import checked_numbers, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import require
+from profilefit.scenes.stage.buffers import finite
 
 NEIGHBOURS = 24  # points that gather together
 COARSE = 0.6  # sigma, in the spacing of elements, below which a Gaussian is none: light comes out where it went in
@@ -46,8 +47,8 @@ def surface_blur(
         raise InputError(f"areas must be {len(where)} numbers >= 0, one a point, got shape {area.shape}")
     if light.shape[:1] != where.shape[:1] or light.ndim > 2:
         raise InputError(f"irradiance must be of shape ({len(where)},) or ({len(where)}, c), got {light.shape}")
-    if variance.ndim != 1 or not variance.size or not np.all(variance > 0):
-        raise InputError(f"variances must be a list of numbers > 0, got {variances!r}")
+    are_positive = variance.ndim == 1 and variance.size and np.all(variance > 0)
+    require(are_positive, "variances", "a list of numbers > 0", variances)
     if weight.shape[:1] != variance.shape or weight.ndim > light.ndim:
         raise InputError(f"weights must be one for each of {variance.size} variances, got shape {weight.shape}")
     gathering = where if at is None else _finite("at", at)
@@ -120,9 +121,4 @@ def sphere_blur(radius: float, cosine: ArrayLike, variances: ArrayLike, weights:
 
 
 def _finite(name: str, value: ArrayLike) -> Floats:
-    try:
-        array = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers, got {value!r}") from None
-    require(name, array, np.isfinite(array), "finite")
-    return array
+    return finite(name, checked_numbers(name, value, "numbers"))

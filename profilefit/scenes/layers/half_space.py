@@ -16,8 +16,8 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Medium
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
+from profilefit.recipes.stack.fit import NODES
 
-NODES = exact.Nodes(12, 16, 16, 10)  # right to 1e-4
 WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
 RINGS, NEAREST, FARTHEST = 200, 1e-3, 200.0  # that light is summed over [mfp]
 PLACES = 40  # beside the edge

@@ -34,15 +34,15 @@ from numpy.typing import ArrayLike
 
 from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_range, require_one_shape, shown
+from mcml_sim.media.checks import checked_numbers, checked_range, require, require_one_shape
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
+from profilefit.recipes.stack.fit import NODES
 from profilefit.recipes.stack.fit import stack_law as stack_law
 
-NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
 PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
 STEP = 1e-6  # of ln of a constant, for derivatives
 LEAST = np.nextafter(0.0, 1.0)  # cosine > 0
@@ -72,13 +72,12 @@ def single_scattering(
 
     InputError on other arguments. Exact, to rounding.
     """
-    if not isinstance(medium, Medium):
-        raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
+    require(isinstance(medium, Medium), "medium", "a mcml_sim.Medium", medium)
     if phases is None:  # of clear glass any
         phases = [HenyeyGreenstein(layer.g if layer.mu_s > 0 else 0.0) for layer in medium.layers]
     given = tuple(phases)
-    if len(given) != len(medium.layers) or not all(isinstance(one, Phase) for one in given):
-        raise InputError(f"phases must be {len(medium.layers)} phase functions, one a layer, got {shown(phases)}")
+    are_phases = len(given) == len(medium.layers) and all(isinstance(one, Phase) for one in given)
+    require(are_phases, "phases", f"{len(medium.layers)} phase functions, one a layer", phases)
     into = checked_range("cos_in", cos_in, "a cosine in (0, 1]", LEAST, 1.0)
     out = checked_range("cos_out", cos_out, "a cosine in (0, 1]", LEAST, 1.0)
     turn = checked_numbers("azimuth", azimuth, "a finite angle")

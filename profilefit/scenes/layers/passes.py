@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +17,8 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.stage.buffers import Singles
-from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.renderer import Pass
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Technique, maps
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import single_text, stack_text
 
@@ -89,12 +89,11 @@ class WithSingle(Technique):
     media: tuple[Medium, Medium, Medium]
     least: float
     most: float
-    table: Singles
 
-    @classmethod
-    def of(cls, by: Technique, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
-        """Return the technique with its table of exitances, a quadrature of seconds."""
-        return cls(by, media, least, most, once_table(media, least, most))
+    @cached_property
+    def table(self) -> Singles:
+        """Table of exitances, a quadrature of seconds."""
+        return once_table(self.media, self.least, self.most)
 
     def passes(self, frame: Frame) -> Sequence[Pass]:
         inner = [replace(one, writes=SCATTERED) if one.writes == EXITANCE else one for one in self.by.passes(frame)]

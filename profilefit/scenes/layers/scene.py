@@ -30,7 +30,7 @@ from profilefit.scenes.stage.judge import Judge, surface_judge
 from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import TechniquePair, alone
+from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
 KINDS = ("stack", "dipole", "half space", "none")
@@ -98,24 +98,21 @@ def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
     """Draw the picture beside its reference, with error and cost: minutes, for exact light at nine thicknesses."""
     scene = scene_of(of)
     with Stage(context, of.size) as stage:
-        stage.draw(scene)
-        request.require_lit(of.file, stage.buffers())  # before the minutes that exact light takes
+        request.draw_lit(stage, scene, of.file)  # before the minutes that exact light takes
         table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
-        pair = technique(of, laws_of(of) if of.kind in OF_LAW else None)
-        if of.single:
-            pair = pair._replace(seen=passes.WithSingle.of(pair.by, of.media, of.thickness.least, of.thickness.most))
-        return request.rendered(stage, surface_judge(stage, scene, of.mfp, table), of, pair)
+        named = technique(of, laws_of(of) if of.kind in OF_LAW else None)
+        seen = passes.WithSingle(named.by, of.media, of.thickness.least, of.thickness.most) if of.single else named.by
+        return request.rendered(stage, surface_judge(stage, scene, of.mfp, table), of, named, seen)
 
 
 def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
     scene = scene_of(of)
-    stage.draw(scene)
-    request.require_lit(of.file, stage.buffers())
+    request.draw_lit(stage, scene, of.file)
     return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 
-def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> TechniquePair:
+def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> NamedTechnique:
     """Return the technique of a `kind`, without light scattered once by itself.
 
     It is the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
@@ -129,15 +126,15 @@ def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Technique
         assert laws is not None
         plates = [plate_of(medium, light) for medium in of.media]
         lengths = of.mfp if of.kind == "stack" else (NO_LENGTH,) * 3
-        return alone(of.kind, passes.of_stack(laws, of.thickness.least, of.thickness.most, plates), lengths)
+        return NamedTechnique(of.kind, passes.of_stack(laws, of.thickness.least, of.thickness.most, plates), lengths)
     if of.kind == "dipole":
         dipole = catalogue.load("dipole", setting=Setting(n=n))
         alpha = rgb(medium.layers[0].alpha for medium in of.media)
-        return alone("dipole of the first layer", passes.of_half_space(dipole), of.mfp, alpha)
+        return NamedTechnique("dipole of the first layer", passes.of_half_space(dipole), of.mfp, alpha)
     near = [one_half_space(medium, light) for medium in of.media]
     hazard = catalogue.load("hazard", setting=Setting(light, n=n))
     lengths, albedos = rgb(one.mfp for one in near), rgb(one.alpha for one in near)
-    return alone(of.kind, passes.of_half_space(hazard), lengths, albedos)
+    return NamedTechnique(of.kind, passes.of_half_space(hazard), lengths, albedos)
 
 
 def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:

@@ -16,11 +16,11 @@ from mcml_sim import Medium, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
+from profilefit.recipes.stack.fit import NODES
 from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
 # By ln d: ln(R_d l^2 / A) + kappa x, ln(cdf / x) and A; and kappa.
 Channel = tuple[RectBivariateSpline, RectBivariateSpline, CubicSpline, float]
-NODES = exact.Nodes(12, 16, 16, 10)
 THICKNESSES, WIDEST = 9, 0.5  # of the table, even in ln d: so many at least, and so far apart at most
 LEAST = 1e-3  # mean free paths that stand for no first layer
 # Mean free paths: exact light of a thinner layer has no digits within a few times its thickness. R_d / A of this one
@@ -47,17 +47,17 @@ class StackTable:
 
     def curves(self, values: ArrayLike, /) -> Curves:
         """Return the curves, as `CurveTable.curves`."""
-        given, y = np.asarray(values, float), knots()
+        given = np.asarray(values, float)
         u = np.log(np.maximum(self.least + (self.most - self.least) * given, np.exp(self.u[0])))
-        size = (given.size, y.size - 1, 4)
+        size = (given.size, knots().size - 1, 4)
         reflectance, kappa = np.empty(given.size), np.empty(given.size)
         profile, cdf = np.empty(size), np.empty(size)
         for channel in range(len(CHANNELS)):
             own = slice(channel, None, len(CHANNELS))
             reflectance[own] = self.reflectance[channel](u[own])
             kappa[own] = self.kappa[channel]
-            profile[own] = hermite(self.profile[channel], u[own], y)
-            cdf[own] = hermite(self.cdf[channel], u[own], y)
+            profile[own] = hermite(self.profile[channel], u[own])
+            cdf[own] = hermite(self.cdf[channel], u[own])
         return Curves(np.zeros(given.size), reflectance, kappa, profile, cdf)
 
 

@@ -14,9 +14,8 @@ import moderngl
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
-from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
+from mcml_sim.media.checks import checked_whole, require
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
@@ -75,8 +74,7 @@ def focus(waves: Waves, depth: float, n: float = 1.34, tilt: float = 0.0) -> flo
 
 def splat_for(f: float) -> Splat:
     """Return the cheapest splat that is right: faces before the first fold, F < 1, cells from there on."""
-    if not f >= 0:
-        raise InputError(f"F must be a number >= 0, got {f!r}")
+    require(f >= 0, "F", "a number >= 0", f)
     return Splat.FACES if f < FOLDS else Splat.CELLS
 
 
@@ -114,8 +112,7 @@ class Caustics:
         require_below(waves, bed)
         self._pixel = waves.tile / self.pixels
         # Light is drawn as many whole pixels aside as a calm sea bends it: margins need hold the waves' share alone.
-        drift = (deep * float(refracted(angle, (np.zeros(1), np.zeros(1)), index)[0][0])) / self._pixel
-        self.drift = round(drift)
+        self.drift = round(deep * calm_ray(angle, index)[0] / self._pixel)
         self._hits, self._splats, self.map = (f"{name} {what}" for what in ("hits", "splats", "map"))
         text = "".join(_text(file) for file in ("waves.glsl", "refract.glsl", "hits.glsl", "hits.frag"))
         given = {
@@ -144,8 +141,7 @@ class Caustics:
 
     def passes(self, splat: Splat) -> tuple[Pass, Pass, Pass]:
         """Return the passes that fill `map`: hits, deposits by a splat, and their fold into the tile."""
-        if not isinstance(splat, Splat):
-            raise InputError(f"splat must be one of {', '.join(map(str, Splat))}, got {splat!r}")
+        require(isinstance(splat, Splat), "splat", f"one of {', '.join(map(str, Splat))}", splat)
         fragment, vertex, shape, count = SHADERS[splat]
         given: dict[str, object] = {
             "pixel": self._pixel,

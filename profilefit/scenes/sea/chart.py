@@ -92,7 +92,7 @@ def by_prisms(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
     return float(np.sum(_scattered(view, own, phase) * gathered))
 
 
-def by_slices(bundle: Bundle, view: ViewRay, phase: Phase, count: int, pixels: int = PIXELS) -> float:
+def by_slices(bundle: Bundle, view: ViewRay, phase: Phase, count: int) -> float:
     """Return that radiance by `count` caustic maps, each in the middle of a piece of the ray; one if it is horizontal.
 
     The piece is laid onto the map along the sun: what is seen there is the mean over its pixels, times the integral of
@@ -100,13 +100,13 @@ def by_slices(bundle: Bundle, view: ViewRay, phase: Phase, count: int, pixels: i
     """
     number = checked_whole("count", count, lowest=1, highest=10**6)
     v_x, _, v_z = view.direction
-    step, pixel = view.length / number, bundle.period / pixels
+    step, pixel = view.length / number, bundle.period / PIXELS
     gathered = 0.0
     for t in step * (np.arange(number) + 0.5):
         depth = view.z + v_z * t
         middle, half = view.x + v_x * t, 0.5 * step * abs(v_x - v_z * bundle.tilt)
         half = max(half, 0.5 * pixel)  # no piece sees less than a pixel
-        flux, slopes = np.diff(flux_below(bundle, float(depth), np.array([middle - half, middle + half]), pixels))[:, 0]
+        flux, slopes = np.diff(flux_below(bundle, float(depth), np.array([middle - half, middle + half])))[:, 0]
         q = np.array(slopes / flux if flux > 0 else bundle.tilt)
         slant = float(np.sqrt(1.0 + q * q))
         ends = ((view.z + v_z * at) * slant + at for at in (t - 0.5 * step, t + 0.5 * step))
@@ -115,21 +115,21 @@ def by_slices(bundle: Bundle, view: ViewRay, phase: Phase, count: int, pixels: i
     return gathered
 
 
-def flux_below(bundle: Bundle, depth: float, x: Floats, pixels: int = PIXELS) -> Floats:
+def flux_below(bundle: Bundle, depth: float, x: Floats) -> Floats:
     """Return (2, n) flux from 0 to x (n,) at a depth [length], as a caustic map's running sum has it, and flux times q.
 
     Over a period it is a period.
     """
-    rays = pixels * RAYS_A_PIXEL
+    rays = PIXELS * RAYS_A_PIXEL
     start = bundle.period * (np.arange(rays) + 0.5) / rays
     q = bundle.slope(start)
     landed = np.mod(start + depth * q, bundle.period) / bundle.period
-    pixel = np.minimum((landed * pixels).astype(int), pixels - 1)
+    pixel = np.minimum((landed * PIXELS).astype(int), PIXELS - 1)
     turns, rest = np.divmod(np.asarray(x, float) / bundle.period, 1.0)
     found = []
     for weights in (np.ones(rays), q):
-        sums = np.concatenate([[0.0], np.cumsum(np.bincount(pixel, weights, pixels))]) / rays
-        found.append(bundle.period * (turns * sums[-1] + np.interp(rest * pixels, np.arange(pixels + 1), sums)))
+        sums = np.concatenate([[0.0], np.cumsum(np.bincount(pixel, weights, PIXELS))]) / rays
+        found.append(bundle.period * (turns * sums[-1] + np.interp(rest * PIXELS, np.arange(PIXELS + 1), sums)))
     return np.array(found)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ellipe
 
 from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.checks import require
 from profilefit.scenes.sea.law import Lobes, beam_share, water_mtf
 
 BROADENED, SCALED, SINGLE = KINDS = ("broadened", "scaled", "single")
@@ -36,8 +36,7 @@ def ways(omega: ArrayLike, ct: ArrayLike, cw: ArrayLike, lobes: Lobes, kind: str
     omega, ct, cw  albedo, length and half-width of the shaft [-], which broadcast;  lobes  as of `law.beam_share`
     kind           one of `KINDS`; the last two leave the same of all three
     """
-    if kind not in KINDS:
-        raise InputError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
+    require(kind in KINDS, "kind", f"one of {', '.join(KINDS)}", kind)
     some, far, wide = np.broadcast_arrays(*(np.asarray(one, float) for one in (omega, ct, cw)))
     if kind == BROADENED:
         with np.errstate(divide="ignore"):

@@ -37,18 +37,10 @@ class SeaPasses:
     light  passes of the floor's map and its levels of detail, and of the maps in depths, by their names
     """
 
-    def __init__(
-        self,
-        renderer: Renderer,
-        world: World,
-        splats: tuple[Splat, Splat],
-        vertices: int = 256,
-        texels: int = 256,
-        slices: int = 12,
-    ) -> None:
+    def __init__(self, renderer: Renderer, world: World, splat: Splat, vertices: int, texels: int, slices: int) -> None:
         """Draw hits once, and lay out the maps.
 
-        splats  of the floor's map, and of each depth's;  slices  maps in depths
+        splat  of all maps;  slices  maps in depths
         vertices, texels  rays, and texels of a map, along a side of the tile
         """
         self.renderer, self.world, self.reach = renderer, world, reach_of(world)
@@ -61,7 +53,7 @@ class SeaPasses:
         self._step = (self._deepest - self._top) / (count - 1)
         depths = self._top + self._step * np.arange(count) + 1e-6 * self._deepest
         renderer.declare(SHAFTS, (texels, texels * count), 1)
-        *before, fold = self._floor.passes(splats[0])
+        *before, fold = self._floor.passes(splat)
         self.light: dict[str, list[Pass]] = {
             "caustics on the floor": [*before, replace(fold, mipmaps=True)],
             "caustics in depths": [],
@@ -71,7 +63,7 @@ class SeaPasses:
             one = Caustics(renderer, world.sea, vertices, texels, depth, world.tilt, world.n, name=name)
             rows, text = (below, below + texels), text_beside(__name__, "glsl/stack.frag")
             stack = Pass("stack", {"light_map": one.map}, SHAFTS, text, {"below": below}, rows=rows)
-            self.light["caustics in depths"] += [*one.passes(splats[1]), stack]
+            self.light["caustics in depths"] += [*one.passes(splat), stack]
         self._lobes = _four(np.array(world.lobes)[None])
         self._tables: dict[str, tuple[Singles, Singles, Singles]] = {}
 

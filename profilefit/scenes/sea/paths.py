@@ -7,8 +7,9 @@ of its closed forms. Lengths in metres, z up.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -162,14 +163,21 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
 def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
     """Return what is scattered in the water: sunlight that turns into the path, and where it goes on backward."""
     flux, beam = light.at(*place.T)
-    turned, sunward = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0), -beam
+    turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
     seen = (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam)
     new = _turned(world.phase, way, rng)
-    sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
-    new[sunny] = _turned(light.around, sunward[sunny], rng)
-    straight, aside = _density(world.phase, way, new), _density(light.around, sunward, new)
-    factor = straight / ((1.0 - SUNWARD) * straight + SUNWARD * aside)
+    factor = _sunward(light, beam, new, partial(_density, world.phase, way), rng)
     return Event(seen, np.ones((1, 3)), factor, place, new)
+
+
+def _sunward(
+    light: Sunlight, beam: Floats, new: Floats, density: Callable[[Floats], Floats], rng: np.random.Generator
+) -> Floats:
+    """Turn a share of new ways around the way to the sun, in place; return `Event.turned`, by the others' density."""
+    sunny = np.flatnonzero(rng.random(len(new)) < SUNWARD)
+    new[sunny] = _turned(light.around, -beam[sunny], rng)
+    straight = density(new)
+    return straight / ((1.0 - SUNWARD) * straight + SUNWARD * _density(light.around, -beam, new))
 
 
 def _come(world: World, place: Floats, beam: Floats) -> Floats:
@@ -185,10 +193,7 @@ def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: n
     seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
     below = 1.0 - np.sqrt(rng.random(len(way)))
     new = np.column_stack(turn(normal.T, below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
-    sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
-    new[sunny] = _turned(light.around, -beam[sunny], rng)
-    lambert = np.maximum(np.sum(new * normal, axis=1), 0.0) / np.pi
-    factor = lambert / ((1.0 - SUNWARD) * lambert + SUNWARD * _density(light.around, -beam, new))
+    factor = _sunward(light, beam, new, lambda ways: np.maximum(np.sum(ways * normal, axis=1), 0.0) / np.pi, rng)
     lifted = place.copy()
     lifted[:, 2] = world.floor.height(*place[:, :2].T) + ABOVE
     return Event(seen, np.array([world.reflectance]), factor, lifted, new)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import moderngl
@@ -196,12 +196,12 @@ class SeaRequest(request.ViewRequest):
         return World(water.a, water.b, water.lobes, water.n, waves, bed, floor.reflectance, tilt, sun, sky)
 
     @property
-    def splats(self) -> tuple[Splat, Splat]:
-        """Splats of the floor's map, and of those in depths."""
+    def splat(self) -> Splat:
+        """Splat of all maps of light."""
         if self.technique.splat != AUTO:
-            return (SPLATS[self.technique.splat],) * 2
+            return SPLATS[self.technique.splat]
         world = self.world
-        return (splat_for(focus(world.sea, world.depth, world.n, world.tilt)),) * 2
+        return splat_for(focus(world.sea, world.depth, world.n, world.tilt))
 
     @model_validator(mode="after")
     def _in_water(self) -> Self:
@@ -234,17 +234,13 @@ class SeaRender(NamedTuple):
         views = self.passes.renderer.image(self._view(kind, samples))[..., :3].astype(float)
         return averaged(views, self.request.technique.supersampling)
 
-    def time(self, kind: str, samples: int) -> float:
-        """Return the milliseconds of a view's pass, which was drawn before."""
-        return self.passes.renderer.time(self._view(kind, samples))
-
     def light(self) -> dict[str, float]:
         """Draw all maps of light, and return the milliseconds of the floor's, and of those in depths."""
         return {name: self.passes.renderer.time(*own) for name, own in self.passes.light.items()}
 
     def points(self, kind: str, numbers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of samples; time is of the view's pass."""
-        draw, time = (lambda count: self.picture(kind, count)), (lambda count: self.time(kind, count))
+        draw, time = partial(self.picture, kind), lambda count: self.passes.renderer.time(self._view(kind, count))
         return self.judge.points(kind, numbers, draw, time, turns)
 
     def _view(self, kind: str, samples: int) -> Pass:
@@ -257,7 +253,7 @@ def reference_render(context: moderngl.Context, of: SeaRequest, paths: int = PAT
     """Open the passes and the reference image of a request; paths  of the reference, all pixels together."""
     world, named = of.world, of.technique
     with Renderer(context, of.size) as renderer:
-        passes = SeaPasses(renderer, world, of.splats, named.vertices, named.texels, named.slices)
+        passes = SeaPasses(renderer, world, of.splat, named.vertices, named.texels, named.slices)
         drawn = SeaRender(of, passes, Judge.of_halves(halves_of(of, world, paths), WHITE))
         drawn.light()
         yield drawn

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
+from mcml_sim.media.checks import checked_whole, is_number, require
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
-from profilefit.scenes.stage.buffers import require
+from profilefit.scenes.stage.buffers import finite
 
 Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
 PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
@@ -52,8 +52,7 @@ def caustic_irradiance(
     The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
     Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
     """
-    where = checked_numbers("x", x, "finite numbers [m]")
-    require("x", where, np.isfinite(where), "finite numbers [m]")
+    where = finite("x", x, "finite numbers [m]")
     rays = Rays(surface, where, depth, tilt, n, slope, curvature, spacing)
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)
@@ -84,8 +83,8 @@ class Rays:
         self.depth, self.tilt, self.n = checked_sun(depth, tilt, n)
         self.tilt += aside
         self._surface = surface
-        if spacing is not None and not (is_number(spacing) and 0.0 < spacing < np.inf):
-            raise InputError(f"spacing must be a length > 0 [m], got {shown(spacing)}")
+        is_length = spacing is None or (is_number(spacing) and 0.0 < spacing < np.inf)
+        require(is_length, "spacing", "a length > 0 [m]", spacing)
         self._step = float(spacing or self.depth / PER_DEPTH)
         self._slope, self._curvature = slope, curvature
         low, high = (float(x.min()), float(x.max())) if x.size else (0.0, 0.0)
@@ -96,10 +95,8 @@ class Rays:
                 raise InputError(f"x must span fewer than {MOST_SAMPLES} samples of spacing, got {count}")
             nodes = np.linspace(low - reach, high + reach, count)
             landing, stretch, _ = self.at(nodes)
-            if not np.all(np.isfinite(stretch)):
-                raise InputError(
-                    f"n must be one at which light enters everywhere, none is all reflected, got {self.n:g}"
-                )
+            enters = np.all(np.isfinite(stretch))
+            require(enters, "n", "one at which light enters everywhere, none is all reflected", self.n)
             shadow = float(np.ptp(self._height(nodes)) * np.tan(self.tilt))  # of the highest crest
             farthest = float(np.max(np.abs(landing - nodes))) + abs(shadow) + 8.0 * self._step
             if farthest <= reach:
@@ -263,8 +260,7 @@ def caustic_photons(waves: Waves, depth: float, tilt: float, n: float, pixels: i
     """
     columns = checked_whole("pixels", pixels, 1, 8192)
     fine = checked_whole("side", side, columns, 16384)
-    if fine % columns:
-        raise InputError(f"side must be a multiple of pixels = {columns}, got {fine}")
+    require(fine % columns == 0, "side", f"a multiple of pixels = {columns}", fine)
     step, rows = waves.tile / fine, max(1, 2**21 // fine)
     found = np.zeros(columns * columns)
     x = np.asarray((np.arange(-1, fine + 1) + 0.5) * step, np.float64)

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, shown
+from mcml_sim.media.checks import checked_numbers, require
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.errors import InputError
-from profilefit.scenes.sea.waves import Waves, checked_sun, refracted, require_below
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.world import Rgb
 
 ROUNDING = 1e-6  # by which weights may miss a sum of 1
@@ -44,11 +43,9 @@ class World:
     sky: Rgb
 
     def __post_init__(self) -> None:
-        if not np.all(self.c > 0):
-            raise InputError(f"a + b must be > 0, got {shown(self.c.tolist())}")
+        require(np.all(self.c > 0), "a + b", "> 0", self.c.tolist())
         checked_sun(self.depth, self.tilt, self.n)
-        if not self.n > 1:
-            raise InputError(f"n must be a refractive index > 1, got {shown(self.n)}")
+        require(self.n > 1, "n", "a refractive index > 1", self.n)
         require_below(self.sea, self.floor)
 
     @property
@@ -76,8 +73,7 @@ class World:
     @cached_property
     def calm(self) -> tuple[float, float]:
         """Tangent of the ray below a calm surface to the vertical, and its flux over that across the sun's rays [-]."""
-        x, _, flux = refracted(self.tilt, (np.zeros(1), np.zeros(1)), self.n)
-        return float(x[0]), float(flux[0])
+        return calm_ray(self.tilt, self.n)
 
     @property
     def beam(self) -> Floats:
@@ -109,8 +105,7 @@ def checked_lobes(lobes: ArrayLike) -> None:
     """Raise InputError where lobes are no mixture of Henyey and Greenstein's terms."""
     accepted = "a list of pairs [weight, g], weights >= 0 that sum to 1, g in (-1, 1)"
     terms = checked_numbers("lobes", lobes, accepted)
-    good = terms.ndim == 2 and terms.shape[1] == 2 and len(terms) > 0
-    if not good or not (
-        np.all(terms[:, 0] >= 0) and np.all(np.abs(terms[:, 1]) < 1) and abs(np.sum(terms[:, 0]) - 1) < ROUNDING
-    ):
-        raise InputError(f"lobes must be {accepted}, got {shown(lobes)}")
+    require(terms.ndim == 2 and terms.shape[1] == 2, "lobes", accepted, lobes)
+    weights, g = terms.T
+    good = np.all(weights >= 0) and np.all(np.abs(g) < 1) and abs(np.sum(weights) - 1) < ROUNDING
+    require(good, "lobes", accepted, lobes)

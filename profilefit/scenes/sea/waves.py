@@ -10,19 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
+from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require, require_index
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS
-from profilefit.scenes.stage.buffers import require
+from profilefit.scenes.stage.buffers import finite
 
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
+OF_SEA, SEA_WAVES = 6, 24  # most waves along a side of the tile, and those that are kept
+OF_FLOOR, FLOOR_WAVES = 4, 6
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for
 WHOLE = 1e-6  # a wave vector may be so far from the tile's lattice, in its steps
 STILL = np.zeros(0)
@@ -58,12 +61,9 @@ class Waves:
 
     def __post_init__(self) -> None:
         tile = _length("tile", self.tile)
-        if not is_number(self.mean) or not np.isfinite(self.mean):
-            raise InputError(f"mean must be a level [m], got {shown(self.mean)}")
+        require(is_number(self.mean) and np.isfinite(self.mean), "mean", "a level [m]", self.mean)
         for name in ("amplitudes", "vectors", "phases"):
-            array = checked_numbers(name, getattr(self, name), "finite numbers")
-            require(name, array, np.isfinite(array), "finite numbers")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, finite(name, getattr(self, name), "finite numbers"))
         count = self.amplitudes.size
         for name, accepted in (("amplitudes", (count,)), ("vectors", (count, 2)), ("phases", (count,))):
             if getattr(self, name).shape != accepted:
@@ -145,18 +145,8 @@ class Waves:
         return found
 
 
-def random_sea(
-    rms_slope: float,
-    tile: float,
-    seed: int = 0,
-    count: int = 24,
-    harmonics: int = 6,
-    wind: tuple[float, float] = (WIND, 0.0),
-) -> Waves:
-    """Return a wind sea of a given root mean square slope [-] over a tile [m].
-
-    count      of waves that are kept, those of the largest slope;  harmonics  most waves along a side of the tile
-    wind       [m/s] along x and y
+def random_sea(rms_slope: float, tile: float, seed: int = 0, wind: tuple[float, float] = (WIND, 0.0)) -> Waves:
+    """Return a wind sea of a given root mean square slope [-] over a tile [m]; wind  [m/s] along x and y.
 
     Heights are complex normal deviates times the root of Phillips's spectrum, e^{-1 / (k L)^2} / k^4 (k.w / k w)^2 with
     L = w^2 / g (Tessendorf, Simulating Ocean Water, SIGGRAPH course, 2001), on the lattice of the tile. It has no scale
@@ -164,31 +154,27 @@ def random_sea(
     """
     blow = checked_numbers("wind", wind, "two speeds [m/s]")
     speed = float(np.hypot(*blow)) if blow.shape == (2,) else 0.0
-    if not 0.0 < speed < np.inf:
-        raise InputError(f"wind must be two speeds [m/s], not both 0, got {shown(wind)}")
-    vectors = _lattice(_length("tile", tile), checked_whole("harmonics", harmonics, 1, 64))
+    require(0.0 < speed < np.inf, "wind", "two speeds [m/s], not both 0", wind)
+    vectors = _lattice(_length("tile", tile), OF_SEA)
     k = np.linalg.norm(vectors, axis=1)
     along = vectors @ blow / (k * speed)
     with np.errstate(divide="ignore", over="ignore"):
         root = np.exp(-0.5 / (k * speed**2 / GRAVITY) ** 2) / k**2 * np.abs(along)
-    if not np.any(root > 1e-100):  # whose squares are floats
-        raise InputError(f"wind must be strong enough for waves on a tile of {tile:g} m, got {shown(wind)}")
-    return _drawn(root, vectors, rms_slope, tile, seed, count)
+    is_strong = np.any(root > 1e-100)  # whose squares are floats
+    require(is_strong, "wind", f"strong enough for waves on a tile of {tile:g} m", wind)
+    return _drawn(root, vectors, rms_slope, tile, seed)
 
 
-def random_floor(
-    rms_slope: float, tile: float, depth: float, seed: int = 0, count: int = 6, harmonics: int = 4
-) -> Waves:
+def random_floor(rms_slope: float, tile: float, depth: float, seed: int = 0) -> Waves:
     """Return an uneven floor of waves of all directions alike, around a mean depth [m]; the others as of `random_sea`.
 
     Each of the waves, drawn from the lattice of the tile, has about as much slope: heights fall as 1 / k.
     """
-    vectors = _lattice(_length("tile", tile), checked_whole("harmonics", harmonics, 1, 64))
-    rng = np.random.default_rng(seed)
-    chosen = rng.permutation(len(vectors))[: checked_whole("count", count, 1)]
+    vectors = _lattice(_length("tile", tile), OF_FLOOR)
+    chosen = np.random.default_rng(seed).permutation(len(vectors))[:FLOOR_WAVES]
     vectors = vectors[chosen]
     root = 1.0 / np.linalg.norm(vectors, axis=1)
-    return replace(_drawn(root, vectors, rms_slope, tile, seed, count), mean=-_length("depth", depth))
+    return replace(_drawn(root, vectors, rms_slope, tile, seed), mean=-_length("depth", depth))
 
 
 def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floats, Floats, Floats]:
@@ -211,14 +197,17 @@ def refracted(tilt: float, slope: tuple[Floats, Floats], n: float) -> tuple[Floa
     return (np.sin(tilt) / n - along * zx) / down, -along * zy / down, (1.0 - reflected) * np.maximum(across, 0.0)
 
 
-def checked_sun(depth: object, tilt: object, n: object) -> tuple[float, float, float]:
+def calm_ray(tilt: float, n: float) -> tuple[float, float]:
+    """Return the tangent to the vertical of sunlight below a calm surface, and its flux, as of `refracted` [-]."""
+    x, _, flux = refracted(tilt, (np.zeros(1), np.zeros(1)), n)
+    return float(x[0]), float(flux[0])
+
+
+def checked_sun(depth: float, tilt: float, n: float) -> tuple[float, float, float]:
     """Return the depth of a floor [m], tilt of the sun [rad] and the water's index over the air's [-]. InputError."""
-    if not is_number(depth) or not 0.0 < depth < np.inf:
-        raise InputError(f"depth must be a length > 0 [m], got {shown(depth)}")
-    if not is_number(tilt) or not 0.0 <= tilt < 0.5 * np.pi:
-        raise InputError(f"tilt must be in [0, pi / 2), in radians, got {shown(tilt)}")
-    if not is_number(n) or not 0.0 < n < np.inf:
-        raise InputError(f"n must be a refractive index > 0, got {shown(n)}")
+    require(is_number(depth) and 0.0 < depth < np.inf, "depth", "a length > 0 [m]", depth)
+    require(is_number(tilt) and 0.0 <= tilt < 0.5 * np.pi, "tilt", "in [0, pi / 2), in radians", tilt)
+    require_index("n", n)
     return float(depth), float(tilt), float(n)
 
 
@@ -238,22 +227,20 @@ def _lattice(tile: float, harmonics: int) -> Floats:
     return np.column_stack([x, y])[half] * 2.0 * np.pi / tile
 
 
-def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: int, count: int) -> Waves:
-    """Return complex normal deviates times these roots of variances, and of those so many of the largest slope."""
-    if not is_number(rms_slope) or not 0.0 <= rms_slope < np.inf:
-        raise InputError(f"rms_slope must be a number >= 0, got {shown(rms_slope)}")
+def _drawn(root: Floats, vectors: Floats, rms_slope: float, tile: float, seed: int) -> Waves:
+    """Return complex normal deviates times these roots of variances, and of those `SEA_WAVES` of the largest slope."""
+    require(is_number(rms_slope) and 0.0 <= rms_slope < np.inf, "rms_slope", "a number >= 0", rms_slope)
     rng = np.random.default_rng(seed)
     real, imaginary = rng.standard_normal((2, root.size)) * root
     amplitudes, phases = np.hypot(real, imaginary), np.arctan2(imaginary, real)
-    order = np.argsort(-amplitudes * np.linalg.norm(vectors, axis=1))[: checked_whole("count", count, 1)]
+    order = np.argsort(-amplitudes * np.linalg.norm(vectors, axis=1))[:SEA_WAVES]
     found = Waves(tile, amplitudes[order], vectors[order], phases[order])
     return found.scaled(rms_slope / found.rms_slope)
 
 
-def _length(name: str, value: object) -> float:
+def _length(name: str, value: float) -> float:
     least, most = LENGTHS
-    if not is_number(value) or not least <= value <= most:
-        raise InputError(f"{name} must be a length in {least:g} ... {most:g} m, got {shown(value)}")
+    require(is_number(value) and least <= value <= most, name, f"a length in {least:g} ... {most:g} m", value)
     return float(value)
 
 
@@ -280,22 +267,22 @@ def first_hit(
     Of two crossings within one step the first is found if the rates at its ends show the dip between. A level ray
     counts as one that never hits. InputError, too, for an origin below the floor.
     """
-    where, along = (one.astype(precision) for one in _rays(origin, direction))
+    rays = _Rays(height, *(one.astype(precision) for one in _checked_rays(origin, direction)))
     low, high = _bounds(lowest, highest)
     number = checked_whole("steps", steps, 1, MOST_STEPS)
     last = checked_whole("newton", newton, 0, MOST_STEPS)
-    below = -_gap(height, where, along, np.zeros_like(where[..., 2]))
-    if np.any(below > _slack(where) * (1.0 + np.abs(where[..., 2]))):
+    z = rays.origin[..., 2]
+    below = -rays.gap(np.zeros_like(z))
+    if np.any(below > rays.slack * (1.0 + np.abs(z))):
         raise InputError(f"origin must not be below the floor, got one that is {np.nanmax(below):g} m below it")
 
     def rate(k: Floats) -> Floats:
         if slope is not None:
-            return _rate(slope, where, along, k)
-        return (_gap(height, where, along, k + short) - _gap(height, where, along, k)) / short
+            return rays.rate(slope, k)
+        return (rays.gap(k + short) - rays.gap(k)) / short
 
     short = SHORT * ((high - low) or 1.0)
-    near, far = _bracket(height, where, along, low, high, number, rate)
-    found = _safeguarded(height, rate, where, along, near, far, last)
+    found = _safeguarded(rays, rate, *_bracket(rays, low, high, number, rate), last)
     return float(found) if found.ndim == 0 else found
 
 
@@ -303,18 +290,18 @@ def dense_hit(
     height: Height, origin: ArrayLike, direction: ArrayLike, lowest: float, highest: float, steps: int = DENSE
 ) -> Floats:
     """Return the reference of `first_hit`: thousands of steps, and bisection to the last digit."""
-    where, along = _rays(origin, direction)
-    near, far = _bracket(height, where, along, *_bounds(lowest, highest), checked_whole("steps", steps, 1))
+    rays = _Rays(height, *_checked_rays(origin, direction))
+    near, far = _bracket(rays, *_bounds(lowest, highest), checked_whole("steps", steps, 1))
     for _ in range(BISECTIONS):
         middle = 0.5 * (near + far)
-        above = _gap(height, where, along, middle) >= 0
+        above = rays.gap(middle) >= 0
         near, far = np.where(above, middle, near), np.where(above, far, middle)
     return np.asarray(0.5 * (near + far))
 
 
 def to_plane(origin: ArrayLike, direction: ArrayLike, level: float) -> Floats:
     """Return the distance along a ray to the plane z = level [m]; nan where the ray is level or goes away from it."""
-    where, along = _rays(origin, direction)
+    where, along = _checked_rays(origin, direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (level - where[..., 2]) / along[..., 2]
     return np.where((found >= 0) & np.isfinite(found), found, np.nan)
@@ -327,10 +314,10 @@ def newton_hit(
 
     Without a slope it is the iteration of Shah et al., as if the floor were level, which may diverge, too.
     """
-    where, along = _rays(origin, direction)
-    k = np.asarray(start, float) + np.zeros(where.shape[:-1])
+    rays = _Rays(height, *_checked_rays(origin, direction))
+    k = np.asarray(start, float) + np.zeros(rays.origin.shape[:-1])
     for _ in range(checked_whole("count", count, 0)):
-        k = k - _gap(height, where, along, k) / (along[..., 2] if slope is None else _rate(slope, where, along, k))
+        k = k - rays.gap(k) / (rays.direction[..., 2] if slope is None else rays.rate(slope, k))
     return k
 
 
@@ -341,14 +328,14 @@ def wrong_shares(ways: Sequence[int | str], steepnesses: Sequence[float], rays: 
     steepnesses  S by the steepest place of the floor and the ray that a calm sea refracts [-]
     """
     for way in ways:
-        if isinstance(way, str) and way not in PLAIN:
-            raise InputError(f"ways must be numbers of steps or of {', '.join(PLAIN)}, got {way!r}")
+        is_known = not isinstance(way, str) or way in PLAIN
+        require(is_known, "ways", f"numbers of steps or of {', '.join(PLAIN)}", way)
     tile = 2.0 * DEPTH
     sea, floor = random_sea(SEA_SLOPE, tile, 0), random_floor(1.0, tile, DEPTH, 1)
     place = np.random.default_rng(0).uniform(0.0, tile, (rays, 2))
     x, y, _ = refracted(TILT, sea.slope(*place.T), INDEX)
     direction = np.column_stack([x, y, -np.ones(rays)]) / np.sqrt(1.0 + x * x + y * y)[:, None]
-    calm = float(refracted(TILT, (np.zeros(1), np.zeros(1)), INDEX)[0][0])
+    calm, _ = calm_ray(TILT, INDEX)
     found = np.zeros((len(ways), len(steepnesses)))
     for column, steep in enumerate(steepnesses):
         under = floor.scaled(steep / (floor.steepest * calm))
@@ -367,37 +354,55 @@ def wrong_shares(ways: Sequence[int | str], steepnesses: Sequence[float], rays: 
     return found
 
 
+class _Rays(NamedTuple):
+    """Rays above a surface: origins [m] and unit directions, arrays of one shape (..., 3)."""
+
+    height: Height
+    origin: Floats
+    direction: Floats
+
+    @property
+    def slack(self) -> float:
+        """Relative tolerance of lengths in their precision [-]."""
+        return max(SLACK, 4.0 * float(np.finfo(self.origin.dtype).eps))
+
+    def gap(self, k: Floats) -> Floats:
+        """Return the height of a ray above the surface after a distance [m]."""
+        x, y, z = (self.origin[..., axis] + k * self.direction[..., axis] for axis in range(3))
+        return np.asarray(z - np.asarray(self.height(x, y), k.dtype))
+
+    def rate(self, slope: Slope, k: Floats) -> Floats:
+        """Return the change of `gap` with the distance [-]."""
+        zx, zy = slope(*(self.origin[..., axis] + k * self.direction[..., axis] for axis in range(2)))
+        zx, zy = np.asarray(zx, k.dtype), np.asarray(zy, k.dtype)
+        return np.asarray(self.direction[..., 2] - zx * self.direction[..., 0] - zy * self.direction[..., 1])
+
+
 def _bracket(
-    height: Height,
-    origin: Floats,
-    direction: Floats,
-    lowest: float,
-    highest: float,
-    steps: int,
-    rate: Callable[[Floats], Floats] | None = None,
+    rays: _Rays, lowest: float, highest: float, steps: int, rate: Callable[[Floats], Floats] | None = None
 ) -> tuple[Floats, Floats]:
     """Return distances between which a ray first comes through the surface; nan where it does not.
 
     rate  of the gap, by its distance: where a step begins falling and ends rising, the lowest place between, that of a
           cubic with both rates, is looked at, too. Without it such a dip is missed
     """
-    z, down = origin[..., 2], direction[..., 2]
+    z, down, slack = rays.origin[..., 2], rays.direction[..., 2], rays.slack
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (np.array([lowest, highest], z.dtype).reshape(2, *[1] * z.ndim) - z) / down
     slanting = down != 0.0
     near = np.where(slanting, np.maximum(ends.min(axis=0), 0.0), np.nan)
     far = np.where(slanting, ends.max(axis=0), np.nan)
-    far = np.where(far >= 0.0, far + _slack(origin) * (far + highest - lowest), np.nan)
+    far = np.where(far >= 0.0, far + slack * (far + highest - lowest), np.nan)
     width = (far - near) / steps
-    before = _gap(height, origin, direction, near)
-    if np.any(before < -_slack(origin) * (1.0 + np.abs(z) + abs(highest))):
+    before = rays.gap(near)
+    if np.any(before < -slack * (1.0 + np.abs(z) + abs(highest))):
         raise InputError(f"highest must be no lower than the floor is, got {highest:g} m")
     before = np.maximum(before, 0.0)
     ends_at = None if rate is None else rate(near)
     first, last = (np.full(z.shape, np.nan) for _ in range(2))
     for number in range(1, steps + 1):
         here = near + number * width
-        gap = _gap(height, origin, direction, here)
+        gap = rays.gap(here)
         end, ahead = here, gap
         if rate is not None and ends_at is not None:
             begins_at, ends_at = ends_at, rate(here)
@@ -408,7 +413,7 @@ def _bracket(
                 share = -left / (linear + np.sqrt(np.maximum(linear * linear - 3.0 * cubic * left, 0.0)))
             dip = here - width + width * np.clip(share, 0.0, 1.0)
             dip = np.where((gap >= 0.0) & (begins_at < 0.0) & (ends_at > 0.0), dip, np.nan)
-            under = _gap(height, origin, direction, dip) < 0.0
+            under = rays.gap(dip) < 0.0
             end, ahead = np.where(under, dip, here), np.where(under, -1.0, gap)
         # At the lower plane every ray that descends has come through, whatever rounding makes of the gap.
         through = (ahead < 0.0) | ((down < 0.0) & (ahead >= 0.0) & (number == steps))
@@ -420,55 +425,28 @@ def _bracket(
     return first, last
 
 
-def _safeguarded(
-    height: Height,
-    rate: Callable[[Floats], Floats],
-    origin: Floats,
-    direction: Floats,
-    near: Floats,
-    far: Floats,
-    iterations: int,
-) -> Floats:
+def _safeguarded(rays: _Rays, rate: Callable[[Floats], Floats], near: Floats, far: Floats, iterations: int) -> Floats:
     """Return Newton's iteration from the chord of a bracket: a step that would leave it is a bisection instead."""
-    above, below = (_gap(height, origin, direction, end) for end in (near, far))
+    above, below = rays.gap(near), rays.gap(far)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(above > np.minimum(below, 0.0), above / (above - np.minimum(below, 0.0)), 0.0)
         k = near + np.clip(share, 0.0, 1.0) * (far - near)
         for _ in range(iterations):
-            gap = _gap(height, origin, direction, k)
+            gap = rays.gap(k)
             near, far = np.where(gap >= 0.0, k, near), np.where(gap >= 0.0, far, k)
             step = np.where(gap == 0.0, k, k - gap / rate(k))
             k = np.where((step >= near) & (step <= far), step, 0.5 * (near + far))
     return np.asarray(k)
 
 
-def _gap(height: Height, origin: Floats, direction: Floats, k: Floats) -> Floats:
-    """Return the height of a ray above the surface after a distance [m]."""
-    x, y, z = (origin[..., axis] + k * direction[..., axis] for axis in range(3))
-    return np.asarray(z - np.asarray(height(x, y), k.dtype))
-
-
-def _slack(lengths: Floats) -> float:
-    """Return the relative tolerance of lengths in their precision [-]."""
-    return max(SLACK, 4.0 * float(np.finfo(lengths.dtype).eps))
-
-
-def _rate(slope: Slope, origin: Floats, direction: Floats, k: Floats) -> Floats:
-    """Return the change of `_gap` with the distance [-]."""
-    zx, zy = slope(*(origin[..., axis] + k * direction[..., axis] for axis in range(2)))
-    zx, zy = np.asarray(zx, k.dtype), np.asarray(zy, k.dtype)
-    return np.asarray(direction[..., 2] - zx * direction[..., 0] - zy * direction[..., 1])
-
-
-def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
+def _checked_rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
     """Return origins and directions as float64 arrays of one shape (..., 3)."""
     found = []
     for name, value in (("origin", origin), ("direction", direction)):
         array = checked_numbers(name, value, "finite numbers (..., 3)")
         if not array.ndim or array.shape[-1] != 3:
             raise InputError(f"{name} must have shape (..., 3), got {array.shape}")
-        require(name, array, np.isfinite(array), "finite")
-        found.append(array)
+        found.append(finite(name, array))
     length = np.linalg.norm(found[1], axis=-1)
     deviation = np.abs(length - 1.0)
     if np.any(deviation > UNIT):
@@ -483,11 +461,10 @@ def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
     return where, along
 
 
-def _bounds(lowest: object, highest: object) -> tuple[float, float]:
+def _bounds(lowest: float, highest: float) -> tuple[float, float]:
     for name, value in (("lowest", lowest), ("highest", highest)):
-        if not is_number(value) or not np.isfinite(value):
-            raise InputError(f"{name} must be a finite level [m], got {shown(value)}")
-    low, high = float(lowest), float(highest)  # type: ignore[arg-type]
+        require(is_number(value) and np.isfinite(value), name, "a finite level [m]", value)
+    low, high = float(lowest), float(highest)
     if low > high:
         raise InputError(f"lowest must not be above highest, got {low:g} and {high:g} m")
     return low, high

@@ -7,6 +7,7 @@ from typing import TypeVar
 import moderngl
 import numpy as np
 
+from mcml_sim.media.checks import require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.stage import Stage
@@ -28,8 +29,7 @@ def covering(context: moderngl.Context, scene: Zoomed, share: float, size: tuple
         share: of the screen, in (0, 1) [-].
         size: columns and rows of the screen, of which only the ratio counts.
     """
-    if not 0 < share < 1:
-        raise InputError(f"share must be in (0, 1), got {share!r}")
+    require(0 < share < 1, "share", "in (0, 1)", share)
     columns = round(ROWS * size[0] / size[1])
     near, far = (factor * scene.camera.height for factor in SPAN)
     with Stage(context, (columns, ROWS), shadow_side=16) as stage:

@@ -1,7 +1,7 @@
 """Laws that draw the head: samples of any profile law, or the separable kernel, stretched to its material.
 
 Sampled are the laws of `profilefit.laws` that have a shader source, as fitted or printed, each by its own source; their
-light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (stage/gather.py).
+light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (`Gather`).
 
 What each tap of the separable filter weighs in each channel: J. Jimenez et al., Separable subsurface scattering,
 Computer Graphics Forum 34, 2015, and the authors' own code (iryoku/separable-sss, SeparableSSS.cpp, calculateKernel;
@@ -23,7 +23,7 @@ from scipy.special import erf
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.checks import require
 from profilefit.scenes.skin.truth import exact_quartile
 from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb
@@ -95,8 +95,8 @@ class Separable:
     setting: Setting = DIFFUSE
 
     def __post_init__(self) -> None:
-        if len(self.strength) != 3 or not all(0 < share <= 1 for share in self.strength):
-            raise InputError(f"strength must be three shares in (0, 1], got {self.strength!r}")
+        are_shares = len(self.strength) == 3 and all(0 < share <= 1 for share in self.strength)
+        require(are_shares, "strength", "three shares in (0, 1]", self.strength)
         require_isotropic(self.setting)
 
     def stretches(self, alpha: Floats, mfp: Floats) -> Floats:
@@ -124,10 +124,7 @@ class Separable:
 
 def kernel_quartile(strength: float) -> float:
     """Return that distance of the kernel, in its unit: its line spread is its slice, 1 - strength stays in place."""
-    if not strength > 0.5:
-        raise InputError(
-            f"strength must be > 0.5: a kernel that blurs less is as wide as no material, got {strength!r}"
-        )
+    require(strength > 0.5, "strength", "> 0.5: a kernel that blurs less is as wide as no material", strength)
     gaussians = separable((0.999, 0.999, 0.999))
     sigma = np.sqrt(gaussians.variances)
     share = np.array([w[0] for w in gaussians.weights]) / sigma

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 
 from mcml_sim import Setting, exact
 from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.checks import require
 from profilefit.materials import BY_NAME
 from profilefit.recipes.declared import Range
 from profilefit.scenes.skin.truth import albedo_of
@@ -66,8 +66,7 @@ class Painted:
 
 def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
     """Return a material of Jensen et al. (2001), table 1; its A is that of the exact half space in a setting."""
-    if name not in BY_NAME:
-        raise InputError(f"material must be one of {', '.join(BY_NAME)}, got {name!r}")
+    require(name in BY_NAME, "material", f"one of {', '.join(BY_NAME)}", name)
     alpha = np.array(BY_NAME[name].alpha)
     return Translucent(name, rgb(alpha), rgb(BY_NAME[name].mfp), rgb(np.asarray(exact.reflectance(alpha, setting))))
 

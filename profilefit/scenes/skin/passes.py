@@ -11,7 +11,7 @@ from mcml_sim.media.arrays import Floats
 from profilefit.scenes.skin.law import FOLLOW, Separable, transmitted
 from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.renderer import Pass
-from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Technique, maps, through_text
+from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Technique, maps
 from profilefit.shader.emit import text_beside
 
 HALFWAY = "halfway_map"
@@ -40,7 +40,7 @@ class SeparableFilter(Technique):
         ]
 
     def through(self) -> LawText:
-        return LawText("separable", through_text(transmitted()))
+        return LawText.of_share("separable", transmitted())
 
     def lengths(self, frame: Frame) -> Floats:
         """Return the stretches of the kernel (3,) [mm]."""

@@ -12,9 +12,10 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.exact.single_scattering import entered
+from mcml_sim.media.checks import require
 from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError, SettingError
+from profilefit.errors import SettingError
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
@@ -35,12 +36,11 @@ from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, t
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.gather import technique
 from profilefit.scenes.stage.judge import surface_judge
 from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import Lambert, Technique, alone
+from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene
 
 
@@ -67,8 +67,7 @@ def head_scene(
     detail  of the meshes, a whole number >= 1;  columns  of the skin's texture
     setting  in which the material has its A: by default n = 1, as in published comparisons; skin has n = 1.4
     """
-    if detail < 1:
-        raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
+    require(detail >= 1, "detail", "a whole number >= 1", detail)
     what = material.middle(setting) if isinstance(material, Painted) else translucent(material, setting)
     most = float(entered(setting))  # a colour that the surface lets out
     face = np.minimum(skin(what.reflectance, columns), np.float32(most))
@@ -199,8 +198,7 @@ def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
     scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
-    pair = alone(of.label, of.method, scene.material.mfp)
+    named = NamedTechnique(of.label, of.method, scene.material.mfp)
     with Stage(context, of.size) as stage:
-        stage.draw(scene)
-        request.require_lit(of.file, stage.buffers())
-        return request.rendered(stage, surface_judge(stage, scene, pair.mfp, of.setting), of, pair)
+        request.draw_lit(stage, scene, of.file)
+        return request.rendered(stage, surface_judge(stage, scene, named.mfp, of.setting), of, named)

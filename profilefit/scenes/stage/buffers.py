@@ -6,14 +6,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import checked_range
 from profilefit.errors import InputError
 
 Singles = NDArray[np.float32]
 VECTORS = ("irradiance", "reflectance", "position", "normal")
 NUMBERS = ("mask", "thickness", "visibility", "roughness")
 INSIDE = 0.5  # the shaders' threshold of the mask: light scatters inside where it is beyond
+LARGEST = float(np.finfo(float).max)
 ROUNDING = 1e-6  # a float32 that came from a texture's filter may end so far beyond 1
 SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
 PLACE = "place_map"  # u, v, and 1 where a surface is
@@ -54,11 +57,10 @@ class Buffers:
             if np.shape(array) != accepted:
                 raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
         mask = np.asarray(self.mask)
-        require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
+        finite("mask", mask)  # NaN would be neither inside nor outside
         inside = mask > INSIDE
         for name, array in given.items():
-            value = np.asarray(array)[inside]
-            require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+            finite(name, np.asarray(array)[inside], f"finite where mask > {INSIDE}")
         albedo = np.asarray(self.reflectance)[inside]
         good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
         require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
@@ -89,6 +91,11 @@ class Buffers:
         one, two, three, four = maps
         vectors = one[..., :3], two[..., :3], three[..., :3], four[..., :3]
         return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
+
+
+def finite(name: str, value: ArrayLike, accepted: str = "finite") -> Floats:
+    """Return numbers as `checked_numbers` does; InputError on the first that is not finite."""
+    return checked_range(name, value, accepted, -LARGEST, LARGEST)
 
 
 def require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], accepted: str) -> None:

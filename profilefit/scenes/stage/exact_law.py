@@ -10,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from mcml_sim import Setting, exact
-from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError, SettingError
+from mcml_sim.media.arrays import Floats, namespace
+from mcml_sim.media.checks import require
+from profilefit.errors import SettingError
 from profilefit.scenes.stage.buffers import Singles
 from profilefit.shader.emit import literal, text_beside
 
@@ -54,8 +55,8 @@ class ExactLaw:
     setting: Setting = DIFFUSE
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.alpha) <= MOST_ALBEDOS or not all(0 < a <= 1 for a in self.alpha):
-            raise InputError(f"alpha must be 1 ... {MOST_ALBEDOS} albedos in (0, 1], got {self.alpha!r}")
+        are_albedos = 1 <= len(self.alpha) <= MOST_ALBEDOS and all(0 < a <= 1 for a in self.alpha)
+        require(are_albedos, "alpha", f"1 ... {MOST_ALBEDOS} albedos in (0, 1]", self.alpha)
         require_isotropic(self.setting)
 
     def text(self, name: str) -> str:
@@ -144,12 +145,12 @@ class Curves:
     def density(self, x: Floats) -> Floats:
         """Return R_d l^2 / A of each albedo at its x = r/l > 0, (m, n); taken at the table's ends beyond them [-]."""
         near = np.clip(x, NEAREST, FARTHEST)
-        return np.exp(_cubic(self.profile, near) - self.kappa[:, None] * near)
+        return np.exp(cubic(self.profile, near) - self.kappa[:, None] * near)
 
     def share(self, x: Floats) -> Floats:
         """Return the cdf of each albedo at its x = r/l >= 0, (m, n) [-]."""
         near = np.clip(x, NEAREST, FARTHEST)
-        return np.minimum(np.exp(_cubic(self.cdf, near)) * np.minimum(x, FARTHEST), 1.0)
+        return np.minimum(np.exp(cubic(self.cdf, near)) * np.minimum(x, FARTHEST), 1.0)
 
 
 class CurveTable(Protocol):
@@ -167,7 +168,6 @@ class CurveTable(Protocol):
 class ExactTable:
     """Splines of one setting: (s, ln x) -> ln(R_d l^2 / A) + kappa x, and ln(cdf / x); A -> s, s -> kappa."""
 
-    y: Floats
     profile: RectBivariateSpline
     cdf: RectBivariateSpline
     root: CubicSpline
@@ -175,17 +175,17 @@ class ExactTable:
     def curves(self, reflectance: ArrayLike) -> Curves:
         """Return curves at reflectances A (m,) in [0, 1]; InputError."""
         values = np.atleast_1d(np.asarray(reflectance, float))
-        if values.ndim != 1 or not np.all((values >= 0) & (values <= 1)):
-            raise InputError(f"reflectance must be a list of numbers in [0, 1], got {reflectance!r}")
+        are_shares = values.ndim == 1 and np.all((values >= 0) & (values <= 1))
+        require(are_shares, "reflectance", "a list of numbers in [0, 1]", reflectance)
         s = np.clip(self.root(values), 0.0, 1.0)
         alpha = 1.0 - s * s
         kappa = np.asarray(exact.decay_rate(alpha))
-        return Curves(alpha, values, kappa, hermite(self.profile, s, self.y), hermite(self.cdf, s, self.y))
+        return Curves(alpha, values, kappa, hermite(self.profile, s), hermite(self.cdf, s))
 
 
-def hermite(spline: RectBivariateSpline, at: Floats, y: Floats) -> Floats:
-    """Return a spline of (s, ln x) at s (m,), as cubics between knots y of ln x (m, intervals, 4), as in `Curves`."""
-    order = np.argsort(at)
+def hermite(spline: RectBivariateSpline, at: Floats) -> Floats:
+    """Return a spline of (s, ln x) at s (m,), as cubics between `knots` (m, intervals, 4), as in `Curves`."""
+    order, y = np.argsort(at), knots()
     value, slope = np.empty((at.size, y.size)), np.empty((at.size, y.size))
     value[order] = spline(at[order], y)
     slope[order] = STEP * spline(at[order], y, dy=1)
@@ -215,7 +215,7 @@ def exact_table(setting: Setting) -> ExactTable:
     within = np.asarray(exact.cdf(x, albedos, setting=setting))
     root = CubicSpline(np.append(0.0, reflectance[-2::-1]), s[::-1])
     rows = log_profile(y, alpha, setting) - np.log(reflectance)[:, None]
-    return ExactTable(y, RectBivariateSpline(s, y, rows), RectBivariateSpline(s, y, np.log(within / x)), root)
+    return ExactTable(RectBivariateSpline(s, y, rows), RectBivariateSpline(s, y, np.log(within / x)), root)
 
 
 def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
@@ -235,10 +235,11 @@ def held(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.minimum(np.arange(bright.shape[1]), last[:, None])
 
 
-def _cubic(coefficients: Floats, x: Floats) -> Floats:
-    """Return the curves (m, intervals, 4) at x (m, n)."""
-    place = (np.log(x) - np.log(NEAREST)) / STEP
-    k = np.minimum(place.astype(int), coefficients.shape[1] - 1)
+def cubic(coefficients: Any, x: Any) -> Any:
+    """Return the curves (m, intervals, 4) at x (m, n), arrays of numpy or of jax."""
+    numpy = namespace(x)
+    place = (numpy.log(x) - np.log(NEAREST)) / STEP
+    k = numpy.minimum(place.astype(int), coefficients.shape[1] - 1)
     t = place - k
-    c = np.take_along_axis(coefficients, k[..., None], axis=1)
+    c = numpy.take_along_axis(coefficients, k[..., None], axis=1)
     return c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * c[..., 3]))

@@ -18,7 +18,7 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, to_srgb
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import exitance_of, own_error
-from profilefit.scenes.stage.technique import TechniquePair
+from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Scene
 
 TURNS = 5
@@ -127,17 +127,17 @@ class Judge:
 
 
 def points(
-    stage: Stage, judge: Judge, pair: TechniquePair, sampling: Sampling, samples: Sequence[int], turns: int = TURNS
+    stage: Stage, judge: Judge, named: NamedTechnique, sampling: Sampling, samples: Sequence[int], turns: int = TURNS
 ) -> list[ChartPoint]:
     """Return error and cost of a stage's technique with each number of samples."""
 
     def draw(number: int) -> NDArray[np.floating]:
-        return stage.scatter(pair.by, pair.mfp, replace(sampling, samples=number), pair.alpha)
+        return stage.scatter(named.by, named.mfp, replace(sampling, samples=number), named.alpha)
 
     def time(number: int) -> float:
-        return stage.time(pair.by, pair.mfp, replace(sampling, samples=number), 1, fixed_alpha=pair.alpha)[0]
+        return stage.time(named.by, named.mfp, replace(sampling, samples=number), 1, fixed_alpha=named.alpha)[0]
 
-    return judge.points(pair.label, samples, draw, time, turns)
+    return judge.points(named.label, samples, draw, time, turns)
 
 
 def surface_judge(

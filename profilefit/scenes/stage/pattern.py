@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
-from profilefit.errors import InputError
+from mcml_sim.media.checks import checked_whole, require
 
 WRAPS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 1, 2)
 KINDS = ("uniform", "importance", "importance blue")
@@ -58,10 +57,8 @@ class Sampling:
         checked_whole("samples", self.samples, 1, MOST_SAMPLES)
         checked_whole("seed", self.seed, 0, MOST_SEED)
         for name, accepted in (("kind", KINDS), ("channels", CHANNELS)):
-            if getattr(self, name) not in accepted:
-                raise InputError(f"{name} must be one of {', '.join(accepted)}, got {getattr(self, name)!r}")
-        if not isinstance(self.area, bool):
-            raise InputError(f"area must be True or False, got {self.area!r}")
+            require(getattr(self, name) in accepted, name, f"one of {', '.join(accepted)}", getattr(self, name))
+        require(isinstance(self.area, bool), "area", "True or False", self.area)
 
 
 class Lattice(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.checks import require
 
 Bytes = NDArray[np.uint8]
 
@@ -81,8 +81,7 @@ def averaged(fine: Floats, each: int) -> Floats:
 
 def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:
     """Return linear light (h, w, 3) times `exposure` as 8-bit values of a screen (IEC 61966-2-1), rows as they are."""
-    if not exposure > 0:
-        raise InputError(f"exposure must be a factor > 0, got {exposure!r}")
+    require(exposure > 0, "exposure", "a factor > 0", exposure)
     return np.round(srgb_codes(np.asarray(image, float) * exposure)).astype(np.uint8)
 
 

@@ -9,12 +9,12 @@ from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import TURNS, Judge, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import TechniquePair
+from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
@@ -156,18 +156,22 @@ class ViewRequest(Declared):
         return sorted({self.technique.samples, *self.technique.chart})
 
 
-def require_lit(file: str, buffers: Buffers) -> None:
-    """Raise InputError where a view shows nothing that light reaches and scatters in."""
+def draw_lit(stage: Stage, scene: Scene, file: str) -> None:
+    """Draw a scene; InputError, with the file, where it shows nothing that light reaches and scatters in."""
+    stage.draw(scene)
+    buffers = stage.buffers()
     inside = buffers.mask > INSIDE
     if not np.any(buffers.irradiance[inside] > 0):
         raise InputError(f"{file}: the view must show something that light scatters in, and light must reach it")
 
 
-def rendered(stage: Stage, judge: Judge, request: ViewRequest, pair: TechniquePair) -> RenderResult:
-    """Return the picture of what a stage has drawn, its reference, error and cost."""
+def rendered(
+    stage: Stage, judge: Judge, request: ViewRequest, named: NamedTechnique, seen: Technique | None = None
+) -> RenderResult:
+    """Return the picture of what a stage has drawn, its reference, error and cost; seen  what else it is shown by."""
     sampling = request.sampling
-    chart = points(stage, judge, pair, sampling, request.numbers)
-    exitance = stage.scatter(pair.by, pair.mfp, sampling, pair.alpha)
-    radiance = stage.render(pair.seen, pair.mfp, sampling, pair.alpha)
-    frame = stage.time(pair.seen, pair.mfp, sampling, TURNS, "frame", pair.alpha)
+    chart = points(stage, judge, named, sampling, request.numbers)
+    exitance = stage.scatter(named.by, named.mfp, sampling, named.alpha)
+    radiance = stage.render(seen or named.by, named.mfp, sampling, named.alpha)
+    frame = stage.time(seen or named.by, named.mfp, sampling, TURNS, "frame", named.alpha)
     return judge.result(exitance, chart, sampling.samples, frame, radiance)

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.checks import checked_whole, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
-from profilefit.scenes.stage.gather import Law, technique
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
-from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Technique, combination
+from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
 from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
 from profilefit.shader.context import seconds
 from profilefit.shader.emit import text_beside
@@ -77,8 +76,7 @@ class Stage(GpuOwner):
     def upload(self, buffers: Buffers) -> None:
         """Take a G-buffer of numpy arrays in place of a scene; no light shines then, and `render` has no highlights."""
         self._alive()
-        if buffers.size != self.size:
-            raise InputError(f"buffers must be {self.size} pixels, as the stage is, got {buffers.size}")
+        require(buffers.size == self.size, "buffers", f"{self.size} pixels, as the stage is", buffers.size)
         for name, array in buffers.maps().items():
             self.renderer.write(name, array)
         self._seen(buffers.pixel, buffers.is_perspective, None)
@@ -132,10 +130,9 @@ class Stage(GpuOwner):
 
         passes  "scatter", pass 3 alone, or "frame", all four of the scene last drawn
         """
-        if passes not in PASSES:
-            raise InputError(f"passes must be one of {', '.join(PASSES)}, got {passes!r}")
-        if passes == "frame" and self._scene is None:
-            raise InputError("passes must be scatter where no scene was drawn, got 'frame'")
+        require(passes in PASSES, "passes", f"one of {', '.join(PASSES)}", passes)
+        is_drawn = passes == "scatter" or self._scene is not None
+        require(is_drawn, "passes", "scatter where no scene was drawn", passes)
         by = technique(law)  # a law's source is written once, and not in the time that is taken
 
         def work() -> None:
@@ -220,8 +217,7 @@ def _three(name: str, value: ArrayLike, accepted: str, low: float, high: float) 
         three = np.broadcast_to(np.asarray(value, float), 3).copy()
     except (TypeError, ValueError):
         raise InputError(f"{name} must be one number or three, got {value!r}") from None
-    if not np.all((three >= low) & (three <= high)):
-        raise InputError(f"{name} must be {accepted}, got {value!r}")
+    require(np.all((three >= low) & (three <= high)), name, accepted, value)
     return three
 
 

@@ -20,7 +20,6 @@ divided by Gauss points, all others taken at their middle. All pairs count, near
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -31,9 +30,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
-from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, STEP, Curves, CurveTable, exact_table
+from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, Curves, CurveTable, cubic, exact_table
 from profilefit.scenes.stage.picture import TruthError, averaged
 from profilefit.scenes.stage.world import Camera
 
@@ -76,10 +76,6 @@ class View(NamedTuple):
             for axis, part in zip(np.eye(3), (normal[..., 0], normal[..., 1]), strict=False)
         )
         return across, along
-
-    def coarsened(self, factor: int) -> View:
-        """Return the view with pixels that many times as large."""
-        return self._replace(pixel=self.pixel * factor)
 
 
 class Surface(NamedTuple):
@@ -171,11 +167,10 @@ def gathered(
     Raises InputError; SettingError of a setting with g. 26 000 visible pixels take about a minute on a core, 100 MiB.
     """
     lengths = np.asarray(mfp, float)
-    if lengths.shape != (3,) or not np.all((lengths > 0) & np.isfinite(lengths)):
-        raise InputError(f"mfp must be three lengths > 0, got {mfp!r}")
+    are_lengths = lengths.shape == (3,) and np.all((lengths > 0) & np.isfinite(lengths))
+    require(are_lengths, "mfp", "three lengths > 0", mfp)
     curves: CurveTable = exact_table(table) if isinstance(table, Setting) else table
-    if not callable(getattr(curves, "curves", None)):
-        raise InputError(f"table must be a Setting, or have a method curves, got {table!r}")
+    require(callable(getattr(curves, "curves", None)), "table", "a Setting, or have a method curves", table)
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     light, share = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     # The number of the visible pixel that stands for each pixel of the image and a margin of NEAR around it.
@@ -196,19 +191,18 @@ def gathered(
 
 
 def refined(
-    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike, factor: int = 2
+    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Return light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
+    """Return light at pixels (m, 2) of a coarser view, from a surface twice as fine, and the error without it.
 
     view  the fine one. -> the means of the fine light over each pixel (m, 3), and the coarse light less these (m, 3):
     an estimate of the error of the coarse one, and a bound for that of the fine one.
     """
-    coarse = fine.coarsened(factor)
+    coarse, wide = fine.coarsened(2), view._replace(pixel=2 * view.pixel)
     chosen = _chosen(coarse, pixels)
-    inside = np.stack(np.meshgrid(range(factor), range(factor), indexing="ij"), axis=-1).reshape(-1, 2)
-    parts = (factor * chosen[:, None] + inside).reshape(-1, 2)
+    parts = (2 * chosen[:, None] + [(0, 0), (0, 1), (1, 0), (1, 1)]).reshape(-1, 2)
     mean = gathered(fine, view, mfp, table, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
-    return mean, gathered(coarse, view.coarsened(factor), mfp, table, chosen).light - mean
+    return mean, gathered(coarse, wide, mfp, table, chosen).light - mean
 
 
 def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
@@ -328,21 +322,24 @@ def _some(
 @jax.jit
 def _sums(scene: _Scene, points: _Points, mfp: Array) -> tuple[Array, Array]:
     """Return sum W E and sum W, each (m, 3)."""
-    return jax.lax.map(partial(_sum, scene, mfp), points)
+    length = mfp[:, None]
 
+    def at(point: _Points) -> tuple[Array, Array]:
+        far = jnp.where(jnp.max(jnp.abs(scene.place - point.place), axis=1) > NEAR, scene.area, 0.0)
+        lit, share = point.own * point.irradiance, point.own
+        for position, area, irradiance in (
+            (scene.position, far, scene.irradiance),
+            _divided(scene, point.around[STEPS > CLOSE], 2),
+            _divided(scene, point.around[(STEPS > 0) & (STEPS <= CLOSE)], 4),
+        ):
+            r = jnp.sqrt(jnp.sum((position - point.position) ** 2, axis=1))
+            x = jnp.clip(r / length, NEAREST, FARTHEST)
+            density = jnp.exp(cubic(point.profile, x) - point.kappa[:, None] * x) / length**2  # as `Curves.density`
+            weight = area * density
+            lit, share = lit + jnp.sum(weight * irradiance.T, axis=1), share + jnp.sum(weight, axis=1)
+        return lit, share
 
-def _sum(scene: _Scene, mfp: Array, point: _Points) -> tuple[Array, Array]:
-    """Return both sums for one point, (3,)."""
-    far = jnp.where(jnp.max(jnp.abs(scene.place - point.place), axis=1) > NEAR, scene.area, 0.0)
-    lit, share = point.own * point.irradiance, point.own
-    for position, area, irradiance in (
-        (scene.position, far, scene.irradiance),
-        _divided(scene, point.around[STEPS > CLOSE], 2),
-        _divided(scene, point.around[(STEPS > 0) & (STEPS <= CLOSE)], 4),
-    ):
-        weight = area * _density(position - point.position, mfp[:, None], point)
-        lit, share = lit + jnp.sum(weight * irradiance.T, axis=1), share + jnp.sum(weight, axis=1)
-    return lit, share
+    return jax.lax.map(at, points)
 
 
 def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Array]:
@@ -352,15 +349,3 @@ def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Ar
     position = scene.position[pixels, None] + a * scene.across[pixels, None] + b * scene.along[pixels, None]
     area = scene.area[pixels, None] * (0.25 * np.outer(weights, weights).ravel())
     return position.reshape(-1, 3), area.ravel(), jnp.repeat(scene.irradiance[pixels], count * count, axis=0)
-
-
-def _density(offset: Array, mfp: Array, point: _Points) -> Array:
-    """Return R_d / A [1/length^2] of the three channels, (3, n), at vectors (n, 3) from the point: `Curves.density`."""
-    r = jnp.sqrt(jnp.sum(offset**2, axis=1))
-    x = jnp.clip(r / mfp, NEAREST, FARTHEST)
-    place = (jnp.log(x) - np.log(NEAREST)) / STEP
-    k = jnp.minimum(place.astype(int), point.profile.shape[1] - 1)
-    t = place - k
-    c = jnp.take_along_axis(point.profile, k[..., None], axis=1)
-    power = c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * c[..., 3]))
-    return jnp.exp(power - point.kappa[:, None] * x) / mfp**2

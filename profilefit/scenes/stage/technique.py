@@ -1,4 +1,7 @@
-"""Techniques: how light scatters in a picture, as passes over the screen between the G-buffer and the radiance."""
+"""Techniques: how light scatters in a picture, as passes over the screen between the G-buffer and the radiance.
+
+Samples of a law are the technique of Liang et al., (22).
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,17 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from mcml_sim.media.arrays import Floats
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw
+from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.buffers import Singles
+from profilefit.scenes.stage.exact_law import NAME, ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, Read
 from profilefit.scenes.stage.world import Part, Rgb, Scene, unit
-from profilefit.shader.emit import text_beside
+from profilefit.shader.emit import law_text, prefix, text_beside
 
+Law = ProfileLaw | ExactLaw
 LAW = "law"  # the prefix of the law in every shader of the stage
 EXITANCE, RADIANCE = "exitance_map", "radiance_map"
 # How a pixel of the one half space takes its law: by its own A, or by a fixed albedo.
@@ -80,6 +88,17 @@ class LawText:
     shape: str = SHAPE
     colour: str = COLOUR
 
+    @classmethod
+    def of_share(cls, name: str, cumulated: str) -> LawText:
+        """Return the source that `Technique.through` needs, of a share within x that no albedo changes: GLSL of x."""
+        text = (
+            f"struct {LAW}_Shape {{ float unused; }};\n"
+            f"float {LAW}_alpha(float reflectance) {{ return reflectance; }}\n"
+            f"{LAW}_Shape {LAW}_shape(float alpha) {{ {LAW}_Shape s; s.unused = alpha; return s; }}\n"
+            f"float {LAW}_cumulated(float x, {LAW}_Shape s) {{ return {cumulated}; }}\n"
+        )
+        return cls(name, text)
+
     def before(self, shader: str) -> str:
         """Return a shader's source with the law before it, and SHAPE and COLOUR, by which it asks for both."""
         shape, colour = (" ".join(one.split()) for one in (self.shape, self.colour))  # a macro is one line
@@ -120,26 +139,71 @@ class Lambert(Technique):
         return [Pass("lambert", reads, EXITANCE, text_beside(__name__, "glsl/lambert.frag"))]
 
     def through(self) -> LawText:
-        return LawText("lambert", through_text("1.0"))
+        return LawText.of_share("lambert", "1.0")
 
 
-class TechniquePair(NamedTuple):
-    """Technique that is judged, the one that is shown, and what a stage takes with both.
+@dataclass(frozen=True, eq=False)
+class Gather(Technique):
+    """Technique by which each pixel samples radii of a law, whose source is compiled in."""
 
-    by     whose scattered light is held against the reference;  seen  that of the picture: `by`, or more than that
-    mfp    of red, green, blue [mm];  alpha  reduced albedos of the three [-]; None where each pixel's A gives them
+    law: LawText
+
+    @classmethod
+    def of(cls, law: Law) -> Gather:
+        """Return samples of a law with a shader source, or of the exact half space."""
+        if isinstance(law, ExactLaw):
+            return cls(LawText(NAME, law.text(LAW), law.textures(LAW)))
+        return cls(LawText(prefix(law), law_text(law, name=LAW)))
+
+    def passes(self, frame: Frame) -> Sequence[Pass]:
+        sampling = frame.sampling
+        lattice = pattern.best(sampling.samples)
+        uniforms = {
+            **frame.camera,
+            "mfp": tuple(frame.mfp),
+            "fixed_alpha": frame.alpha_uniform,
+            "samples": sampling.samples,
+            "longest": max(range(3), key=lambda channel: (frame.mfp[channel], frame.alpha_uniform[channel])),
+            "seed": sampling.seed,
+            "generator": lattice.generator,
+            # A channel's third of the points is no lattice: to be right in the mean, its shifts must go everywhere.
+            "cell": (1.0, 0.0, 0.0, 1.0) if sampling.channels == "mixture" else tuple(lattice.cell.ravel()),
+        }
+        surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map")
+        reads = {**surface, "noise_map": pattern.shifts(), **self.law.tables}
+        switches = {
+            "UNIFORM": sampling.kind == "uniform",
+            "BLUE": sampling.kind == "importance blue",
+            "MIXTURE": sampling.channels == "mixture",
+            "AREA": sampling.area,
+        }
+        source = "".join(f"#define {name} {int(is_on)}\n" for name, is_on in switches.items())
+        source += self.law.before(text_beside(__name__, "glsl/scatter.frag"))
+        return [Pass(f"scatter {self.law.name}", reads, EXITANCE, source, uniforms)]
+
+    def through(self) -> LawText:
+        return self.law
+
+
+def technique(by: Law | Technique) -> Technique:
+    """Return a technique itself, or samples of a law; InputError on anything else."""
+    if isinstance(by, Technique):
+        return by
+    if isinstance(by, Law):
+        return Gather.of(by)
+    raise InputError(f"law must be a profile law, an ExactLaw or a technique, got {by!r}")
+
+
+class NamedTechnique(NamedTuple):
+    """Technique whose scattered light is judged, and what a stage takes with it.
+
+    mfp  of red, green, blue [mm];  alpha  reduced albedos of the three [-]; None where each pixel's A gives them
     """
 
     label: str
     by: Technique
-    seen: Technique
     mfp: Rgb
     alpha: Rgb | None = None
-
-
-def alone(label: str, by: Technique, mfp: Rgb, alpha: Rgb | None = None) -> TechniquePair:
-    """Return the pair of a technique that is judged and shown."""
-    return TechniquePair(label, by, by, mfp, alpha)
 
 
 def combination(by: Technique, frame: Frame) -> Pass:
@@ -160,13 +224,3 @@ def combination(by: Technique, frame: Frame) -> Pass:
 def maps(*names: str) -> dict[str, Read]:
     """Return the reads of maps by samplers of their own names."""
     return {name: name for name in names}
-
-
-def through_text(cumulated: str) -> str:
-    """Return the source that `Technique.through` needs, of a share within x that no albedo changes: GLSL of x."""
-    return (
-        f"struct {LAW}_Shape {{ float unused; }};\n"
-        f"float {LAW}_alpha(float reflectance) {{ return reflectance; }}\n"
-        f"{LAW}_Shape {LAW}_shape(float alpha) {{ {LAW}_Shape s; s.unused = alpha; return s; }}\n"
-        f"float {LAW}_cumulated(float x, {LAW}_Shape s) {{ return {cumulated}; }}\n"
-    )

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.checks import require
 from profilefit.errors import InputError
 
 Rgb = tuple[float, float, float]
@@ -31,10 +32,8 @@ class Camera:
     kind: str = "perspective"
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError(f"camera kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
-        if not 0 < self.height < np.inf:
-            raise InputError(f"camera height must be a length > 0 [mm], got {self.height!r}")
+        require(self.kind in KINDS, "camera kind", f"one of {', '.join(KINDS)}", self.kind)
+        require(0 < self.height < np.inf, "camera height", "a length > 0 [mm]", self.height)
 
     @property
     def is_perspective(self) -> bool:
@@ -97,8 +96,8 @@ class Light:
     irradiance: Rgb = (3.6, 3.4, 3.1)
 
     def __post_init__(self) -> None:
-        if not (np.all(np.isfinite(self.direction)) and np.linalg.norm(self.direction) > 0):
-            raise InputError(f"light direction must be a direction, not 0, got {self.direction!r}")
+        is_direction = np.all(np.isfinite(self.direction)) and np.linalg.norm(self.direction) > 0
+        require(is_direction, "light direction", "a direction, not 0", self.direction)
         _require_light("light irradiance", self.irradiance)
 
 
@@ -121,8 +120,8 @@ class Scene:
 
 
 def _require_light(name: str, light: Rgb) -> None:
-    if np.shape(light) != (3,) or not np.all(np.isfinite(light)) or min(light) < 0:
-        raise InputError(f"{name} must be three finite numbers >= 0, got {light!r}")
+    holds = np.shape(light) == (3,) and np.all(np.isfinite(light)) and min(light) >= 0
+    require(holds, name, "three finite numbers >= 0", light)
 
 
 def rgb(values: Iterable[float]) -> Rgb:

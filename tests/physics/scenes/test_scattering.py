@@ -27,13 +27,7 @@ from tests.unit.scenes.scenes import refused, scene
 ALPHA = 0.8
 A = exact.reflectance(ALPHA, edges.DIFFUSE)
 EVERY = [(kind, channels) for kind in KINDS for channels in CHANNELS]
-
-
-@pytest.fixture
-def small(context):
-    """24 x 24 pixels."""
-    with Stage(context, (24, 24), shadow_side=16) as stage:
-        yield stage
+SMALL = 24, 24
 
 
 @pytest.mark.parametrize(("kind", "channels"), EVERY)

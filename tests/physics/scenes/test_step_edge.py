@@ -217,13 +217,7 @@ def test_misuse():
 ALPHA = 0.8
 A = exact.reflectance(ALPHA, edges.DIFFUSE)
 EXACT = ExactLaw((ALPHA,))
-
-
-@pytest.fixture
-def small(context):
-    """16 x 128 pixels: enough for paths within a pixel."""
-    with Stage(context, (16, 128), shadow_side=16) as stage:
-        yield stage
+SMALL = 16, 128  # pixels: enough for paths within one
 
 
 @pytest.mark.slow

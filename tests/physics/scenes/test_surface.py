@@ -49,18 +49,13 @@ def test_footprints_of_an_outline_and_of_the_background():
     np.testing.assert_array_equal(across[0], view.footprint(THROUGH, NORMAL)[0])
 
 
-def _plane(h, w, **changed):
-    return flat(h, w, 0.5)._replace(**changed)
-
-
 def test_coarsened_is_the_mean_of_blocks():
     light = np.arange(48.0).reshape(4, 4, 3)
     mask = np.ones((4, 4), bool)
     mask[0, 0] = False
-    coarse = _plane(4, 4, irradiance=light, mask=mask).coarsened(2)
+    coarse = flat(4, 4, 0.5)._replace(irradiance=light, mask=mask).coarsened(2)
     np.testing.assert_array_equal(coarse.mask, [[False, True], [True, True]])
     np.testing.assert_allclose(coarse.irradiance[1, 1], light[2:, 2:].mean(axis=(0, 1)))
-    assert View(0.5).coarsened(2).pixel == 1.0
 
 
 def test_seen_is_the_render_in_view_space():
@@ -208,7 +203,7 @@ def test_refined_says_what_coarse_pixels_cost():
     fine, view = seen(planes.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
     pixels = np.array([[12, 11], [12, 12], [12, 15]])
     light, change = refined(fine, view, np.ones(3), DIFFUSE, pixels)
-    coarse = gathered(fine.coarsened(2), view.coarsened(2), np.ones(3), DIFFUSE, pixels)
+    coarse = gathered(fine.coarsened(2), view._replace(pixel=0.5), np.ones(3), DIFFUSE, pixels)
     np.testing.assert_allclose(coarse.light - light, change, atol=1e-15)
     assert 1e-4 < np.max(np.abs(change)) < 0.02
 
@@ -245,7 +240,7 @@ def test_what_cannot_be_gathered():
     refused("mfp must be three lengths > 0", gathered, surface, VIEW, [1.0, 0.0, 1.0])
     refused(r"pixels must be visible ones, got \(4, 0\)", gathered, surface, VIEW, MFP, pixels=[[4, 0]])
     refused("pixels must be pairs", gathered, surface, VIEW, MFP, pixels=[[1.0, 2.0]])
-    refused("factor must divide 2 and 3, got 2", _plane(2, 3).coarsened, 2)
+    refused("factor must divide 2 and 3, got 2", flat(2, 3, 0.5).coarsened, 2)
 
 
 REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])

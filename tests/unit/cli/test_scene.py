@@ -25,7 +25,7 @@ NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("wate
 OWN = {
     "skin": ("label", "material", "setting"),
     "layers": ("pose", "single"),
-    "heart": ("surface",),
+    "heart": ("surface", "stack", "illumination"),
     "sea": ("sea", "floor"),
     "fur": ("fur", "shading_table"),
 }

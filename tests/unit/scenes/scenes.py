@@ -58,6 +58,16 @@ def changed(example: dict[str, Any], place: str = "", value: Any = None) -> dict
     return found
 
 
+def refusals(call, *cases):
+    """A test that a call, in which all it takes is named, refuses each of these changes, by the message beside it."""
+
+    @pytest.mark.parametrize(("given", "message"), cases)
+    def test(given, message):
+        refused(message, call, **given)
+
+    return test
+
+
 def mistaken(read, file: str, content: dict[str, Any], message: str) -> None:
     """Content that is refused in one line, which begins with the file's name."""
     assert refused(message, read, file, content).startswith(f"{file}: ")

@@ -10,10 +10,9 @@ from benchmarks.planes import flat, step_edge
 from mcml_sim import Setting
 from profilefit.errors import ShaderError
 from profilefit.scenes.skin import material
-from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, uniforms_of
-from profilefit.scenes.stage.technique import EXITANCE, Lambert, LawText, Technique, maps, through_text
+from profilefit.scenes.stage.technique import EXITANCE, Gather, Lambert, LawText, Technique, maps
 from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE = (128, 128)
@@ -49,7 +48,7 @@ class Scaled(Technique):
         ]
 
     def through(self):
-        return LawText("scaled", through_text("1.0"))
+        return LawText.of_share("scaled", "1.0")
 
 
 def test_uniforms_are_those_of_the_source():
@@ -123,8 +122,3 @@ def test_lambert_is_the_light_that_arrives(stage):
     stage.upload(edge)
     np.testing.assert_array_equal(stage.scatter(Lambert(), 2.0, Sampling(1)), edge.irradiance * edge.reflectance)
     assert np.isfinite(stage.render(Lambert(), 2.0)).all()
-
-
-def test_what_is_no_technique_is_refused(stage):
-    stage.upload(flat(SIZE, 1.0, 0.5))
-    refused("law must be a profile law, an ExactLaw or a technique, got 'separable'", stage.scatter, "separable", 1.0)

@@ -5,6 +5,7 @@ And where an atlas fails if it is made carelessly.
 
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from profilefit.scenes.heart.meshes import CHARTS_END, ball, bumps, heart
 from profilefit.scenes.heart.truth import Elements, sphere_blur, summed
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Mesh, Part, Scene
-from tests.unit.scenes.scenes import refused
+from tests.unit.scenes.scenes import refusals, refused
 
 VARIANCES, WEIGHTS = np.array([0.3, 2.0, 9.0]), np.array([0.2, 0.5, 0.3])
 BALL, COUNT = 3.0, 20_000
@@ -87,6 +88,7 @@ def test_light_is_counted_once():
         assert sum(part.variances.size for part in parts) == 3
         light = sum(surface_blur(*surface, part.variances, part.weights, at=points[:50]) for part in parts)
         np.testing.assert_allclose(light, whole, rtol=1e-12)
+    refused("crossover must be a length >= 0, got nan", split, Kernel(VARIANCES, WEIGHTS), np.nan)
 
 
 def test_the_share_of_the_screen():
@@ -99,33 +101,23 @@ def test_the_share_of_the_screen():
     np.testing.assert_array_equal(chosen, [1.0, 2.0, 2.0])
 
 
-@pytest.mark.parametrize(
-    ("changed", "told"),
-    [
-        ({"points": np.zeros((2, 2))}, r"points must have shape \(n, 3\), got \(2, 2\)"),
-        ({"areas": [1.0, -1.0]}, "areas must be 2 numbers >= 0"),
-        ({"irradiance": [np.nan, 1.0]}, "irradiance must be finite, got nan"),
-        ({"irradiance": [1.0]}, r"irradiance must be of shape \(2,\)"),
-        ({"variances": [0.0]}, "variances must be a list of numbers > 0"),
-        ({"weights": [1.0, 2.0]}, "weights must be one for each of 1 variances"),
-        ({"areas": "much"}, "areas must be numbers, got 'much'"),
-    ],
+POINTS, ONES = np.eye(3)[:2], [1.0, 1.0]
+test_bad_sums = refusals(
+    partial(surface_blur, points=POINTS, areas=ONES, irradiance=ONES, variances=ONES[:1], weights=ONES[:1]),
+    ({"points": np.zeros((2, 2))}, r"points must have shape \(n, 3\), got \(2, 2\)"),
+    ({"areas": [1.0, -1.0]}, "areas must be 2 numbers >= 0"),
+    ({"irradiance": [np.nan, 1.0]}, "irradiance must be finite, got nan"),
+    ({"irradiance": [1.0]}, r"irradiance must be of shape \(2,\)"),
+    ({"variances": [0.0]}, "variances must be a list of numbers > 0"),
+    ({"weights": [1.0, 2.0]}, "weights must be one for each of 1 variances"),
+    ({"areas": "much"}, "areas must be numbers, got 'much'"),
 )
-def test_bad_sums(changed, told):
-    good = {"areas": [1.0, 1.0], "irradiance": [1.0, 1.0], "variances": [1.0], "weights": [1.0]}
-    refused(told, surface_blur, **({"points": np.eye(3)[:2], **good} | changed))
-    refused("crossover must be a length >= 0, got nan", split, Kernel(VARIANCES, WEIGHTS), np.nan)
 
 
 KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
 RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24
 WHITE = np.ones((1, 1, 3), np.float32)
-
-
-@pytest.fixture
-def stage(context):
-    with Stage(context, (32, 32), shadow_side=64) as stage:
-        yield stage
+STAGE = (32, 32), 64
 
 
 @contextmanager

@@ -26,12 +26,7 @@ WEIGHTS = np.stack([[0.2, 0.5, 0.3], [0.3, 0.5, 0.2], [0.5, 0.3, 0.2]], axis=1)
 KERNEL = Kernel(np.array([0.1, 0.8, 5.0]), WEIGHTS)
 COLOUR = np.array([0.8, 0.6, 0.3], np.float32)
 SAMPLES, UNITS = Sampling(64), (1.0, 1.0, 1.0)
-
-
-@pytest.fixture
-def stage(context):
-    with Stage(context, (64, 64), shadow_side=512) as stage:
-        yield stage
+STAGE = (64, 64), 512
 
 
 def drawn(stage, mesh, camera, light=(1.0, 1.0, 1.0), ambient=(0.0, 0.0, 0.0)):

@@ -17,7 +17,6 @@ SMALL = {"camera": {"resolution": [64, 48]}, "technique": {"samples": 64, "texel
 content = partial(changed, EXAMPLE)
 KEYS = "keys must be of "
 REFUSED = [
-    ("colour", 1, f"{KEYS}unit, .*, got 'colour'"),
     ("surface.colour", 1, rf"\[surface\] {KEYS}kind, size, steepness, roughness, got 'colour'"),
     ("technique.crossover", 1, rf"\[technique\] {KEYS}samples, .*, texel, tolerance, got 'crossover'"),
     ("surface.kind", "cow", r"\[surface\] kind must be one of heart, ball, bumps, got 'cow'"),
@@ -26,12 +25,9 @@ REFUSED = [
     ("surface.roughness", 2.0, r"\[surface\] roughness must be a number > 0 and <= 1, got 2.0"),
     ("technique.kind", "fog", r"\[technique\] kind must be one of split, texture, screen, none, got 'fog'"),
     ("technique.gaussians", 9, r"\[technique\] gaussians must be a whole number in 1 ... 8, got 9"),
-    ("technique.gaussians", True, r"\[technique\] gaussians must be a whole number in 1 ... 8, got True"),
     ("technique.texel", 0.01, r"\[technique\] texel must be a length \[mm\] of which 2048 at most make a side of"),
-    ("technique.texel", float("nan"), r"\[technique\] texel must be a number > 0"),
     ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
     ("layers.2.g", 0.9, r"\[layers 2\] g must be 0, and mu_s reduced"),
-    ("unit", "cm", "unit must be one of mm, got 'cm'"),
 ]
 
 
@@ -41,11 +37,7 @@ def test_a_mistake_is_one_line(place, value, message):
 
 
 @pytest.mark.slow
-def test_what_is_left_out_is_as_the_example_has_it():
-    found = scene.read("heart.toml", content())
-    least = scene.read("heart.toml", {"scene": "heart", "layers": EXAMPLE["layers"]})
-    for name in ("stack", "camera", "light", "ambient", "size", "surface", "technique", "illumination"):
-        assert getattr(least, name) == getattr(found, name), name
+def test_a_view_is_as_wide_as_what_is_seen():
     wide = scene.read("heart.toml", content("surface", {"kind": "ball", "size": 30.0}) | {"camera": {}})
     assert wide.camera.height == 90.0
 
@@ -116,7 +108,7 @@ def test_ways_and_frames(context, request_small):
         assert many.rmse < few.rmse < ways["none"][0].rmse
         assert len(many.milliseconds) == 2
         assert many.rmse == pytest.approx(chart.error(found, "screen"))
-        frames = chart.frames(found, ("split", "texture"), turns=1)
+        frames = heart.frames(found, ("split", "texture"), 1, chart.SURE)
         assert list(frames) == ["split", "texture"]
         assert min(frames.values()) > 0
 

@@ -18,11 +18,11 @@ from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import unit
 from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE, SAMPLES = (96, 96), Sampling(4)
+STAGE = SIZE, 256
 LEAST, MOST = 0.05, 0.5  # thickness of the first layer [mm]
 # Of each colour mu_a and mu_s of two layers [1/mm], and near what a fit of such a stack gives for its interface.
 COLOURS = (((0.05, 1.8), (0.20, 1.13)), ((0.20, 2.2), (0.80, 1.2)), ((0.35, 2.6), (1.2, 1.3)))
@@ -130,12 +130,6 @@ def test_no_energy_comes_or_goes(n):
         assert of_out @ np.abs(apart).mean(axis=1) > 0.05 * alike
 
 
-@pytest.fixture
-def stage(context):
-    with Stage(context, SIZE, shadow_side=256) as stage:
-        yield stage
-
-
 def uneven_ball():
     """Thin at one side, thick at the other."""
     values = np.linspace(0.0, 1.0, 64, dtype=np.float32)[None, :, None]
@@ -152,7 +146,7 @@ def test_the_shader_adds_what_numpy_does(stage, kind, g):
     stage.draw(drawn)
     by = of_stack(laws(), LEAST, MOST, ())
     plain, seen = stage.scatter(by, MFP, SAMPLES), stage.buffers()
-    single = WithSingle.of(by, three, LEAST, MOST)
+    single = WithSingle(by, three, LEAST, MOST)
     found = stage.scatter(single, MFP, SAMPLES).astype(float) - plain
     toward = drawn.camera.view()[:3, :3] @ unit(direction)
     into = seen.normal.astype(float) @ toward
@@ -185,7 +179,7 @@ def test_the_shader_adds_what_numpy_does(stage, kind, g):
 def test_light_from_everywhere_has_no_direction(stage):
     """Nor has light from behind: there the pass changes not a bit."""
     by = of_stack(laws(), LEAST, MOST, ())
-    single = WithSingle.of(by, media(), LEAST, MOST)
+    single = WithSingle(by, media(), LEAST, MOST)
     for show, what in ((stage.draw, scene((0.0, 0.0, -1.0), uneven_ball())), (stage.upload, flat(SIZE, 1.0, 0.5))):
         show(what)
         np.testing.assert_array_equal(stage.scatter(single, MFP, SAMPLES), stage.scatter(by, MFP, SAMPLES))

@@ -1,6 +1,6 @@
 """Caustics: exact in one dimension, by photons of a lattice, and maps by OpenGL, against each other."""
 
-from functools import cache
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -14,7 +14,7 @@ from profilefit.scenes.sea.truth import caustic_irradiance, caustic_photons, mis
 from profilefit.scenes.sea.waves import Waves, first_hit, random_floor, random_sea, refracted
 from profilefit.scenes.stage.renderer import Renderer
 from tests.fixtures import slow
-from tests.unit.scenes.scenes import refused
+from tests.unit.scenes.scenes import refusals, refused
 
 TILE, DEPTH, N = 10.0, 5.0, 1.34
 STEP = 2.0 * np.pi / TILE
@@ -340,22 +340,16 @@ def test_a_fold_is_infinite_under_a_point_sun_only():
     np.testing.assert_allclose(2.0 * SUN / N, 0.007, rtol=0.02)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"depth": -1.0}, "depth must be a length > 0 \\[m\\], got -1.0$"),
-        ({"depth": 0.05}, "depth must be below the deepest trough, 0\\.07\\d* m, got 0.05$"),
-        ({"tilt": 30.0}, "tilt must be in \\[0, pi / 2\\), in radians, got 30.0$"),
-        ({"tilt": -0.1}, "tilt must be in \\[0, pi / 2\\), in radians, got -0.1$"),
-        ({"tilt": np.nan}, "tilt must be in \\[0, pi / 2\\), in radians, got nan$"),
-        ({"n": 0.0}, "n must be a refractive index > 0, got 0.0$"),
-        ({"n": "water"}, "n must be a refractive index > 0, got 'water'$"),
-        ({"x": [0.0, np.nan]}, "x must be finite numbers \\[m\\], got nan$"),
-        ({"surface": lambda x: x + np.nan}, "surface must be finite, got nan$"),
-        ({"surface": 3.0}, "surface must be a function of an array of x \\[m\\], got 'float' object is not callable$"),
-        ({"spacing": 0.0}, "spacing must be a length > 0 \\[m\\], got 0.0$"),
-    ],
+test_what_no_floor_has = refusals(
+    partial(caustic_irradiance, surface=ridge_height, x=[0.0, 1.0], depth=5.0, tilt=0.0, n=N),
+    ({"depth": -1.0}, "^depth must be a length > 0 \\[m\\], got -1.0$"),
+    ({"depth": 0.05}, "^depth must be below the deepest trough, 0\\.07\\d* m, got 0.05$"),
+    ({"tilt": 30.0}, "^tilt must be in \\[0, pi / 2\\), in radians, got 30.0$"),
+    ({"tilt": -0.1}, "^tilt must be in \\[0, pi / 2\\), in radians, got -0.1$"),
+    ({"n": 0.0}, "^n must be a refractive index > 0, got 0.0$"),
+    ({"n": "water"}, "^n must be a refractive index > 0, got 'water'$"),
+    ({"x": [0.0, np.nan]}, "^x must be finite numbers \\[m\\], got nan$"),
+    ({"surface": lambda x: x + np.nan}, "^surface must be finite, got nan$"),
+    ({"surface": 3.0}, "^surface must be a function of an array of x \\[m\\], got 'float' object is not callable$"),
+    ({"spacing": 0.0}, "^spacing must be a length > 0 \\[m\\], got 0.0$"),
 )
-def test_what_no_floor_has(given, message):
-    good = {"surface": ridge_height, "x": [0.0, 1.0], "depth": 5.0, "tilt": 0.0, "n": N}
-    refused(f"^{message}", caustic_irradiance, **{**good, **given})

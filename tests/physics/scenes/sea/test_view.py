@@ -90,7 +90,7 @@ def directions(camera, size):
 def drawn(context, world, splat=Splat.FACES, texels=16):
     """A world with its maps of light, as a function from camera, size, kind and pieces to radiance."""
     with Renderer(context, (1, 1)) as renderer:
-        passes = SeaPasses(renderer, world, (splat, splat), texels, texels, 4)
+        passes = SeaPasses(renderer, world, splat, texels, texels, 4)
         for own in passes.light.values():
             renderer.run(*own)
         yield lambda *view: renderer.image(passes.view(*view, 16))[..., :3].astype(float)
