@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.model import exact_light, u_of
@@ -267,15 +268,25 @@ def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]
 def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
     pixel, core = setup.camera.pitch, setup.optics.sigma
     edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
-    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
     beliefs = Beliefs(beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core)).over(setup.camera.sides, pixel, float(edges[-1]))
-    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.medium.setting), beliefs)
+    return dict(medium.fisher(*noiseless(setup.medium.setting, mu_s, mu_a, edges, cards, beliefs)))
+
+
+def noiseless(
+    setting: Setting, mu_s: float, mu_a: float, edges: Floats, cards: Sequence[Known | None], beliefs: Beliefs
+) -> tuple[Shot, Floats]:
+    """Return rings of exact light under the believed beam, with the errors that SCATTER gives them, and coordinates.
+
+    cards  reflectance of each card, None where it is not known
+    """
+    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
+    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setting), beliefs)
     x = shot.middle
-    x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)
+    x[:3] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0
     x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
     seen = [
         replace(blank, value=one, covariance=np.diag((SCATTER * one) ** 2))
         for one in np.split(shot.rows(x)[0], 1 + len(cards))
     ]
     shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
-    return dict(medium.fisher(replace(shot, medium=seen[0], cards=shown), x))
+    return replace(shot, medium=seen[0], cards=shown), x

@@ -14,9 +14,9 @@ from profilefit.fitting.solver import CONVERGED, Solution, lowest
 from profilefit.measured import model
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import exposure as bracket
-from profilefit.measured.photo import medium, rings, simulated, workflow
+from profilefit.measured.photo import medium, rings, setup, simulated, workflow
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, Picture
-from profilefit.measured.photo.medium import Beliefs, Card, Shot, halo, ring_means, ring_weights
+from profilefit.measured.photo.medium import Beliefs, Shot, halo, ring_means, ring_weights
 from profilefit.measured.photo.rings import PixelScale, SpotRings, pixel_scale
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
@@ -222,18 +222,9 @@ def test_rings_err_as_they_say(light):
     assert 0.4 < squares[:2].mean() < 2.4, "though a grain of speckle is wider than a sector there"
 
 
-def made(cards=(), **beliefs) -> tuple[Shot, np.ndarray]:
+def made(*cards) -> tuple[Shot, np.ndarray]:
     """A shot of rings without noise, and its coordinates."""
-    edges = rings.edges_of(20.0, 0.1)
-    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
-    shot = Shot(blank, tuple(Card(blank, one) for one in cards), exact_light(SETTING), Beliefs(**beliefs))
-    x = shot.middle
-    x[:4] = u_of(ALPHA), np.log(LENGTH), 0.0, np.log(0.25)
-    x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
-    parts = np.split(shot.rows(x)[0], 1 + len(cards))
-    seen = [replace(blank, value=one, covariance=np.diag((0.003 * one) ** 2)) for one in parts]
-    shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
-    return replace(shot, medium=seen[0], cards=shown), x
+    return setup.noiseless(SETTING, 1.0, 0.05, rings.edges_of(20.0, 0.1), cards, Beliefs(beam=BEAM))
 
 
 BEAM = Known(0.5, 0.05)
@@ -243,7 +234,7 @@ GREY = Known(0.18, 0.005)
 @pytest.fixture(scope="module")
 def carded():
     """A shot with both cards, and its coordinates."""
-    return made((None, GREY), beam=BEAM)
+    return made(None, GREY)
 
 
 @pytest.fixture(scope="module")
@@ -321,7 +312,7 @@ def test_a_beam_of_two_pixels_gives_its_medium():
 
 
 def test_cards_are_worth_what_is_said_and_glare_costs_it(carded):
-    shot, x = made((), beam=BEAM)
+    shot, x = made()
     alone, both = medium.fisher(shot, x), medium.fisher(*carded)
     assert both["mu_s'"] < 0.7 * alone["mu_s'"]
     assert both["mu_a"] < 0.6 * alone["mu_a"]

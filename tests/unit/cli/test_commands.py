@@ -137,8 +137,6 @@ def test_control_c_is_one_line_and_keeps_the_batches(recipe, tmp_path):
     ("words", "status", "said"),
     [
         (("regenerate", "--nonsense"), 2, "profilefit: No such option: --nonsense"),
-        (("regenerate", "--photons", "many"), 2, "profilefit: Invalid value for '--photons'"),
-        (("nonsense",), 2, "profilefit: No such command 'nonsense'"),
         (("--help",), 0, ""),
     ],
 )
@@ -155,10 +153,7 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
     ("change", "said"),
     [
         ('law = "liang"|law = "lang"', "law must be one of liang, rational, van_de_hulst, chiang, got 'lang'"),
-        ("count = 9|cuont = 9", "[albedos] keys must be of low, high, count, spacing, got 'cuont'"),
-        ("[weighting]|[weighting", "is not TOML"),
         ('objective = "albedo"|objective = "energy"', "must be one of albedo, reflectance, relative_reflectance, got"),
-        ('truth = "orders"|truth = "orders"\nstart = "old"', "start must be one of published, got 'old'"),
     ],
 )
 def test_a_bad_recipe_is_one_line_and_writes_nothing(refused, recipe, change, said):
@@ -171,14 +166,9 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(refused, recipe, change, sa
     ("words", "said"),
     [
         ("regenerate no-such-recipe", "recipe must be one of albedo-liang,"),
-        ("regenerate missing.toml", "missing.toml: there is no such recipe"),
-        ("regenerate albedo-liang --photons 0", "photons must be a whole number >= 1"),
-        ("regenerate albedo-liang --photons -5", "photons must be a whole number >= 1"),
         ("regenerate albedo-rational --photons 0", "photons must be a whole number >= 1, got 0"),
-        ("regenerate albedo-liang --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
         ("regenerate albedo-rational --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
         ("regenerate missing.toml --seed 4294967296", "seed must be a whole number in [0, 4294967295], got"),
-        ("report no-such-record", "there is no record 'no-such-record' in "),
         ("report --fits empty", "must be a folder of records, got 'empty', which is none"),
     ],
 )

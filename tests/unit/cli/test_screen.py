@@ -107,24 +107,11 @@ def test_claims_are_shown_as_they_were_measured_last(command, done, tmp_path):
     assert "claims.json" in err
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("pipe", "profilefit: cannot write pipe: it is a pipe that nobody reads from\n"),
-        ("folder", "profilefit: cannot write folder: it is a folder\n"),
-        ("loop", "profilefit: cannot write loop: Too many levels of symbolic links\n"),
-    ],
-)
-def test_what_cannot_be_written_is_one_line(refused, name, said):
+def test_what_cannot_be_written_is_one_line(refused):
+    """To read a pipe, whose tables were to be filled in, would wait for ever."""
     os.mkfifo("pipe")
-    Path("folder").mkdir()
-    Path("loop").symlink_to("loop")
-    assert refused(f"export burley --out {name}", "cannot write") == said
-
-
-def test_what_is_filled_in_place_must_be_a_file(refused):
-    """To read a pipe would wait for ever."""
-    os.mkfifo("pipe")
+    said = "profilefit: cannot write pipe: it is a pipe that nobody reads from\n"
+    assert refused("export burley --out pipe", said) == said
     said = "--markdown must be a file whose tables are filled in, got pipe, which is none"
     assert refused("report burley-whole --markdown pipe", said) == f"profilefit: {said}\n"
 

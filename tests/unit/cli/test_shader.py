@@ -21,7 +21,7 @@ from profilefit.scenes.sea import beam_share
 from profilefit.scenes.sea.scene import read
 from profilefit.shader.check.chosen import INDICES, scope
 from profilefit.shader.law_file import export
-from tests.fixtures import EXAMPLES, slow
+from tests.fixtures import EXAMPLES
 
 FITS = catalogue.fits_folder()
 
@@ -111,18 +111,9 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     assert "FAIL liang, published: float32" not in text  # the text itself is right
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("nothing", "name must be a law, map or record, got 'nothing'; laws: liang, "),
-        *slow(("hazzard", "did you mean hazard"), ("reproduction", "record 'reproduction' holds no law")),
-        ("hazard --constants nothing", "--constants must be one of regenerated"),
-        ("--constants nothing", "--constants must be regenerated or a printed set, got 'nothing'"),
-        ("hazard --precision float8", "float8"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(refused, words, said):
-    refused(f"check {words}", said)
+def test_bad_input_is_one_line_and_status_2(refused):
+    refused("check nothing", "name must be a law, map or record, got 'nothing'; laws: liang, ")
+    refused("check hazard --precision float8", "float8")
 
 
 @pytest.fixture
@@ -212,18 +203,8 @@ def test_a_folder_that_lacks_the_record_gives_no_other(refused):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("hazzard", "name must be a law, map or record, got 'hazzard'; did you mean hazard"),
-        ("gaussians:3", "--constants must be the path of a record (.json): "),
-        ("hazard --name gl_skin", "name must be letters, digits and single underscores"),
-        ("hazard --name skin --lang json", "name must be left out where lang is json"),
-        ("hazard --lang wgsl", "lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
-        ("hazard --constants old", "--constants must be one of regenerated, "),
-        ("hazard --out no/such/folder.glsl", "cannot write no/such/folder.glsl: No such file"),
-        ("hazard --constants x.json", "x.json: there is no such record"),
-        ("hazard --fits nowhere", "--fits must be a folder of records, got 'nowhere', which is none"),
         ("sea-segment --n 1.3", "--n must be left out where NAME is of light in water, got 'sea-segment'"),
         ("heart.toml", f"{EXAMPLES['heart.toml']}: scene must be sea, whose water has a text, got 'heart'"),
-        ("nope.toml", "nope.toml: expected a file that can be read, got: No such file or directory"),
         ("fur --n 1.3", "--n must be left out where NAME is of fur, got 'fur'"),
         ("fur --constants old", "--constants must be left out where NAME is of fur, got 'fur'"),
     ],

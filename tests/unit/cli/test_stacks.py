@@ -94,10 +94,6 @@ def test_a_name_of_its_own_and_files(command, mine):
     ("words", "said"),
     [
         ("--constants published", "--constants must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
-        ("--n 1.4", "--n must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
-        ("--lang json --name x", "name must be left out where lang is json, which has no functions"),
-        ("--lang cobol", "lang must be one of glsl, hlsl, glsl-es, python, json, got 'cobol'"),
-        ("--name 1st", "name must be letters, digits and single underscores"),
     ],
 )
 def test_what_a_stack_does_not_take_is_one_line(refused, mine, words, said):
