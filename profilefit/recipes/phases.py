@@ -30,7 +30,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.phase import Phase, Tabulated, as_table, from_table
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.schema import ERRORS
@@ -384,10 +384,7 @@ def _errors(
 
 
 def _jackknife(form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: Arrays, used: Mask) -> Floats:
-    """Return the standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2).
-
-    They are NaN where a refit fails.
-    """
+    """Return the standard errors of a grouped jackknife over rows; NaN where a refit fails."""
     cosine, level, weight, moments = arrays
     group = np.where(used, (np.cumsum(used) - 1) // TOGETHER % JACKKNIFE_GROUPS, -1)
     moved = []
@@ -397,5 +394,4 @@ def _jackknife(form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: A
         with jax.enable_x64(True):
             own = np.asarray(form.constants(jnp.asarray(again.parameters)))
         moved.append(own if again.converged else np.full(own.shape, np.nan))
-    apart = np.array(moved) - np.mean(moved, axis=0)
-    return np.sqrt((JACKKNIFE_GROUPS - 1) / JACKKNIFE_GROUPS * np.sum(apart**2, axis=0))
+    return jackknife_error(moved)
