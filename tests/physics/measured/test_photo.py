@@ -227,6 +227,16 @@ def made(*cards) -> tuple[Shot, np.ndarray]:
     return setup.noiseless(SETTING, 1.0, 0.05, rings.edges_of(20.0, 0.1), cards, Beliefs(beam=BEAM))
 
 
+def photographed(radii, light, camera, rng, colour, size):
+    """Rings of one colour in photographs of the light, and of a white and a grey card."""
+    card = simulated.card(OPTICS, radii)
+    spot, white, grey = (
+        workflow.bracketed(bench.exposures(radii, one, camera, rng), size) for one in (light, 0.9 * card, 0.18 * card)
+    )
+    cards = tuple(workflow.carded(one, colour, size, known, spot) for one, known in ((white, None), (grey, GREY)))
+    return Shot(workflow.ringed(spot, colour, size), cards, exact_light(SETTING), Beliefs(beam=BEAM))
+
+
 BEAM = Known(0.5, 0.05)
 GREY = Known(0.18, 0.005)
 
@@ -298,14 +308,8 @@ def test_a_beam_of_two_pixels_gives_its_medium():
     """Red pixels, of which few lie in the beam: the middle ring counts, and the search starts near the truth."""
     camera, rng = SpotCamera(sides=(300, 225), pitch=0.25), np.random.default_rng(4)
     radii, size = simulated.radii(60.0, OPTICS), PixelScale(np.diag([0.25, 0.25, 1.0]), "known")
-    alpha, length = 1.2 / 1.22, 1.0 / 1.22
-    card = simulated.card(OPTICS, radii)
-    spot, white, grey = (
-        workflow.bracketed(bench.exposures(radii, light, camera, rng), size)
-        for light in (simulated.light(alpha, length, SETTING, OPTICS, radii), 0.9 * card, 0.18 * card)
-    )
-    cards = tuple(workflow.carded(one, "red", size, known, spot) for one, known in ((white, None), (grey, GREY)))
-    fit = medium.fitted(Shot(workflow.ringed(spot, "red", size), cards, exact_light(SETTING), Beliefs(beam=BEAM)))
+    light = simulated.light(1.2 / 1.22, 1.0 / 1.22, SETTING, OPTICS, radii)
+    fit = medium.fitted(photographed(radii, light, camera, rng, "red", size))
     for name, truth in (("mu_s'", 1.2), ("mu_a", 0.02)):
         assert fit.errors[name] < 0.15 * fit.values[name]
         assert abs(np.log(fit.values[name] / truth)) < 3.0 * fit.errors[name] / fit.values[name]
@@ -346,11 +350,7 @@ def test_photons_that_a_camera_sees_give_their_medium():
     """Light that no table knows: traced, of a medium whose g is the fit's, photographed with cards."""
     radii = simulated.radii(bench.FARTHEST, OPTICS)
     traced = simulated.light(ALPHA, LENGTH, SETTING, OPTICS, radii, photons=2**23, seed=7)
-    card, rng = simulated.card(OPTICS, radii), np.random.default_rng(5)
-    seen, white, grey = (workflow.bracketed(bench.exposures(radii, light, CAMERA, rng), SQUARE)
-                         for light in (traced, 0.9 * card, 0.18 * card))  # fmt: skip
-    cards = tuple(workflow.carded(one, "green", SQUARE, known, seen) for one, known in ((white, None), (grey, GREY)))
-    shot = Shot(workflow.ringed(seen, "green", SQUARE), cards, exact_light(SETTING), Beliefs(beam=BEAM))
+    shot = photographed(radii, traced, CAMERA, np.random.default_rng(5), "green", SQUARE)
     fit = medium.fitted(shot)
     for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
         assert fit.errors[name] < 0.06 * fit.values[name]

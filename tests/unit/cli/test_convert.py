@@ -137,10 +137,7 @@ def test_the_light_of_a_colour_matters(table):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (
-            "--mfp 1",
-            "colour must be one of --alpha, --reflectance with --illumination, or --mu-a with --mu-s, got none",
-        ),
+        ("--n 1", "colour must be one of --alpha, --reflectance with --illumination, or --mu-a with --mu-s, got none"),
         ("--alpha .5 --reflectance .5 --mfp 1", "got --alpha and --reflectance"),
         ("--mu-a 1", "got --mu-a"),
         ("--alpha .5", "length must be one, such as --mfp 1.2mm, got none"),

@@ -55,19 +55,11 @@ def test_a_mistake_is_no_json(refused):
     assert refused("report hazzard --json", said) == said + rest
 
 
-@pytest.mark.parametrize(
-    ("name", "near"),
-    [
-        ("liang", "liang-whole, liang-as-published, liang-inverse-whole? "),
-        ("skim", "skimmilk-on-marble, skimmilk-on-potato? "),
-        ("hearts", "heart? "),
-        ("zzz", None),
-    ],
-)
-def test_an_unknown_record_names_the_nearest(command, name, near):
-    _, _, err = command("report", name)
-    assert (f"did you mean {near}" in err) if near else ("did you mean" not in err)
-    assert err.count("\n") == 1
+def test_an_unknown_record_names_the_nearest(refused):
+    liang = "liang-whole, liang-as-published, liang-inverse-whole? "
+    for name, near in {"liang": liang, "skim": "skimmilk-on-marble, skimmilk-on-potato? ", "hearts": "heart? "}.items():
+        refused(f"report {name}", f"did you mean {near}")
+    assert "did you mean" not in refused("report zzz", "")
 
 
 @pytest.mark.parametrize("width", [40, 80, *(pytest.param(one, marks=pytest.mark.slow) for one in (60, 100, 120))])

@@ -181,8 +181,6 @@ def test_records_that_are_not_the_shipped_ones_are_named(command):
         shutil.copy(FITS / f"{name}.json", "fits")
     said = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
     assert command("export", "hazard") == (0, shipped, said)
-    assert command("export", "hazard", "--fits", "fits") == (0, shipped, "profilefit: records of 'fits'\n")
-    assert command("export", "hazard", "--fits", str(FITS)) == (0, shipped, "")
     (Path("fits") / "albedo-rational.json").unlink()
     status, out, err = command("export", "hazard")
     assert (status, "// map: this record came with profilefit" in out) == (0, True)

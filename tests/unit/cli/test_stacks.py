@@ -90,14 +90,9 @@ def test_a_name_of_its_own_and_files(command, mine):
     assert "float my_heart_profile(" in command("export", "mine/stacks/my-heart.json")[1]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--constants published", "--constants must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
-    ],
-)
-def test_what_a_stack_does_not_take_is_one_line(refused, mine, words, said):
-    refused(f"export mine/stacks/heart.json {words}", said)
+def test_what_a_stack_does_not_take_is_one_line(refused, mine):
+    said = "--constants must be left out where NAME is a stack, got 'mine/stacks/heart.json'"
+    refused("export mine/stacks/heart.json --constants published", said)
 
 
 def test_a_mistake_in_the_file_is_one_line_and_writes_nothing(refused, heart):

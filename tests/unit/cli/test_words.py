@@ -207,7 +207,6 @@ print("LOADED", [name for name in {HEAVY!r} if name in sys.modules])
         ("held alpha must be in (0, 1)", "--fix alpha must be in (0, 1)"),
         ("x.csv: no row is left between `r_min` and `r_max`", "x.csv: no row is left between --r-min and --r-max"),
         ("x.csv:1: column r: out must be", "x.csv:1: column r: out must be"),
-        ("constants of a record are its own", "constants of a record are its own"),
         (
             "lang must be glsl; `profilefit report` lists `names`",
             "lang must be glsl; `profilefit report` lists `names`",

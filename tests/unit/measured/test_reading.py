@@ -355,11 +355,7 @@ def test_light_that_no_run_gives_is_one_line(tmp_path):
     for name, changed_text, message in (
         ("few", text.replace("2097152 \t", "50 \t"), r"expected at least 3 annuli .*, got \d\d in"),
         ("bright", head + mark + rest.replace(rest.split("\n")[1], "1E+20", 1), TOO_MUCH),
-        (
-            "mirror",
-            re.sub(r"0\s*\t#Specular", "1 \t#Specular", text),
-            "expected a specular reflectance below 1, got 1$",
-        ),
+        ("mirror", re.sub(r"0\s*\t#Spec", "1 \t#Spec", text), "expected a specular reflectance below 1, got 1$"),
     ):
         (tmp_path / f"{name}.mco").write_text(changed_text)
         with pytest.raises(InputError, match=f"{name}.mco: {message}"):
