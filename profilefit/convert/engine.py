@@ -101,10 +101,6 @@ def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
     return np.minimum(np.asarray(law.reflectance(alpha)) / law.entered, 1.0)
 
 
-def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
-    return UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
-
-
 # Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface, "entered" is
 # A under a pencil beam and the medium's surface, per light that entered.
 COLOURS: dict[str, Colour] = {
@@ -131,7 +127,9 @@ FACTORS: dict[str, Factor] = {
     "HDRP's radius": lambda alpha, g: HDRP_REACH * falloff_diffuse(alpha, g),
     "HDRP's walk": lambda alpha, g: 1.0 / scale_diffuse(mapped_colour("Chiang", alpha)),
     "Unreal's": lambda alpha, g: UNREAL_MAGIC * transport(alpha, g),
-    "Unreal's before 5.1": _unreal_dmfp,
+    "Unreal's before 5.1": lambda alpha, g: (
+        UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
+    ),
     "appleseed's walk of 2017": lambda alpha, g: 1.0 / scale_searchlight(mapped_colour("Chiang", alpha)),
 }
 # A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half

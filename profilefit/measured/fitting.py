@@ -204,7 +204,7 @@ class MediumFit:
         All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
         Derivatives are by the free coordinates and, where `values` of them are given, by the spec's ranges.
         """
-        own, count = self.problem.noise.of_data, self.minimum.residuals.size
+        own, count = replace(self.problem.noise, model=None, lack=None), self.minimum.residuals.size
         times = np.ones(count)
         times[: self.data.value.size] = np.sqrt(self.widening)
         problem = replace(self.problem, noise=own)

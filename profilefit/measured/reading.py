@@ -38,9 +38,11 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.checks import shown
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 from profilefit.measured.data import (
     FEWEST,
     UNITS,
@@ -49,7 +51,6 @@ from profilefit.measured.data import (
     Measured,
     ModeratedVariance,
     area_unit,
-    checked_unit,
     factor,
     moderated_variances,
 )
@@ -92,7 +93,6 @@ SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are fl
 LONGEST_SHOWN = 40  # characters of a cell in a message
 TLS_BYTES = 2**24  # of a TLS850's file
 HEAD_BYTES = 4096  # hold its first line of words
-COLOURS = ("red", "green", "blue")
 LENGTH = 20.0  # mm
 AVERAGED = 4  # pixels
 CELLS = re.compile(r"[\s,;]+")
@@ -380,7 +380,9 @@ def _length_unit(table: _Table, unit: str | None) -> str:
     units = written | ({unit} if unit else set())
     if len({UNITS.get(one) for one in units}) > 1:
         raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
-    return written.pop() if written else checked_unit("unit", unit) if unit else ""
+    if unit and unit not in UNITS:
+        raise InputError(f"unit must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
+    return next(iter(written), unit or "")
 
 
 def _require_one_measure(table: _Table) -> None:
@@ -415,13 +417,13 @@ def _shown(cell: str) -> str:
 
 def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
     """Read the records of one colour from a file's first TLS_BYTES + 1; InputError names the line of what is wrong."""
-    if colour not in COLOURS:
-        raise InputError(f"{path}: `colour` must be one of {', '.join(COLOURS)}, got {colour!r}")
+    if colour not in CHANNELS:
+        raise InputError(f"{path}: `colour` must be one of {', '.join(CHANNELS)}, got {colour!r}")
     if not scaled:
         raise InputError(f"{path}: expected `scaled`, since the instrument's values are in a measure of its own")
     if len(content) > TLS_BYTES:
         raise InputError(f"{path}: expected records of at most {TLS_BYTES} bytes, got a longer file")
-    samples = _records(path, content.decode("utf-8", "replace"))[COLOURS.index(colour) :: len(COLOURS)]
+    samples = _records(path, content.decode("utf-8", "replace"))[CHANNELS.index(colour) :: len(CHANNELS)]
     if len(samples) < FEWEST:
         raise InputError(f"{path}: expected {FEWEST} records of a colour or more, got {len(samples)}")
     r = np.linspace(0.0, LENGTH, samples.shape[1])

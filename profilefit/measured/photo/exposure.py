@@ -32,12 +32,13 @@ from scipy.ndimage import binary_dilation, uniform_filter
 
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 
 Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
 MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
-COLOURS, GREY = ("red", "green", "blue"), "grey"
+GREY = "grey"
 PLATEAU, BELOW = 12, 0.98  # pixels that share the largest value where it clips, of it, others just below
 FEW, FAINT = 1000.0, 0.2  # steps, and share of the brightest plane: less is not white
 STEPS, BEYOND = 65535.0, 1.2  # of sixteen bits, which floats become; over the largest of them, if that is not white
@@ -174,7 +175,7 @@ def _plain(path: Path, kind: str) -> Exposure:
         raise InputError(
             f"{path}: expected linear values, 16 bits or floats each, got {values.dtype} of an unknown curve"
         )
-    names = COLOURS if values.shape[2] == 3 else (GREY,)
+    names = CHANNELS if values.shape[2] == 3 else (GREY,)
     most = 255.0 if kind in JPEG else STEPS if kind in TIFF and values.dtype == np.uint16 else None
     brightest = float(counts.max())
     planes = tuple(

@@ -21,12 +21,13 @@ from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
-from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, SpotCamera, SpotOptics
+from profilefit.measured.photo.simulated import SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
 from profilefit.recipes.declared import LISTED, Declared, Misplaced, Refused, Share, Tolerance, words
 
@@ -252,24 +253,24 @@ def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
     surface, glare and lens what `Beliefs` have. Exposures and noise are not in it.
     """
-    grey = setup.cards.grey or 0.18
+    sides, pixel, beam, grey = (
+        setup.camera.sides,
+        setup.camera.pitch,
+        2.0 * setup.optics.sigma,
+        setup.cards.grey or 0.18,
+    )
+    edges = edges_of(0.5 * min(sides) * pixel, 2.0 * pixel)
+    beliefs = Beliefs(beam=Known(beam, BEAM_ERROR * beam)).over(sides, pixel, float(edges[-1]))
     known = Known(grey, GREY_ERROR * grey)
     of: dict[str, tuple[Known | None, ...]]
     of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
     return {
         label: {
-            colour: _bounds(setup, mu_s, mu_a, cards)
+            colour: medium.fisher(*noiseless(setup.medium.setting, mu_s, mu_a, edges, cards, beliefs))
             for colour, mu_s, mu_a in zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)
         }
         for label, cards in of.items()
     }
-
-
-def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
-    pixel, core = setup.camera.pitch, setup.optics.sigma
-    edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
-    beliefs = Beliefs(beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core)).over(setup.camera.sides, pixel, float(edges[-1]))
-    return dict(medium.fisher(*noiseless(setup.medium.setting, mu_s, mu_a, edges, cards, beliefs)))
 
 
 def noiseless(

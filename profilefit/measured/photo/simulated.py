@@ -33,7 +33,6 @@ from profilefit.measured.instrument import between
 from profilefit.measured.model import exact_light
 
 Counts = NDArray[np.uint16]
-CHANNELS = ("red", "green", "blue")
 PATTERN = (("red", "green"), ("green", "blue"))  # of a Bayer sensor's first two rows
 PANELS, ORDER = 260, 10  # of the quadratures, which have more where J_0 turns by more than TURN in a panel [rad]
 TURN, MOST_VALUES = 16.0, 4e8  # and the most values of J_0: ten seconds

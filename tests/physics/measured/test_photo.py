@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from benchmarks import photo as bench
 from profilefit.errors import InputError
 from profilefit.fitting.solver import CONVERGED, Solution, lowest
+from profilefit.materials import CHANNELS
 from profilefit.measured import model
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import exposure as bracket
@@ -38,7 +39,7 @@ def light():
 
 
 def taken(light, times, seed, camera=CAMERA, electrons=1.0):
-    return simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), camera, electrons, times, seed)
+    return simulated.exposures_of(dict.fromkeys(CHANNELS, light), camera, electrons, times, seed)
 
 
 def late(brightest, phase=0.0, camera=CAMERA):
