@@ -253,12 +253,8 @@ def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
     surface, glare and lens what `Beliefs` have. Exposures and noise are not in it.
     """
-    sides, pixel, beam, grey = (
-        setup.camera.sides,
-        setup.camera.pitch,
-        2.0 * setup.optics.sigma,
-        setup.cards.grey or 0.18,
-    )
+    sides, pixel = setup.camera.sides, setup.camera.pitch
+    beam, grey = 2.0 * setup.optics.sigma, setup.cards.grey or 0.18
     edges = edges_of(0.5 * min(sides) * pixel, 2.0 * pixel)
     beliefs = Beliefs(beam=Known(beam, BEAM_ERROR * beam)).over(sides, pixel, float(edges[-1]))
     known = Known(grey, GREY_ERROR * grey)
