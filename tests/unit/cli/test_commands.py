@@ -172,18 +172,79 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(refused, recipe, change, sa
     assert not list(Path("out").glob("**/*.*")) if Path("out").exists() else True
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("regenerate no-such-recipe", "recipe must be one of albedo-liang,"),
-        ("regenerate albedo-rational --photons 0", "photons must be a whole number >= 1, got 0"),
-        ("regenerate albedo-rational --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
-        ("regenerate missing.toml --seed 4294967296", "seed must be a whole number in [0, 4294967295], got"),
-        ("report --fits empty", "must be a folder of records, got 'empty', which is none"),
+MISTAKES = {
+    "regenerate": [
+        ("no-such-recipe", "recipe must be one of albedo-liang,"),
+        ("albedo-rational --photons 0", "photons must be a whole number >= 1, got 0"),
+        ("albedo-rational --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
+        ("missing.toml --seed 4294967296", "seed must be a whole number in [0, 4294967295], got"),
     ],
-)
-def test_bad_words_are_one_line(refused, words, said):
-    refused(words, said)
+    "report": [("--fits empty", "must be a folder of records, got 'empty', which is none")],
+    "check": [
+        ("nothing", "name must be a law, map or record, got 'nothing'; laws: liang, "),
+        ("hazard --precision float8", "float8"),
+    ],
+    "stability": [("hazzard", "name must be a law, map or record"), ("--out", "requires an argument")],
+    "export": [
+        ("sea-segment --n 1.3", "profilefit: --n must be left out where NAME is of light in water, got 'sea-segment'"),
+        ("heart.toml", f"profilefit: {EXAMPLES['heart.toml']}: scene must be sea, whose water has a text, got 'heart'"),
+        ("fur --n 1.3", "profilefit: --n must be left out where NAME is of fur, got 'fur'"),
+        ("fur --constants old", "profilefit: --constants must be left out where NAME is of fur, got 'fur'"),
+    ],
+    "convert": [
+        ("--n 1", "colour must be one of --alpha, --reflectance with --illumination, or --mu-a with --mu-s, got none"),
+        ("--alpha .5 --reflectance .5 --mfp 1", "got --alpha and --reflectance"),
+        ("--mu-a 1", "got --mu-a"),
+        ("--alpha .5", "length must be one, such as --mfp 1.2mm, got none"),
+        ("--alpha .5 --mfp 1 --falloff 2", "got --mfp and --falloff"),
+        ("--mu-a 1 --mu-s 1 --mfp 1", "length must be left out, as --mu-a and --mu-s have one, got --mfp"),
+        ("--reflectance .5 --mfp 1", "--illumination must be one of searchlight, diffuse with --reflectance, got none"),
+        ("--alpha .5 --mfp 1 --illumination sun", "--illumination must be one of searchlight, diffuse, got 'sun'"),
+        ("--alpha .5 --mfp one", "--mfp must be numbers, with a unit of um,"),
+        ("--alpha .5 --mfp 1mm,2cm", "--mfp must have one unit, got cm, mm"),
+        ("--alpha .5mm --mfp 1", "--alpha must be numbers, between commas, got '.5mm'"),
+        ("--alpha .5,97.1 --mfp 1", "--alpha must be numbers in [0, 1], between commas, got '97.1' (a share: 0.971"),
+        (f"--alpha .5 --mfp {'9' * 5000}mm", f"--mfp must be numbers that floating point holds, got '{'9' * 59}..."),
+        ("--mu-a 1/mm --mu-s 1/cm", "--mu-a and --mu-s must have one unit, got /mm and /cm"),
+        ("--mu-a 1mm --mu-s 1mm", "--mu-a must be numbers, with a unit of /um,"),
+    ],
+    "fit": [
+        ("nothing.csv", "nothing.csv: expected a file that can be read, got: No such file"),
+        ("phantom.csv --law hazard --n 1.7",
+         "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these"),
+        ("phantom.csv --g 0.9", "got searchlight, n = 1, g = 0.9: simulate it instead"),
+        ("phantom.csv --n 1.4 --g 0.95:0.7", "--g must be a mean cosine in (-1, 1), or a range such as"),
+        ("two_layers.mco --free d1", "--free must be left out where there are no --layers"),
+        ("two_layers.mco --layers two_layers.toml", "--free must name quantities such as d1, mu_a2 or mu_s2, got ''"),
+        ("two_layers.mco --layers two_layers.toml --free d1 --g 0.9", "--g must be left out where --layers say what"),
+        ("two_layers.mco --layers two_layers.toml --free d1 --beam 1mm:2mm",
+         "--beam must be one width where layers are"),
+        ("two_layers.mco --layers none.toml --free d1", "none.toml: expected a file that can be read"),
+        ("two_layers.mco --layers skin.toml --free d1", "g = 0"),
+        ("phantom.csv --beam 0.7mm:0.3mm", "--beam must have a range that rises, such as 0.3mm:0.7mm"),
+        (f"phantom.csv --fix A={'9' * 5000}", f"--fix A must be a number, got '{'9' * 59}..."),
+        ("phantom.csv --total 53.4%+-1%", "such as 0.52+-0.01, got '53.4%+-1%' (a share: 0.534 for 53.4 %)"),
+        ("phantom.csv --fix alpha=97", "--fix alpha must be a number in (0, 1), got '97' (a share: 0.97 for 97 %)"),
+        ("half_space.mco --fibre 2mm", "--fibre must be left out where rows are averages"),
+        ("two_layers.mco --light diffuse", "--light must be searchlight for"),
+        ("phantom.csv --fix l", "--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got 'l'"),
+        ("phantom.csv --fix A=.5 --fix alpha=.9", "--fix must hold each of l and alpha (or A) once"),
+        ("phantom.csv --scale -1", "--scale must be a number > 0, free, or a number with its error"),
+        ("phantom.csv --scale 1e300", "--scale must lie between 1e-40 and 1e+40, got '1e300'"),
+        ("phantom.csv --scale 1+-0", "--scale must be a number > 0, free, or a number with its error"),
+        ("phantom.csv --total 0.5", "--total must be a reflectance in (0, 1) with its error"),
+        ("phantom.csv --oblique 45:4mm:0.5mm", "--oblique must be an angle in degrees, a radius and a shift with its"),
+        ("phantom.csv --oblique 95:4mm:0.5mm+-.1mm", "--oblique's angle must lie between 0 and 90 degrees, got '95'"),
+        ("phantom.csv --oblique 45:4ly:0.5mm+-.1mm", "--oblique's radius must be a length > 0 such as 1.2mm"),
+        ("phantom.csv --seed -1", "--seed must be a whole number >= 0, got -1"),
+        ("phantom.csv --out /proc/nowhere", "cannot write into /proc/nowhere"),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "words", "said"), [(one, *row) for one, rows in MISTAKES.items() for row in rows])
+def test_bad_words_are_one_line(refused, name, words, said):
+    refused(f"{name} {words}", said)
     assert not list(Path().iterdir()), "refused before anything is made"
 
 

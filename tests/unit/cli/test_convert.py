@@ -132,27 +132,3 @@ def test_the_light_of_a_colour_matters(table):
     found = [table(*words, light)["alpha"][0] for light in ("searchlight", "diffuse")]
     np.testing.assert_allclose(found, [alpha_of(0.5, "searchlight"), alpha_of(0.5, "diffuse")], rtol=1e-14)
     assert found[0] - found[1] > 0.02
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--n 1", "colour must be one of --alpha, --reflectance with --illumination, or --mu-a with --mu-s, got none"),
-        ("--alpha .5 --reflectance .5 --mfp 1", "got --alpha and --reflectance"),
-        ("--mu-a 1", "got --mu-a"),
-        ("--alpha .5", "length must be one, such as --mfp 1.2mm, got none"),
-        ("--alpha .5 --mfp 1 --falloff 2", "got --mfp and --falloff"),
-        ("--mu-a 1 --mu-s 1 --mfp 1", "length must be left out, as --mu-a and --mu-s have one, got --mfp"),
-        ("--reflectance .5 --mfp 1", "--illumination must be one of searchlight, diffuse with --reflectance, got none"),
-        ("--alpha .5 --mfp 1 --illumination sun", "--illumination must be one of searchlight, diffuse, got 'sun'"),
-        ("--alpha .5 --mfp one", "--mfp must be numbers, with a unit of um,"),
-        ("--alpha .5 --mfp 1mm,2cm", "--mfp must have one unit, got cm, mm"),
-        ("--alpha .5mm --mfp 1", "--alpha must be numbers, between commas, got '.5mm'"),
-        ("--alpha .5,97.1 --mfp 1", "--alpha must be numbers in [0, 1], between commas, got '97.1' (a share: 0.971"),
-        (f"--alpha .5 --mfp {'9' * 5000}mm", f"--mfp must be numbers that floating point holds, got '{'9' * 59}..."),
-        ("--mu-a 1/mm --mu-s 1/cm", "--mu-a and --mu-s must have one unit, got /mm and /cm"),
-        ("--mu-a 1mm --mu-s 1mm", "--mu-a must be numbers, with a unit of /um,"),
-    ],
-)
-def test_bad_words_are_one_line(refused, words, said):
-    refused(words, said)

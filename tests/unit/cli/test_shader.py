@@ -111,11 +111,6 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     assert "FAIL liang, published: float32" not in text  # the text itself is right
 
 
-def test_bad_input_is_one_line_and_status_2(refused):
-    refused("check nothing", "name must be a law, map or record, got 'nothing'; laws: liang, ")
-    refused("check hazard --precision float8", "float8")
-
-
 @pytest.fixture
 def blind(tmp_path):
     """Run `profilefit WORDS` in a process of its own, which finds no driver."""
@@ -196,20 +191,6 @@ def test_a_folder_that_lacks_the_record_gives_no_other(refused):
             assert "mine/" in refused(("export", name, *more, "--fits", "mine"), said)
     Path("mine/burley.csv").write_text("r, value, sigma\n1,1,1\n2,.5,.1\n3,.1,.1\n")
     refused("fit mine/burley.csv --unit mm --law hazard --fits mine", "mine/hazard.json: there is no such record")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("sea-segment --n 1.3", "--n must be left out where NAME is of light in water, got 'sea-segment'"),
-        ("heart.toml", f"{EXAMPLES['heart.toml']}: scene must be sea, whose water has a text, got 'heart'"),
-        ("fur --n 1.3", "--n must be left out where NAME is of fur, got 'fur'"),
-        ("fur --constants old", "--constants must be left out where NAME is of fur, got 'fur'"),
-    ],
-)
-def test_bad_input_is_one_line_and_writes_nothing(refused, tmp_path, words, said):
-    assert refused(f"export {words}", said).startswith(f"profilefit: {said}")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_light_in_water_and_cones_of_fur(command):
