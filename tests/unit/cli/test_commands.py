@@ -145,10 +145,7 @@ def test_control_c_is_one_line_and_keeps_the_batches(recipe, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "status", "said"),
-    [
-        (("regenerate", "--nonsense"), 2, "profilefit: No such option: --nonsense"),
-        (("--help",), 0, ""),
-    ],
+    [(("regenerate", "--nonsense"), 2, "profilefit: No such option: --nonsense"), (("--help",), 0, "")],
 )
 def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp_path):
     run = subprocess.run(

@@ -15,15 +15,7 @@ import pytest
 
 from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.data import (
-    MOST_ROWS,
-    UNITS,
-    Measured,
-    area_unit,
-    factor,
-    length,
-    require_workable,
-)
+from profilefit.measured.data import MOST_ROWS, UNITS, Measured, area_unit, factor, length, require_workable
 from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
 
 HEAD = "r,value1,value2,value3\n"
