@@ -36,10 +36,10 @@ def test_a_phantom_is_told_in_100_columns_with_figures_and_json(done):
 
 
 @pytest.mark.slow
-def test_a_law_in_place_of_exact_light_brings_its_own_error(command, done):
-    out = done("fit", PHANTOM, "--law", "hazard")
+def test_a_law_in_place_of_exact_light_brings_its_own_error(done):
+    out = done("fit", PHANTOM, "--law", "hazard", "--out", "out", said=None)
     assert out.startswith("phantom.csv: 20 points, law hazard, searchlight")
-    found = json.loads(command("fit", PHANTOM, "--law", "hazard", "--json")[1])
+    found = json.loads(Path("out/fit.json").read_text())
     assert found["law"]["record"] == "hazard.json"
     assert len(found["law"]["record_sha256"]) == 64
     length = found["quantities"]["l"]
@@ -53,7 +53,7 @@ def half(ends):
 
 
 @pytest.mark.slow
-def test_errors_from_three_replicates_are_said_to_be_estimates(command, done):
+def test_errors_from_three_replicates_are_said_to_be_estimates(done):
     """Table, JSON and chain have one and the same width: Student's of the trend's freedom, and Meier's factor."""
     rows = [line.split(",") for line in Path(PHANTOM).read_text().splitlines()[2:]]
     text = "r [mm],value1,value2,value3\n"
@@ -61,8 +61,8 @@ def test_errors_from_three_replicates_are_said_to_be_estimates(command, done):
         noisy = (f"{float(value) * (1 + 0.03 * math.sin(7 * at + 2 * k)):.6g}" for k in range(3))
         text += ",".join((r, *noisy)) + "\n"
     Path("three.csv").write_text(text)
-    out = done("fit", "three.csv")
-    found = json.loads(command("fit", "three.csv", "--json")[1])
+    out = done("fit", "three.csv", "--out", "out", said=None)
+    found = json.loads(Path("out/fit.json").read_text())
     assert found["data"]["pooled_freedom"] == pytest.approx(0.61 * 2 * 18, rel=0.01)
     assert max(found["data"]["freedom"]) <= found["data"]["pooled_freedom"] + 2
     assert found["widening"] > 1.1
