@@ -29,7 +29,7 @@ from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
 from profilefit.measured.photo.simulated import SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.recipes.declared import LISTED, Declared, Misplaced, Refused, Share, Tolerance, words
+from profilefit.recipes.declared import LISTED, Declared, Refused, Share, Tolerance, at, words
 
 MAX_BYTES, LEAST_SIDE, MOST_SIDE = 1 << 16, 50, 12_000
 OURS, HEAD = b"profilefit", 4096  # in the first bytes of each file
@@ -155,10 +155,8 @@ class Setup(Declared):
     @model_validator(mode="after")
     def _resolved(self) -> Self:
         longest = 1.0 / min(map(sum, zip(self.medium.mu_s, self.medium.mu_a, strict=True)))
-        try:
+        with at("medium"):
             simulated.require_resolved(longest, self.optics, _far(self.camera))
-        except InputError as error:
-            raise Misplaced(error, "medium") from None
         return self
 
 
@@ -176,12 +174,10 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
-    for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)):
+    for number, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)):
         medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.medium.setting, setup.optics, radii
-        spot[colour] = (
-            radii,
-            simulated.light(*medium, setup.medium.photons, len(CHANNELS) * setup.camera_table.seed + at),
-        )
+        seed = len(CHANNELS) * setup.camera_table.seed + number
+        spot[colour] = radii, simulated.light(*medium, setup.medium.photons, seed)
     card = simulated.card(setup.optics, radii)
     shown = {name: dict.fromkeys(CHANNELS, (radii, share * card)) for name, share in setup.cards.shown.items()}
     scenes = {"spot": spot} | shown
@@ -213,8 +209,8 @@ def written(setup: Setup, out: Path) -> list[Path]:
             raise InputError(f"{file}: expected no photograph of that name, or one that was simulated, got another")
     files = []
     for name, bracket in brackets(setup).items():
-        for at, one in enumerate(bracket, start=1):
-            files.append(out / f"{name}-{at}.dng")
+        for number, one in enumerate(bracket, start=1):
+            files.append(out / f"{name}-{number}.dng")
             write_whole(files[-1], as_dng(one))
     return files
 
