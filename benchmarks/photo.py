@@ -154,7 +154,7 @@ def exposures(
 
 def as_read(one: simulated.SimulatedExposure, source: str) -> Exposure:
     """Return a bracket as a raw file of it would be read."""
-    return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
+    return of_sensor(source, one.counts, simulated.PATTERN, [[one.black] * 2] * 2, one.white, one.seconds)
 
 
 def outcome(cards: bool, shaped: bool, at: int) -> Outcome:

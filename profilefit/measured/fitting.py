@@ -152,12 +152,6 @@ class MediumFit:
         """Covariance (m, m) of the rows, in standard errors, from the lack of fit; zero where none is allowed for."""
         return self.problem.noise.in_errors(self.problem.noise.lack, self.minimum.residuals.size)
 
-    @property
-    def law_size(self) -> Floats:
-        """Standard deviation (n,) of the law's own error in the light of each row; zero if that is unknown."""
-        model = self.problem.noise.model
-        return np.zeros(self.data.value.size) if model is None else np.sqrt(np.diag(model))
-
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
         """True (n,) for rows farther out than the radii that `rel` covers."""

@@ -27,7 +27,7 @@ from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
-from profilefit.measured.photo.simulated import SimulatedExposure, SpotCamera, SpotOptics
+from profilefit.measured.photo.simulated import PATTERN, SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
 from profilefit.recipes.declared import LISTED, Declared, Refused, Share, Tolerance, at, words
 
@@ -223,7 +223,7 @@ def room(setup: Setup) -> float:
 def as_dng(exposure: SimulatedExposure) -> bytes:
     """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
-    codes = tuple(CFA[colour] for row in exposure.pattern for colour in row)
+    codes = tuple(CFA[colour] for row in PATTERN for colour in row)
     below = 10 ** int(np.clip(9 - np.ceil(np.log10(max(exposure.seconds, 1e-9))), 0, 9))  # of the ratio of seconds
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
     tags: list[tuple[int, str, int, Any, bool]] = [

@@ -12,7 +12,7 @@ Halos are Moffat's, h = (b - 1) / (pi a^2) (1 + r^2 / a^2)^-b, whose transform i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import jax
@@ -109,7 +109,6 @@ class SimulatedExposure:
     seconds: float
     black: int
     white: int
-    pattern: tuple[tuple[str, str], tuple[str, str]] = field(default=PATTERN)
 
 
 def light(
