@@ -171,6 +171,7 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(refused, recipe, change, sa
 
 MISTAKES = {
     "regenerate": [
+        ("--photons many", "profilefit: Invalid value for '--photons'"),
         ("no-such-recipe", "recipe must be one of albedo-liang,"),
         ("albedo-rational --photons 0", "photons must be a whole number >= 1, got 0"),
         ("albedo-rational --seed -1", "seed must be a whole number in [0, 4294967295], got -1"),
