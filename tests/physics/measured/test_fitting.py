@@ -368,15 +368,11 @@ POINT = np.array([u_of(0.9), np.log(1.3), np.log(0.7)])
 R = np.geomspace(0.05, 9.0, BLOCK + 3)  # more than one block
 
 
-def test_points_are_the_laws_own():
-    light, _ = Model(LAW).linearised(POINT, R, R)
-    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
-    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
-
-
-def test_derivatives_and_flocks_agree_with_single_evaluations():
+def test_points_are_the_laws_own_and_derivatives_and_flocks_agree_with_them():
     model, step = Model(LAW), 1e-5
     light, slopes = model.linearised(POINT, R, R)
+    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
+    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
     ways = np.concatenate([POINT + step * np.eye(3), POINT - step * np.eye(3)])
     moved = model.predicted(ways, R, R)
     # Central differences: their own error is step^2 times a third derivative, and rounding over the step.

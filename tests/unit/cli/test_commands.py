@@ -318,13 +318,10 @@ def test_json_of_quality_is_measured(done):
     assert (told["quality"]["profiles"], told["quality"]["samplers"]) == ([], [])
 
 
-def test_a_mistake_is_no_json(refused):
+def test_an_unknown_record_names_the_nearest_and_is_no_json(refused):
     said = f"profilefit: there is no record 'hazzard' in {FITS}; did you mean hazard? stacks are "
     rest = f"{', '.join(record.available(FITS / 'stacks'))}, and `profilefit report` lists records\n"
     assert refused("report hazzard --json", said) == said + rest
-
-
-def test_an_unknown_record_names_the_nearest(refused):
     liang = "liang-whole, liang-as-published, liang-inverse-whole? "
     for name, near in {"liang": liang, "skim": "skimmilk-on-marble, skimmilk-on-potato? ", "hearts": "heart? "}.items():
         refused(f"report {name}", f"did you mean {near}")

@@ -45,11 +45,8 @@ def test_sources_of_every_row(command):
         assert f"typed: {engine.formula}" in text
         assert f"source: {engine.source} checked: {engine.checked}" in text
     assert "Mean Free Path Color x Mean Free Path Distance; World Unit Scale = 0.1" in text
-
-
-def test_what_every_channel_has_is_not_explained_away(command):
-    _, out, _ = command("--alpha", "0.5", "--mfp", "1")
-    assert "none" not in out
+    out = command("--alpha", "0.5", "--mfp", "1")[1]
+    assert "none" not in out, "what every channel has is not explained away"
     assert "1/length" in out
     assert "No unit was given" in out
 
