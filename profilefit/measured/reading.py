@@ -41,6 +41,7 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.checks import shown
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
+from mcml_sim.results.mci import quoted
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.measured.data import (
@@ -90,7 +91,6 @@ MOST_SHOWN = 5  # statements that a note names
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
 ANGLES = ("angle", "theta", "scattering angle")  # columns of a phase function
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
-LONGEST_SHOWN = 40  # characters of a cell in a message
 TLS_BYTES = 2**24  # of a TLS850's file
 HEAD_BYTES = 4096  # hold its first line of words
 LENGTH = 20.0  # mm
@@ -228,11 +228,11 @@ def _notes(others: list[Fact], named: Fact | None, unit: str | None) -> tuple[st
     """Return notes on statements that are not understood, and on a unit that another one replaces."""
     notes = []
     if others:
-        shown = ", ".join(f"{_shown(one.text)} (line {one.line})" for one in others[:MOST_SHOWN])
+        shown = ", ".join(f"{quoted(one.text)} (line {one.line})" for one in others[:MOST_SHOWN])
         more = f" and {len(others) - MOST_SHOWN} more" if len(others) > MOST_SHOWN else ""
         notes.append(f"comments state what is not understood: {shown}{more}; known are {', '.join(FACTS)}")
     if named is not None and unit is not None and UNITS.get(named.text) != UNITS.get(unit):
-        notes.append(f"the file's unit is {_shown(named.text)} (line {named.line}), read with `unit` {unit}")
+        notes.append(f"the file's unit is {quoted(named.text)} (line {named.line}), read with `unit` {unit}")
     return tuple(notes)
 
 
@@ -286,10 +286,10 @@ def _header(path: Path, at: int, cells: tuple[str, ...]) -> dict[str, str]:
     names = tuple(NAMES.get(word, word) for word in words)
     for word, name in zip(words, names, strict=True):
         if names.count(name) > 1:
-            raise _bad(path, at, "expected each column once", f"{_shown(name)} {names.count(name)} times")
+            raise _bad(path, at, "expected each column once", f"{quoted(name)} {names.count(name)} times")
         if name not in NAMES and not REPLICATE.fullmatch(name):
             hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
-            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {_shown(word)}{hint}")
+            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {quoted(word)}{hint}")
     if missing := _missing(names):
         raise _bad(path, at, f"expected a header of {ACCEPTED}", missing)
     units = [next(filter(None, match.groups()[1:]), "").strip() if match else "" for match in matches]
@@ -315,14 +315,14 @@ def _number(table: _Table, line: int, name: str, cell: str) -> float:
     if _is_number(cell):
         return float(cell)
     if DECIMAL_COMMA.fullmatch(cell):
-        raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {_shown(cell)}")
+        raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {quoted(cell)}")
     expected = "a finite number"
     with contextlib.suppress(ValueError):
         if math.isfinite(float(cell)) and "_" not in cell:
             expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
     if not cell and REPLICATE.fullmatch(name):
         expected += ", since every row has all replicates"
-    raise table.bad(line, name, expected, _shown(cell))
+    raise table.bad(line, name, expected, quoted(cell))
 
 
 def _is_number(cell: str) -> bool:
@@ -376,7 +376,7 @@ def _length_unit(table: _Table, unit: str | None) -> str:
     written = {table.units[name] for name in names} - {""}
     for one in written:
         if one not in UNITS:
-            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", _shown(one))
+            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", quoted(one))
     units = written | ({unit} if unit else set())
     if len({UNITS.get(one) for one in units}) > 1:
         raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
@@ -409,10 +409,6 @@ def _value_factor(table: _Table, length: str, scaled: bool) -> float:
     if not length:
         raise table.bad(table.line, "r", f"a unit, as {name} has one ([{text}])", "none")
     return factor(unit, length) ** -2
-
-
-def _shown(cell: str) -> str:
-    return repr(cell if len(cell) <= LONGEST_SHOWN else f"{cell[: LONGEST_SHOWN - 3]}...")
 
 
 def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
