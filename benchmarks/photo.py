@@ -35,6 +35,7 @@ from mcml_sim import Setting
 from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
 from profilefit.fitting.misfit import DETECTED, waves
+from profilefit.materials import CHANNELS
 from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.noise import WAVE
@@ -146,14 +147,14 @@ def exposures(
     first = FULL * camera.gain * (camera.white - camera.black) / brightest
     stated = [first * 4.0**step for step in range(STEPS)]
     times = {one: one * (1.0 + LATE * rng.standard_normal()) for one in stated}
-    radial = {name: wavy[name if name in wavy else ""] for name in simulated.CHANNELS}
+    radial = {name: wavy[name if name in wavy else ""] for name in CHANNELS}
     taken = simulated.exposures_of(radial, camera, 1.0, times, int(rng.integers(2**31)))
     return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
 
 
 def as_read(one: simulated.SimulatedExposure, source: str) -> Exposure:
     """Return a bracket as a raw file of it would be read."""
-    return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
+    return of_sensor(source, one.counts, simulated.PATTERN, [[one.black] * 2] * 2, one.white, one.seconds)
 
 
 def outcome(cards: bool, shaped: bool, at: int) -> Outcome:
@@ -205,7 +206,7 @@ def setup(at: int) -> Setup:
         told = Known(pitch * pixels, 0.1 * pitch * pixels)
         optics, camera = nuisances(rng, told, camera)
         media = {}
-        for name in simulated.CHANNELS:
+        for name in CHANNELS:
             absorbed, rate = (np.exp(rng.uniform(*np.log(ends))) for ends in ((0.003, 0.98), (0.3, 4.0)))
             media[name] = float(1.0 - absorbed), float(1.0 / rate)
         try:
@@ -237,11 +238,11 @@ def verdicts(at: int) -> list[Verdict]:
         shown += [] if one.grey is None else [(seen(one.grey * card), GREY)]
         found = workflow.measured(spot, shown, size, SETTING, Beliefs(beam=one.beam))
     except InputError as error:
-        return [Verdict(colour, str(error), (), {}) for colour in simulated.CHANNELS]
+        return [Verdict(colour, str(error), (), {}) for colour in CHANNELS]
     return [
         _verdict(colour, found.fits[colour], *one.media[colour]) if colour in found.fits
         else Verdict(colour, "no spot is seen", (), {})
-        for colour in simulated.CHANNELS
+        for colour in CHANNELS
     ]  # fmt: skip
 
 
@@ -266,7 +267,7 @@ def setups(count: int, jobs: int) -> dict[str, Any]:
                 print(f"{at} {one.colour}: {off}; {one.refusal or ', '.join(one.warned) or 'no warning'}", flush=True)
     answered = [one for one in each if not one.refusal]
     shares: dict[str, Any] = {"answers": len(answered), "refused": len(each) - len(answered)}
-    for colour in simulated.CHANNELS:
+    for colour in CHANNELS:
         of = [one.off for one in answered if one.colour == colour]
         for name in (*NAMES, "A"):
             shares[f"{colour} {name}"] = float(np.mean([abs(off[name]) < 1.0 for off in of]))

@@ -5,15 +5,11 @@ at the medium's alpha, and not its A. Engines that blur with a profile multiply 
 an index-matched surface, whatever n the medium has. What a renderer then shows is A only where light enters as the map
 assumes: `Engine.renders` has what Cycles' walks show instead.
 
-Cycles' four methods have changed their meaning three times since 2.79. bssrdf_setup_radius multiplies the radius,
-radius times scale, by 1 / (4 pi) or by nothing. Until 2.93 both methods had the factor. Since 3.0 Christensen-Burley's
-d has it and is no longer divided by s(A): bssrdf_burley_setup, which does that, has no caller. The walk has it as
-Random Walk (Fixed Radius) of 3.x, Random Walk of 4.0 to 5.1 and Random Walk (Legacy) since 5.2. Random Walk since 5.2
-has none: the typed radius is the mean free path. Since 4.0 walks enter along the refracted ray, while colours are
-mapped as if light entered diffusely, and leave unrefracted: they show less than the A of their medium. Seen from the
-normal through roughness 1 this is exact, and agrees with renders of Blender 5.0 to 5.3 within 0.5 %.
-
-HDRP's rasteriser draws normalized diffusion with the typed d; its path tracer walks with l = d s(A), s the diffuse one.
+Cycles' four methods have changed their meaning three times since 2.79, as their rows say. bssrdf_setup_radius takes
+the radius, radius times scale, times 1 / (4 pi) or as it is; bssrdf_burley_setup, which divides by s(A), has had no
+caller since 3.0. Since 4.0 walks enter along the refracted ray, while colours are mapped as if light entered diffusely,
+and leave unrefracted: they show less than the A of their medium. Seen from the normal through roughness 1 this is
+exact, and agrees with renders of Blender 5.0 to 5.3 within 0.5 %.
 
 Unreal's rasteriser takes a mean free path since 5.1 and a diffuse one before. It draws d = dmfp / s_dmfp(A), dmfp being
 mfp s_dmfp(A) / (0.6 s_searchlight(A)): an l of 1 is typed as 0.6. Profiles from before 5.1 were drawn 10/3 wider than
@@ -56,8 +52,7 @@ from profilefit.laws.diffusion import BeamDiffusion
 Colour = Callable[[Floats, float, float], Floats]  # of reduced albedo, index n of the surface, and g
 METRES = {"um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 
-# Cycles' src/kernel/closure/bssrdf.h, bssrdf_setup_radius: what a radius is multiplied by; in Random Walk by nothing
-# since commit e5f41641 of 2026-06-02.
+# Cycles' src/kernel/closure/bssrdf.h, bssrdf_setup_radius: what a radius is multiplied by.
 SHRINK = 0.25 / np.pi
 # The same file, bssrdf_dipole_compute_alpha_prime.
 SKIN_HALVINGS = 12
@@ -101,10 +96,6 @@ def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
     return np.minimum(np.asarray(law.reflectance(alpha)) / law.entered, 1.0)
 
 
-def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
-    return UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
-
-
 # Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface, "entered" is
 # A under a pencil beam and the medium's surface, per light that entered.
 COLOURS: dict[str, Colour] = {
@@ -118,8 +109,7 @@ COLOURS: dict[str, Colour] = {
     ),
     "albedo": lambda alpha, n, g: unreduced(alpha, g),
 }
-# Lengths that are typed, over l [-]. The extinction of Cycles' legacy walk is 4 pi / (radius (1 - g)), that of its skin
-# depends on the colour that is typed, too; walks of HDRP and of appleseed in 2017 multiply by s of the typed colour.
+# Lengths that are typed, over l [-]; each row of `engines.toml` has its formula in words.
 FACTORS: dict[str, Factor] = {
     "l": transport,
     "unreduced": unreduced_path,
@@ -131,7 +121,9 @@ FACTORS: dict[str, Factor] = {
     "HDRP's radius": lambda alpha, g: HDRP_REACH * falloff_diffuse(alpha, g),
     "HDRP's walk": lambda alpha, g: 1.0 / scale_diffuse(mapped_colour("Chiang", alpha)),
     "Unreal's": lambda alpha, g: UNREAL_MAGIC * transport(alpha, g),
-    "Unreal's before 5.1": _unreal_dmfp,
+    "Unreal's before 5.1": lambda alpha, g: (
+        UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
+    ),
     "appleseed's walk of 2017": lambda alpha, g: 1.0 / scale_searchlight(mapped_colour("Chiang", alpha)),
 }
 # A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half

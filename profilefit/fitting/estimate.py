@@ -379,7 +379,7 @@ def residual_structure(table: Floats) -> Structure:
 
 
 def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
-    """Return standard errors (p,) by a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982)."""
+    """Return standard errors (p,) by a grouped jackknife over neighbouring albedos."""
     m = rings.alpha.size
     if not solution.converged or m < JACKKNIFE_GROUPS:
         return np.full(solution.parameters.size, np.nan)
@@ -392,9 +392,13 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
     refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data, JACKKNIFE_WORTH)
     if not all(judged(refit, problem.free).converged for refit in refits):
         return np.full(solution.parameters.size, np.nan)
-    moved = np.stack([refit.parameters for refit in refits])
-    spread = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
-    return np.sqrt((len(groups) - 1) / len(groups) * spread)
+    return jackknife_error([refit.parameters for refit in refits])
+
+
+def jackknife_error(moved: Sequence[Floats]) -> Floats:
+    """Return standard errors (p,) from refits, each without one group (Efron, The Jackknife, 1982, ch. 2)."""
+    apart = np.array(moved) - np.mean(moved, axis=0)
+    return np.sqrt((len(moved) - 1) / len(moved) * np.sum(apart**2, axis=0))
 
 
 def followed(hessian: Floats, mixed: Floats) -> Floats:

@@ -175,10 +175,11 @@ def solve_batch(
     return tuple(solutions)
 
 
-def best_apart(places: NDArray[np.int_], costs: Floats) -> list[int]:
-    """Return the rows of a coarse search where descents start: the cheapest, no two at neighbouring places (m, 2)."""
+def best_apart(costs: Floats) -> list[int]:
+    """Return where descents start, of a coarse search on a grid (m, k), counted row by row: no two are neighbours."""
+    places = np.indices(costs.shape).reshape(2, -1).T
     chosen: list[int] = []
-    for at in np.argsort(costs):
+    for at in np.argsort(costs, axis=None):
         if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
             chosen.append(int(at))
     return chosen[:STARTS]

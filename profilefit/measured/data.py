@@ -239,13 +239,6 @@ def widening(freedom: Floats, free: int) -> float:
     return 1.0 + 4.0 * (1.0 - free / freedom.size) * float(np.mean(1.0 / (freedom - 1.0)))
 
 
-def checked_unit(name: str, unit: str) -> str:
-    """Return a unit of length that is known; InputError names what `name` was given."""
-    if unit in UNITS:
-        return unit
-    raise InputError(f"{name} must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
-
-
 def length(name: str, text: str, unit: str, accepted: str = "a length > 0 such as 1.2mm") -> float:
     """Return a length > 0 such as 1.2mm, in `unit`; a bare number is in `unit` already. InputError names `name`."""
     match = NUMBER.fullmatch(text.strip())

@@ -152,12 +152,6 @@ class MediumFit:
         """Covariance (m, m) of the rows, in standard errors, from the lack of fit; zero where none is allowed for."""
         return self.problem.noise.in_errors(self.problem.noise.lack, self.minimum.residuals.size)
 
-    @property
-    def law_size(self) -> Floats:
-        """Standard deviation (n,) of the law's own error in the light of each row; zero if that is unknown."""
-        model = self.problem.noise.model
-        return np.zeros(self.data.value.size) if model is None else np.sqrt(np.diag(model))
-
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
         """True (n,) for rows farther out than the radii that `rel` covers."""
@@ -204,7 +198,7 @@ class MediumFit:
         All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
         Derivatives are by the free coordinates and, where `values` of them are given, by the spec's ranges.
         """
-        own, count = self.problem.noise.of_data, self.minimum.residuals.size
+        own, count = replace(self.problem.noise, model=None, lack=None), self.minimum.residuals.size
         times = np.ones(count)
         times[: self.data.value.size] = np.sqrt(self.widening)
         problem = replace(self.problem, noise=own)

@@ -19,7 +19,7 @@ distance .1 to 2.5; tests hold the prediction against the real shift.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -63,11 +63,6 @@ class Noise:
     @property
     def share(self) -> float:
         return float(self.common @ self.common)
-
-    @property
-    def of_data(self) -> Noise:
-        """Errors of the data only."""
-        return replace(self, model=None, lack=None)
 
     @property
     def data(self) -> Floats:

@@ -203,13 +203,11 @@ class Problem:
         """Best points (k, 3) of a coarse search, no two neighbours."""
         held = self.spec.base
         u = [held[U]] if U not in self.spec.free else [u_of(alpha) for alpha in ALBEDOS]
-        lengths = np.linspace(*self.lengths, LENGTHS)
-        ln_l = [held[LENGTH]] if LENGTH not in self.spec.free else lengths
+        ln_l = [held[LENGTH]] if LENGTH not in self.spec.free else np.linspace(*self.lengths, LENGTHS)
         points = np.array([[a, b, held[SCALE]] for a in u for b in ln_l])
         if SCALE in self.spec.free:
             points[:, SCALE] = np.log(self._best_scales(points))
-        places = np.array([[i, j] for i in range(len(u)) for j in range(len(ln_l))])
-        return points[best_apart(places, self.costs(points))]
+        return points[best_apart(self.costs(points).reshape(len(u), len(ln_l)))]
 
     def _best_scales(self, points: Floats) -> Floats:
         """Return the scale that fits best at each point, by linear least squares (m,)."""

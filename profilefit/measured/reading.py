@@ -38,9 +38,12 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.checks import shown
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
+from mcml_sim.results.mci import quoted
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 from profilefit.measured.data import (
     FEWEST,
     UNITS,
@@ -49,7 +52,6 @@ from profilefit.measured.data import (
     Measured,
     ModeratedVariance,
     area_unit,
-    checked_unit,
     factor,
     moderated_variances,
 )
@@ -89,10 +91,8 @@ MOST_SHOWN = 5  # statements that a note names
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
 ANGLES = ("angle", "theta", "scattering angle")  # columns of a phase function
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
-LONGEST_SHOWN = 40  # characters of a cell in a message
 TLS_BYTES = 2**24  # of a TLS850's file
 HEAD_BYTES = 4096  # hold its first line of words
-COLOURS = ("red", "green", "blue")
 LENGTH = 20.0  # mm
 AVERAGED = 4  # pixels
 CELLS = re.compile(r"[\s,;]+")
@@ -106,6 +106,7 @@ FEWEST_RINGS = 3
 MOST_LAYERS = 6  # that a note names
 ENDLESS = 1e4  # cm: what users of MCML write for a half space is 1e8
 ALL_LIGHT = 1.0 + 1e-3  # files are rounded
+MODERATED = "standard errors of the means of {}, variances moderated by their trend"
 
 
 def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str | None = None) -> Measured:
@@ -145,8 +146,8 @@ def _read_table(path: Path, content: bytes, unit: str | None, scaled: bool) -> M
     named = stated.pop("unit", None)
     notes = _notes(others, named, unit)
     unit = named.text if named is not None and unit is None else unit
-    cells = [[_number(table, line, *each) for each in zip(table.names, row, strict=True)] for line, row in table.rows]
-    numbers = dict(zip(table.names, np.array(cells).T, strict=True))
+    cells = [[_number(table, line, *each) for each in zip(table.units, row, strict=True)] for line, row in table.rows]
+    numbers = dict(zip(table.units, np.array(cells).T, strict=True))
     inner, outer = _radii(table, numbers)
     length = _length_unit(table, unit)
     means, errors = _values(table, numbers)
@@ -162,26 +163,22 @@ def _read_table(path: Path, content: bytes, unit: str | None, scaled: bool) -> M
 class _Table:
     """Table as text.
 
-    names, units  of the columns in their order; "" where a unit is not given. line where the header stands
-    rows          the line and the cells of each
+    units  of the columns by name, in their order; "" where none is given. line where the header stands
+    rows   the line and the cells of each
     """
 
     path: Path
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    units: dict[str, str]
     line: int
     rows: list[tuple[int, tuple[str, ...]]]
 
     @property
     def replicates(self) -> tuple[str, ...]:
-        return tuple(name for name in self.names if REPLICATE.fullmatch(name))
+        return tuple(name for name in self.units if REPLICATE.fullmatch(name))
 
     @property
     def rings(self) -> bool:
-        return "r_in" in self.names
-
-    def unit(self, name: str) -> str:
-        return self.units[self.names.index(name)]
+        return "r_in" in self.units
 
     def bad(self, line: int, name: str, expected: str, got: str) -> InputError:
         """Return the error of a cell, or of a column's head."""
@@ -231,11 +228,11 @@ def _notes(others: list[Fact], named: Fact | None, unit: str | None) -> tuple[st
     """Return notes on statements that are not understood, and on a unit that another one replaces."""
     notes = []
     if others:
-        shown = ", ".join(f"{_shown(one.text)} (line {one.line})" for one in others[:MOST_SHOWN])
+        shown = ", ".join(f"{quoted(one.text)} (line {one.line})" for one in others[:MOST_SHOWN])
         more = f" and {len(others) - MOST_SHOWN} more" if len(others) > MOST_SHOWN else ""
         notes.append(f"comments state what is not understood: {shown}{more}; known are {', '.join(FACTS)}")
     if named is not None and unit is not None and UNITS.get(named.text) != UNITS.get(unit):
-        notes.append(f"the file's unit is {_shown(named.text)} (line {named.line}), read with `unit` {unit}")
+        notes.append(f"the file's unit is {quoted(named.text)} (line {named.line}), read with `unit` {unit}")
     return tuple(notes)
 
 
@@ -250,11 +247,11 @@ def _table(path: Path, lines: list[str]) -> _Table:
     delimiter = next((one for one in DELIMITERS if one in first.strip()), ",")
     heads = tuple(WORD.findall(first)) if delimiter == " " else _split(path, at, first, delimiter)
     # The columns after the last one with a name are those that spreadsheets leave empty.
-    names, units = _header(path, at, heads[: max((i for i, head in enumerate(heads, 1) if head), default=0)])
-    rows = [(line, _row(path, len(names), delimiter, line, text)) for line, text in kept[1:]]
+    units = _header(path, at, heads[: max((i for i, head in enumerate(heads, 1) if head), default=0)])
+    rows = [(line, _row(path, len(units), delimiter, line, text)) for line, text in kept[1:]]
     if len(rows) < FEWEST_ROWS:
         raise InputError(f"{path}: expected at least {FEWEST_ROWS} rows under the header, got {len(rows)}")
-    return _Table(path, names, units, at, rows)
+    return _Table(path, units, at, rows)
 
 
 def _row(path: Path, count: int, delimiter: str, at: int, line: str) -> tuple[str, ...]:
@@ -278,8 +275,8 @@ def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
         raise InputError(f"{path}:{at}: expected cells between {DELIMITERS[delimiter]}s, got: {error}") from None
 
 
-def _header(path: Path, at: int, cells: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units of the columns."""
+def _header(path: Path, at: int, cells: tuple[str, ...]) -> dict[str, str]:
+    """Return the units of the columns by name."""
     if len(cells) > MOST_COLUMNS:
         raise _bad(path, at, f"expected at most {MOST_COLUMNS} columns", len(cells))
     cells = tuple(" ".join(cell.split()) for cell in cells)
@@ -289,15 +286,15 @@ def _header(path: Path, at: int, cells: tuple[str, ...]) -> tuple[tuple[str, ...
     names = tuple(NAMES.get(word, word) for word in words)
     for word, name in zip(words, names, strict=True):
         if names.count(name) > 1:
-            raise _bad(path, at, "expected each column once", f"{_shown(name)} {names.count(name)} times")
+            raise _bad(path, at, "expected each column once", f"{quoted(name)} {names.count(name)} times")
         if name not in NAMES and not REPLICATE.fullmatch(name):
             hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
-            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {_shown(word)}{hint}")
+            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {quoted(word)}{hint}")
     if missing := _missing(names):
         raise _bad(path, at, f"expected a header of {ACCEPTED}", missing)
     units = [next(filter(None, match.groups()[1:]), "").strip() if match else "" for match in matches]
-    # value / (1/mm^2)
-    return names, tuple(unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit for unit in units)
+    units = [unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit for unit in units]  # value / (1/mm^2)
+    return dict(zip(names, units, strict=True))
 
 
 def _missing(names: tuple[str, ...]) -> str:
@@ -318,14 +315,14 @@ def _number(table: _Table, line: int, name: str, cell: str) -> float:
     if _is_number(cell):
         return float(cell)
     if DECIMAL_COMMA.fullmatch(cell):
-        raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {_shown(cell)}")
+        raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {quoted(cell)}")
     expected = "a finite number"
     with contextlib.suppress(ValueError):
         if math.isfinite(float(cell)) and "_" not in cell:
             expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
     if not cell and REPLICATE.fullmatch(name):
         expected += ", since every row has all replicates"
-    raise table.bad(line, name, expected, _shown(cell))
+    raise table.bad(line, name, expected, quoted(cell))
 
 
 def _is_number(cell: str) -> bool:
@@ -362,7 +359,7 @@ def _values(table: _Table, numbers: dict[str, Floats]) -> tuple[ModeratedVarianc
     if not np.any(value > 0):
         raise InputError(f"{table.path}: expected a value above 0, got none")
     if replicates:
-        means, errors = moderated_variances(samples), _moderated(f"{len(replicates)} replicates")
+        means, errors = moderated_variances(samples), MODERATED.format(f"{len(replicates)} replicates")
     else:
         means, errors = ModeratedVariance(value, numbers["sigma"], np.full(value.size, np.inf), np.inf), "as given"
     for (line, _), one in zip(table.rows, means.sigma, strict=True):
@@ -374,37 +371,35 @@ def _values(table: _Table, numbers: dict[str, Floats]) -> tuple[ModeratedVarianc
     return means, errors
 
 
-def _moderated(samples: str) -> str:
-    return f"standard errors of the means of {samples}, variances moderated by their trend"
-
-
 def _length_unit(table: _Table, unit: str | None) -> str:
     names = ("r_in", "r_out") if table.rings else ("r",)
-    written = {table.unit(name) for name in names} - {""}
+    written = {table.units[name] for name in names} - {""}
     for one in written:
         if one not in UNITS:
-            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", _shown(one))
+            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", quoted(one))
     units = written | ({unit} if unit else set())
     if len({UNITS.get(one) for one in units}) > 1:
         raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
-    return written.pop() if written else checked_unit("unit", unit) if unit else ""
+    if unit and unit not in UNITS:
+        raise InputError(f"unit must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
+    return next(iter(written), unit or "")
 
 
 def _require_one_measure(table: _Table) -> None:
     """InputError where an error, or another replicate, has a unit that is not the first value's."""
     first, *others = table.replicates or ("value", "sigma")
-    own = table.unit(first)
+    own = table.units[first]
     for name in others:
-        unit = table.unit(name) or own
+        unit = table.units[name] or own
         areas = area_unit(unit), area_unit(own)  # one measure may be spelled in several ways
         if unit != own and (None in areas or UNITS[str(areas[0])] != UNITS[str(areas[1])]):
-            raise table.bad(table.line, name, f"the unit of {first}, [{own}], or none", f"[{table.unit(name)}]")
+            raise table.bad(table.line, name, f"the unit of {first}, [{own}], or none", f"[{table.units[name]}]")
 
 
 def _value_factor(table: _Table, length: str, scaled: bool) -> float:
     """Return the factor to values per area in the unit of r; 1 where they are in any other measure."""
     name = table.replicates[0] if table.replicates else "value"
-    text = table.unit(name)
+    text = table.units[name]
     unit = area_unit(text)
     if not text or (scaled and (unit is None or not length)):
         return 1.0
@@ -416,19 +411,15 @@ def _value_factor(table: _Table, length: str, scaled: bool) -> float:
     return factor(unit, length) ** -2
 
 
-def _shown(cell: str) -> str:
-    return repr(cell if len(cell) <= LONGEST_SHOWN else f"{cell[: LONGEST_SHOWN - 3]}...")
-
-
 def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
     """Read the records of one colour from a file's first TLS_BYTES + 1; InputError names the line of what is wrong."""
-    if colour not in COLOURS:
-        raise InputError(f"{path}: `colour` must be one of {', '.join(COLOURS)}, got {colour!r}")
+    if colour not in CHANNELS:
+        raise InputError(f"{path}: `colour` must be one of {', '.join(CHANNELS)}, got {colour!r}")
     if not scaled:
         raise InputError(f"{path}: expected `scaled`, since the instrument's values are in a measure of its own")
     if len(content) > TLS_BYTES:
         raise InputError(f"{path}: expected records of at most {TLS_BYTES} bytes, got a longer file")
-    samples = _records(path, content.decode("utf-8", "replace"))[COLOURS.index(colour) :: len(COLOURS)]
+    samples = _records(path, content.decode("utf-8", "replace"))[CHANNELS.index(colour) :: len(CHANNELS)]
     if len(samples) < FEWEST:
         raise InputError(f"{path}: expected {FEWEST} records of a colour or more, got {len(samples)}")
     r = np.linspace(0.0, LENGTH, samples.shape[1])
@@ -443,7 +434,7 @@ def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> M
     left = f"{start} pixels up to the brightest one left out, the others averaged by {AVERAGED}"
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), middle, middle, moderated.value, moderated.sigma,
-        moderated.freedom, _moderated(f"{len(samples)} records"), "mm", pooled=moderated.pooled,
+        moderated.freedom, MODERATED.format(f"{len(samples)} records"), "mm", pooled=moderated.pooled,
         notes=(f"{colour}: {len(samples)} records; {left}",),
     )  # fmt: skip
 
@@ -498,13 +489,13 @@ def _read_npz(path: Path) -> Measured:
     estimate, areas = result.estimates["reflectance_r"], result.grid.r_areas
     with np.errstate(over="ignore"):  # impossible reflectances are refused below
         energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
+        squares = error**2 + energy**2 / (result.photons - 1.0)
     if not np.all(error <= ALL_LIGHT):
         raise InputError(f"{path}: expected standard errors of no more than all of the light")
-    _require_light(path, energy)
     return _counted(
-        path, content, result.grid.r_edges, energy, error**2 + energy**2 / (result.photons - 1.0),
-        np.asarray(estimate.effective_samples), float(result.photons), errors="standard errors of the simulation",
-        medium=result.medium, illumination=result.illumination, notes=(),
+        path, content, result.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
+        float(result.photons), errors="standard errors of the simulation", medium=result.medium,
+        illumination=result.illumination, notes=(),
     )  # fmt: skip
 
 
@@ -516,7 +507,8 @@ def _counted(
     energy  E of each; squares the sum of w^2 of its photons over N (N - 1), whose excess over E^2 / (N - 1) is the
             variance of E; seen the photons that it is estimated from
     """
-    _require_light(path, energy)
+    if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
+        raise InputError(f"{path}: expected annuli of reflectance >= 0 that add up to at most 1")
     starts = merged(edges, seen)
     if starts.size < FEWEST_RINGS:
         expected = f"at least {FEWEST_RINGS} annuli of {FEWEST_PHOTONS:.0f} photons each"
@@ -552,11 +544,6 @@ def _layers(medium: Medium) -> Iterator[str]:
             f"the file's medium is a slab {medium.z_edges[-1]:g} cm thick, fitted as a half space: light that leaves "
             "below reads as absorbed"
         )
-
-
-def _require_light(path: Path, energy: Floats) -> None:
-    if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
-        raise InputError(f"{path}: expected annuli of reflectance >= 0 that add up to at most 1")
 
 
 def merged(edges: Floats, photons: Floats) -> np.ndarray:

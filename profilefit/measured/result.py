@@ -295,14 +295,13 @@ def _inside(fit: MediumFit, judgement: Identifiability) -> MediumFit:
 
 def posterior(fit: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
     """Sample the posterior of a fit's free coordinates, by emcee along the fit's ridge: samples (k, p)."""
-    best, reach = fit.point, np.full(fit.point.size, FARTHEST_LN)
+    best = fit.point
 
     def log_density(samples: Floats, volume: Floats) -> Floats:
         full = points(fit, samples)
-        inside = np.all(np.abs(full - best)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
-            np.abs(full[:, U]) < FARTHEST_U + ROOM
-        )
-        costs = fit.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach))
+        inside = np.abs(full[:, U]) < FARTHEST_U + ROOM
+        inside &= np.all(np.abs(full - best)[:, U + 1 :] < FARTHEST_LN, axis=1)
+        costs = fit.problem.costs(np.clip(full, best - 3 * FARTHEST_LN, best + 3 * FARTHEST_LN))
         value = _log_density(fit, costs, full[:, U], volume)
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
@@ -378,8 +377,8 @@ def content(result: MediumPosterior) -> dict[str, Any]:
             **{name: getattr(data, name) for name in ("notes", "medium", "inner", "outer", "value")},
             "sigma": fit.sigma,
             "freedom": data.freedom if np.isfinite(data.pooled) else None,
-            "pooled_freedom": data.pooled if np.isfinite(data.pooled) else None,
-            "photons": data.photons if np.isfinite(data.photons) else None,
+            "pooled_freedom": data.pooled,
+            "photons": data.photons,
         },
         "law": {
             "name": spec.name,

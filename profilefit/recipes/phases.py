@@ -28,9 +28,10 @@ from numpy.typing import NDArray
 from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.phase import Phase, Tabulated, as_table, from_table
+from mcml_sim.results.mci import quoted
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.schema import ERRORS
@@ -44,7 +45,6 @@ UNITS |= {text: f"1/{unit}" for unit in ("m", "cm", "mm") for text in (f"1/({uni
 COLUMNS = {"angle": DEGREES, "value": (*UNITS,), "sigma": (*UNITS,)}
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 ACCEPTED = "angle [deg], value [1/sr] or [1/(m sr)] and, if known, sigma"
-LONGEST_SHOWN = 40
 LEAST_DEGREES = 7.0  # more than 2 pi: a table that ends before is one in radians
 WIDEST = 20.0  # [degrees] between rows; wider gaps are named
 MOST_SHARE = 1e3  # beyond which a rule estimates nothing
@@ -184,13 +184,13 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
         match = HEADING.fullmatch(cell.strip())
         name = match["name"].strip().lower() if match else ""
         if match is None or name not in COLUMNS or name in units:
-            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {_shown(cell)}")
+            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {quoted(cell.strip())}")
         units[name] = " ".join((match["unit"] or "").split())
         if units[name] not in COLUMNS[name]:
             accepted = ", ".join(filter(None, COLUMNS[name]))
-            raise InputError(f"{path}:{at}: expected {name} in {accepted} or without a unit, got {_shown(units[name])}")
+            raise InputError(f"{path}:{at}: expected {name} in {accepted} or without a unit, got {quoted(units[name])}")
     if "angle" not in units or "value" not in units:
-        raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {_shown(line)}")
+        raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {quoted(line)}")
     if units.get("sigma") and units["sigma"] != units["value"]:
         unit = f"[{units['value']}]" if units["value"] else "none"
         raise InputError(f"{path}:{at}: expected sigma in the unit of value, {unit}, got [{units['sigma']}]")
@@ -208,13 +208,8 @@ def _row(path: Path, at: int, text: str, names: Collection[str]) -> list[float]:
         except ValueError:
             numbers.append(math.nan)
         if not math.isfinite(numbers[-1]):
-            raise InputError(f"{path}:{at}: column {name}: expected a finite number, got {_shown(cell)}")
+            raise InputError(f"{path}:{at}: column {name}: expected a finite number, got {quoted(cell.strip())}")
     return numbers
-
-
-def _shown(cell: str) -> str:
-    text = cell.strip()
-    return repr(text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}...")
 
 
 MOMENTS = ("mean_cosine", "backscattered")  # that a fit may hold, in this order
@@ -384,10 +379,7 @@ def _errors(
 
 
 def _jackknife(form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: Arrays, used: Mask) -> Floats:
-    """Return the standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2).
-
-    They are NaN where a refit fails.
-    """
+    """Return the standard errors of a grouped jackknife over rows; NaN where a refit fails."""
     cosine, level, weight, moments = arrays
     group = np.where(used, (np.cumsum(used) - 1) // TOGETHER % JACKKNIFE_GROUPS, -1)
     moved = []
@@ -397,5 +389,4 @@ def _jackknife(form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: A
         with jax.enable_x64(True):
             own = np.asarray(form.constants(jnp.asarray(again.parameters)))
         moved.append(own if again.converged else np.full(own.shape, np.nan))
-    apart = np.array(moved) - np.mean(moved, axis=0)
-    return np.sqrt((JACKKNIFE_GROUPS - 1) / JACKKNIFE_GROUPS * np.sum(apart**2, axis=0))
+    return jackknife_error(moved)

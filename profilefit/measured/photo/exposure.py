@@ -32,12 +32,13 @@ from scipy.ndimage import binary_dilation, uniform_filter
 
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 
 Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
 MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
-COLOURS, GREY = ("red", "green", "blue"), "grey"
+GREY = "grey"
 PLATEAU, BELOW = 12, 0.98  # pixels that share the largest value where it clips, of it, others just below
 FEW, FAINT = 1000.0, 0.2  # steps, and share of the brightest plane: less is not white
 STEPS, BEYOND = 65535.0, 1.2  # of sixteen bits, which floats become; over the largest of them, if that is not white
@@ -102,21 +103,18 @@ def read(path: Path) -> Exposure:
 
 def _raw(path: Path) -> Exposure:
     rawpy = library("rawpy")
-    try:
-        with rawpy.imread(str(path)) as raw:
-            _require_size(path, raw.sizes.width, raw.sizes.height, 1)
-            if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
-                raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
-            counts, pattern = raw.raw_image_visible, raw.raw_pattern
-            names = {"R": "red", "G": "green", "B": "blue"}
-            colours = [names.get(chr(code), "") for code in raw.color_desc]
-            own = [[colours[int(which)] for which in row] for row in pattern]
-            black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
-            seconds = float(raw.other.shutter_speed)
-            exposure = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
-            return replace(exposure, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
-    except rawpy.LibRawError as error:
-        raise _refused(path, "a raw file", error) from None
+    with _refused(path, "a raw file", rawpy.LibRawError), rawpy.imread(str(path)) as raw:
+        _require_size(path, raw.sizes.width, raw.sizes.height, 1)
+        if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
+            raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
+        counts, pattern = raw.raw_image_visible, raw.raw_pattern
+        names = {"R": "red", "G": "green", "B": "blue"}
+        colours = [names.get(chr(code), "") for code in raw.color_desc]
+        own = [[colours[int(which)] for which in row] for row in pattern]
+        black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
+        seconds = float(raw.other.shutter_speed)
+        exposure = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
+        return replace(exposure, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
 
 
 @contextmanager
@@ -174,7 +172,7 @@ def _plain(path: Path, kind: str) -> Exposure:
         raise InputError(
             f"{path}: expected linear values, 16 bits or floats each, got {values.dtype} of an unknown curve"
         )
-    names = COLOURS if values.shape[2] == 3 else (GREY,)
+    names = CHANNELS if values.shape[2] == 3 else (GREY,)
     most = 255.0 if kind in JPEG else STEPS if kind in TIFF and values.dtype == np.uint16 else None
     brightest = float(counts.max())
     planes = tuple(
@@ -197,16 +195,13 @@ def _range(counts: Plane, most: float | None, brightest: float) -> float:
 def _decoded(path: Path, kind: str) -> NDArray[Any]:
     if kind in TIFF:
         tifffile = library("tifffile")
-        try:
-            with tifffile.TiffFile(path) as file:
-                page = file.pages[0]
-                _require_size(path, int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel))
-                return np.asarray(page.asarray())
-        except (tifffile.TiffFileError, *DAMAGED) as error:
-            raise _refused(path, "a TIFF", error) from None
+        with _refused(path, "a TIFF", tifffile.TiffFileError, *DAMAGED), tifffile.TiffFile(path) as file:
+            page = file.pages[0]
+            _require_size(path, int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel))
+            return np.asarray(page.asarray())
     if kind in EXR:
         exr = library("OpenEXR")
-        try:
+        with _refused(path, "an EXR", StopIteration, *DAMAGED):
             parts = exr.File(str(path), header_only=True).parts
             if len(parts) != 1:
                 raise InputError(f"{path}: expected an EXR of one part, got {len(parts)}")
@@ -214,10 +209,9 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             _require_size(path, int(right - left) + 1, int(bottom - top) + 1, len(parts[0].header["channels"]))
             channels = exr.File(str(path)).channels()
             return np.asarray(next(iter(channels.values())).pixels)
-        except (StopIteration, *DAMAGED) as error:
-            raise _refused(path, "an EXR", error) from None
     try:
         with (
+            _refused(path, "a picture", OSError, ValueError, SyntaxError),
             warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
             Image.open(path, formats=["jpeg"]) as file,
         ):
@@ -225,8 +219,6 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             return np.asarray(ImageOps.exif_transpose(file).convert("RGB"))
     except Image.DecompressionBombError:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got more") from None
-    except (OSError, ValueError, SyntaxError) as error:
-        raise _refused(path, "a picture", error) from None
 
 
 def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
@@ -246,14 +238,18 @@ def library(name: str) -> Any:
         raise InputError(f"this photograph needs the package {package}: pip install {package}") from None
 
 
-def _refused(path: Path, kind: str, error: Exception) -> InputError:
-    """Return an error in a library's words, where none of ours say it already."""
-    if isinstance(error, InputError):
-        return error
-    words = error.args[0] if error.args else error
-    text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words)
-    first = (text.splitlines() or [type(error).__name__])[0][:100]
-    return InputError(f"{path}: cannot be read as {kind}: {first}")
+@contextmanager
+def _refused(path: Path, kind: str, *errors: type[Exception]) -> Iterator[None]:
+    """Raise a library's errors in its words, where none of ours say it already."""
+    try:
+        yield
+    except InputError:
+        raise
+    except errors as error:
+        words = error.args[0] if error.args else error
+        text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words)
+        first = (text.splitlines() or [type(error).__name__])[0][:100]
+        raise InputError(f"{path}: cannot be read as {kind}: {first}") from None
 
 
 @dataclass(frozen=True)

@@ -350,16 +350,16 @@ class Shot:
     @cached_property
     def starts(self) -> list[Floats]:
         """The best points of a coarse search over albedos and lengths, no two neighbours, the best first."""
-        places = np.array([[i, j] for i in range(len(ALBEDOS)) for j in range(LENGTHS)])
-        u, ln_l = np.array([u_of(one) for one in ALBEDOS]), np.linspace(*self.lengths, LENGTHS)
-        points = np.column_stack([u[places[:, 0]], ln_l[places[:, 1]], np.zeros(len(places))])
+        u, ln_l = [u_of(one) for one in ALBEDOS], np.linspace(*self.lengths, LENGTHS)
+        points = np.array([[a, b, 0.0] for a in u for b in ln_l])
         sigma, densities = float(np.exp(self._first[3])), Model(self.light).densities(points, self.radii)
         _, weights, widening = ring_weights(sigma, self.beliefs.halos, self.medium)
         light = np.concatenate([weights, widening[None]]) @ densities.T
         own = ring_means(sigma, self.beliefs.halos, self.medium)
         none = np.zeros((*weights.shape[:2], 2))
         each = [self._settled(point, SpotLight(light[..., at], none, *own)) for at, point in enumerate(points)]
-        return [each[at][1] for at in best_apart(places, np.array([cost for cost, _ in each]))]
+        costs = np.array([cost for cost, _ in each]).reshape(len(u), len(ln_l))
+        return [each[at][1] for at in best_apart(costs)]
 
     def _settled(self, point: Floats, spread: SpotLight) -> tuple[float, Floats]:
         """Chi-square and coordinates (p,) at an albedo and a length, after COARSE steps in all others."""

@@ -18,16 +18,18 @@ from pydantic import Field, model_validator
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
-from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, SpotCamera, SpotOptics
+from profilefit.measured.photo.simulated import PATTERN, SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.recipes.declared import LISTED, Declared, Misplaced, Refused, Share, Tolerance, words
+from profilefit.recipes.declared import LISTED, Declared, Refused, Share, Tolerance, at, words
 
 MAX_BYTES, LEAST_SIDE, MOST_SIDE = 1 << 16, 50, 12_000
 OURS, HEAD = b"profilefit", 4096  # in the first bytes of each file
@@ -153,10 +155,8 @@ class Setup(Declared):
     @model_validator(mode="after")
     def _resolved(self) -> Self:
         longest = 1.0 / min(map(sum, zip(self.medium.mu_s, self.medium.mu_a, strict=True)))
-        try:
+        with at("medium"):
             simulated.require_resolved(longest, self.optics, _far(self.camera))
-        except InputError as error:
-            raise Misplaced(error, "medium") from None
         return self
 
 
@@ -174,12 +174,10 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
-    for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)):
+    for number, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)):
         medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.medium.setting, setup.optics, radii
-        spot[colour] = (
-            radii,
-            simulated.light(*medium, setup.medium.photons, len(CHANNELS) * setup.camera_table.seed + at),
-        )
+        seed = len(CHANNELS) * setup.camera_table.seed + number
+        spot[colour] = radii, simulated.light(*medium, setup.medium.photons, seed)
     card = simulated.card(setup.optics, radii)
     shown = {name: dict.fromkeys(CHANNELS, (radii, share * card)) for name, share in setup.cards.shown.items()}
     scenes = {"spot": spot} | shown
@@ -211,8 +209,8 @@ def written(setup: Setup, out: Path) -> list[Path]:
             raise InputError(f"{file}: expected no photograph of that name, or one that was simulated, got another")
     files = []
     for name, bracket in brackets(setup).items():
-        for at, one in enumerate(bracket, start=1):
-            files.append(out / f"{name}-{at}.dng")
+        for number, one in enumerate(bracket, start=1):
+            files.append(out / f"{name}-{number}.dng")
             write_whole(files[-1], as_dng(one))
     return files
 
@@ -225,7 +223,7 @@ def room(setup: Setup) -> float:
 def as_dng(exposure: SimulatedExposure) -> bytes:
     """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
-    codes = tuple(CFA[colour] for row in exposure.pattern for colour in row)
+    codes = tuple(CFA[colour] for row in PATTERN for colour in row)
     below = 10 ** int(np.clip(9 - np.ceil(np.log10(max(exposure.seconds, 1e-9))), 0, 9))  # of the ratio of seconds
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
     tags: list[tuple[int, str, int, Any, bool]] = [
@@ -251,31 +249,37 @@ def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
     surface, glare and lens what `Beliefs` have. Exposures and noise are not in it.
     """
-    grey = setup.cards.grey or 0.18
+    sides, pixel = setup.camera.sides, setup.camera.pitch
+    beam, grey = 2.0 * setup.optics.sigma, setup.cards.grey or 0.18
+    edges = edges_of(0.5 * min(sides) * pixel, 2.0 * pixel)
+    beliefs = Beliefs(beam=Known(beam, BEAM_ERROR * beam)).over(sides, pixel, float(edges[-1]))
     known = Known(grey, GREY_ERROR * grey)
     of: dict[str, tuple[Known | None, ...]]
     of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
     return {
         label: {
-            colour: _bounds(setup, mu_s, mu_a, cards)
+            colour: medium.fisher(*noiseless(setup.medium.setting, mu_s, mu_a, edges, cards, beliefs))
             for colour, mu_s, mu_a in zip(CHANNELS, setup.medium.mu_s, setup.medium.mu_a, strict=True)
         }
         for label, cards in of.items()
     }
 
 
-def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
-    pixel, core = setup.camera.pitch, setup.optics.sigma
-    edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
+def noiseless(
+    setting: Setting, mu_s: float, mu_a: float, edges: Floats, cards: Sequence[Known | None], beliefs: Beliefs
+) -> tuple[Shot, Floats]:
+    """Return rings of exact light under the believed beam, with the errors that SCATTER gives them, and coordinates.
+
+    cards  reflectance of each card, None where it is not known
+    """
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
-    beliefs = Beliefs(beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core)).over(setup.camera.sides, pixel, float(edges[-1]))
-    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.medium.setting), beliefs)
+    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setting), beliefs)
     x = shot.middle
-    x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)
+    x[:3] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0
     x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
     seen = [
         replace(blank, value=one, covariance=np.diag((SCATTER * one) ** 2))
         for one in np.split(shot.rows(x)[0], 1 + len(cards))
     ]
     shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
-    return dict(medium.fisher(replace(shot, medium=seen[0], cards=shown), x))
+    return replace(shot, medium=seen[0], cards=shown), x

@@ -12,7 +12,7 @@ Halos are Moffat's, h = (b - 1) / (pi a^2) (1 + r^2 / a^2)^-b, whose transform i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import jax
@@ -33,7 +33,6 @@ from profilefit.measured.instrument import between
 from profilefit.measured.model import exact_light
 
 Counts = NDArray[np.uint16]
-CHANNELS = ("red", "green", "blue")
 PATTERN = (("red", "green"), ("green", "blue"))  # of a Bayer sensor's first two rows
 PANELS, ORDER = 260, 10  # of the quadratures, which have more where J_0 turns by more than TURN in a panel [rad]
 TURN, MOST_VALUES = 16.0, 4e8  # and the most values of J_0: ten seconds
@@ -110,7 +109,6 @@ class SimulatedExposure:
     seconds: float
     black: int
     white: int
-    pattern: tuple[tuple[str, str], tuple[str, str]] = field(default=PATTERN)
 
 
 def light(

@@ -11,9 +11,10 @@ import numpy as np
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
 from profilefit.measured.model import exact_light
 from profilefit.measured.photo import exposure, medium, rings
-from profilefit.measured.photo.exposure import COLOURS, FULL, GREY, Exposure, Picture, Sensor, Times, read
+from profilefit.measured.photo.exposure import FULL, GREY, Exposure, Picture, Sensor, Times, read
 from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
 from profilefit.measured.photo.rings import MARKER, PixelScale, Spot, SpotRings, pixel_scale, spot
 from profilefit.measured.problem import Known
@@ -56,7 +57,7 @@ class Bracket:
     @property
     def colours(self) -> tuple[str, ...]:
         """Red before green before blue, however the sensor has them."""
-        return tuple(sorted({name for name, _ in self.planes}, key=(*COLOURS, GREY).index))
+        return tuple(sorted({name for name, _ in self.planes}, key=(*CHANNELS, GREY).index))
 
 
 @dataclass(frozen=True, eq=False)

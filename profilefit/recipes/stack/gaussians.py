@@ -15,7 +15,7 @@ from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance, scaled_inverse
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance, scaled_inverse
 from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.materials import CHANNELS
@@ -421,7 +421,7 @@ def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium],
 
 
 def _jackknife(found: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """Return the standard errors of a grouped jackknife over rings (Efron, The Jackknife, 1982, ch. 2)."""
+    """Return the standard errors of a grouped jackknife over rings."""
     moved = []
     for group in range(JACKKNIFE_GROUPS):
         fewer = []
@@ -429,5 +429,4 @@ def _jackknife(found: JointSum, lights: Sequence[SumLight]) -> Floats:
             kept = np.arange(len(light.energy)) // TOGETHER % JACKKNIFE_GROUPS != group
             fewer.append(light._replace(weight=light.weight * kept))
         moved.append(refitted(found, fewer))
-    apart = np.array(moved) - np.mean(moved, axis=0)
-    return np.sqrt((JACKKNIFE_GROUPS - 1) / JACKKNIFE_GROUPS * np.sum(apart**2, axis=0))
+    return jackknife_error(moved)

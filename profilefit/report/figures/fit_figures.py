@@ -47,7 +47,8 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
     below.axhline(0.0, color=pen.BLUE, linewidth=1.0)
     below.plot(r, residual, color=pen.BLACK, marker="o", markersize=3.0, linewidth=0.6)
     if fit.rel is not None and result.identifiability is not None:
-        band = fit.law_size / fit.sigma
+        model = fit.problem.noise.model  # of exact light there is none
+        band = np.sqrt(0.0 if model is None else np.diag(model)) / fit.sigma
         below.plot(r, band, color=pen.VERMILION, linestyle="--", linewidth=0.9, label="model error")
         below.plot(r, -band, color=pen.VERMILION, linestyle="--", linewidth=0.9)
     span = max(3.0, 1.15 * float(np.max(np.abs(residual))))

@@ -25,6 +25,7 @@ pytestmark = pytest.mark.slow
 
 DATA = Path(__file__).parents[3] / "examples"
 LAW = catalogue.load("hazard")
+SPEC = FitSpec(LAW, {"scale": 1.0}, source=origin("hazard", "regenerated", Setting(), catalogue.fits_folder()))
 ALPHA, MFP = 0.9, 1.2
 R = np.geomspace(0.1, 9.0, 24)
 TRUTH = {"A": LAW.albedo.reflectance(ALPHA), "alpha": ALPHA, "l": MFP, "mu_s'": ALPHA / MFP, "mu_a": (1 - ALPHA) / MFP}
@@ -32,10 +33,6 @@ REPLICATES = 300
 # What the runs behind the stored files were.
 HALF_SPACE = Medium((Layer(1.0, 1.0, 9.0, 0.0),)), Grid(0.01, 120, 1.0, 1), 2**21, 11
 TWO_LAYERS = Medium((Layer(1.0, 5.0, 10.0, 0.0, 0.03), Layer(1.0, 0.1, 10.0, 0.0))), Grid(0.01, 150, 1.0, 1), 2**20, 12
-
-
-def source(setting=None):
-    return origin("hazard", "regenerated", setting or Setting(), catalogue.fits_folder())
 
 
 def points(value, sigma, freedom=np.inf, r=R, pooled=np.inf) -> Measured:
@@ -53,9 +50,8 @@ def band(share, count):
 def replicates():
     """Fits to light of the law itself with 2 % noise."""
     generator, light = np.random.default_rng(5), LAW.profile(R, ALPHA, MFP)
-    spec = FitSpec(LAW, {"scale": 1.0}, source=source())
     draws = light * (1 + 0.02 * generator.standard_normal((REPLICATES, R.size)))
-    return [fitted(points(one, 0.02 * light), spec) for one in draws]
+    return [fitted(points(one, 0.02 * light), SPEC) for one in draws]
 
 
 def covered(replicates, level, wider=1.0):
@@ -93,7 +89,7 @@ def test_replicates_are_not_accused_and_cover(count, uneven):
         size = 0.01 * np.sqrt(count) * np.exp(uneven * generator.standard_normal((R.size, 1)))
         one = moderated_variances(light[:, None] * (1 + size * generator.standard_normal((R.size, count))))
         data = points(one.value, one.sigma, one.freedom, pooled=one.pooled)
-        found.append(fitted(data, FitSpec(LAW, {"scale": 1.0}, source=source())))
+        found.append(fitted(data, SPEC))
     low, high = band(0.95, REPLICATES)
     assert all(low <= held <= high for held in covered(found, 0.95).values())
     assert sum(one.misfit.detected for one in found) <= 3
@@ -131,7 +127,7 @@ def test_errors_of_simulations_are_the_scatter_of_seeds(tmp_path):
     for seed in range(60):
         tally = simulate(medium, grid, 2**14, seed=seed, progress=False)
         write_results(tally, tmp_path / "a.npz")
-        found.append(fitted(read(tmp_path / "a.npz"), FitSpec(LAW, {"scale": 1.0}, source=source())))
+        found.append(fitted(read(tmp_path / "a.npz"), SPEC))
     assert all(one.minimum.converged for one in found)
     for name, too_wide in (("alpha", 1.5), ("l", 1.0)):
         scatter = np.std([one.values[name] for one in found], ddof=1)
@@ -239,7 +235,7 @@ def test_a_white_medium_has_an_upper_limit_of_absorption():
     """No absorption at all: in half of the replicates alpha runs to 1, and mu_a has an upper limit and no value."""
     light = np.asarray(exact.profile(R, 1.0, MFP)) * (1 + 0.02 * np.random.default_rng(3).standard_normal(R.size))
     for part in (light, 1.03 * light):
-        result = judged(fitted(points(part, 0.02 * light), FitSpec(LAW, {"scale": 1.0}, source=source())))
+        result = judged(fitted(points(part, 0.02 * light), SPEC))
         assert result.walk is not None
         low, high = result.interval("mu_a")
         assert low is None

@@ -332,8 +332,7 @@ def test_rows_that_share_nothing_are_divided_by_their_errors():
 def test_errors_of_a_fit_are_those_of_the_full_covariance(alpha, too_wide):
     """Generalised least squares by hand; negative control: rings without their covariance."""
     data = counted(energies(alpha))
-    spec = FitSpec(LAW, {"scale": 1.0}, source=SOURCE)
-    found = fitted(data, spec)
+    found = fit(data, scale=1.0)
     assert found.minimum.converged
     slopes = found.predicted[1][:-1, :2]
     photons, law = covariance(energies(alpha)), found.problem.noise.model
@@ -349,19 +348,19 @@ def test_errors_of_a_fit_are_those_of_the_full_covariance(alpha, too_wide):
 @pytest.mark.slow
 def test_fits_to_drawn_photons_scatter_as_stated():
     """Sixty multinomial draws at alpha .99: squares of both coordinates over their covariance are chi-square."""
-    share, spec = energies(0.99), FitSpec(LAW, {"scale": 1.0}, source=SOURCE)
+    share = energies(0.99)
     truth = np.array([u_of(0.99), 0.0])
     whole = np.append(share, 1 - share.sum())
     draws = np.random.default_rng(4).multinomial(PHOTONS, whole, 60)[:, :-1] / PHOTONS
     squares, alphas = [], []
     for one in draws:
-        found = fitted(counted(one), spec)
+        found = fit(counted(one), scale=1.0)
         off = found.point[:2] - truth
         squares.append(off @ np.linalg.solve(found.statistical[:2, :2], off))
         alphas.append(off[0] ** 2)
     # Chi-square of 120 degrees of freedom, 99.9 % of it.
     assert 78 < np.sum(squares) < 172
-    apart = fitted(counted(share), spec).statistical[0, 0] * 1.8**2
+    apart = fit(counted(share), scale=1.0).statistical[0, 0] * 1.8**2
     assert np.sum(alphas) / apart < 33, "negative control: with the errors of rings apart 60, at least 33, is expected"
 
 
@@ -369,15 +368,11 @@ POINT = np.array([u_of(0.9), np.log(1.3), np.log(0.7)])
 R = np.geomspace(0.05, 9.0, BLOCK + 3)  # more than one block
 
 
-def test_points_are_the_laws_own():
-    light, _ = Model(LAW).linearised(POINT, R, R)
-    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
-    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
-
-
-def test_derivatives_and_flocks_agree_with_single_evaluations():
+def test_points_are_the_laws_own_and_derivatives_and_flocks_agree_with_them():
     model, step = Model(LAW), 1e-5
     light, slopes = model.linearised(POINT, R, R)
+    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
+    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
     ways = np.concatenate([POINT + step * np.eye(3), POINT - step * np.eye(3)])
     moved = model.predicted(ways, R, R)
     # Central differences: their own error is step^2 times a third derivative, and rounding over the step.

@@ -11,12 +11,13 @@ from scipy.interpolate import CubicSpline
 from benchmarks import photo as bench
 from profilefit.errors import InputError
 from profilefit.fitting.solver import CONVERGED, Solution, lowest
+from profilefit.materials import CHANNELS
 from profilefit.measured import model
 from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import exposure as bracket
-from profilefit.measured.photo import medium, rings, simulated, workflow
+from profilefit.measured.photo import medium, rings, setup, simulated, workflow
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, Picture
-from profilefit.measured.photo.medium import Beliefs, Card, Shot, halo, ring_means, ring_weights
+from profilefit.measured.photo.medium import Beliefs, Shot, halo, ring_means, ring_weights
 from profilefit.measured.photo.rings import PixelScale, SpotRings, pixel_scale
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
@@ -38,7 +39,7 @@ def light():
 
 
 def taken(light, times, seed, camera=CAMERA, electrons=1.0):
-    return simulated.exposures_of(dict.fromkeys(simulated.CHANNELS, light), camera, electrons, times, seed)
+    return simulated.exposures_of(dict.fromkeys(CHANNELS, light), camera, electrons, times, seed)
 
 
 def late(brightest, phase=0.0, camera=CAMERA):
@@ -222,18 +223,19 @@ def test_rings_err_as_they_say(light):
     assert 0.4 < squares[:2].mean() < 2.4, "though a grain of speckle is wider than a sector there"
 
 
-def made(cards=(), **beliefs) -> tuple[Shot, np.ndarray]:
+def made(*cards) -> tuple[Shot, np.ndarray]:
     """A shot of rings without noise, and its coordinates."""
-    edges = rings.edges_of(20.0, 0.1)
-    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
-    shot = Shot(blank, tuple(Card(blank, one) for one in cards), exact_light(SETTING), Beliefs(**beliefs))
-    x = shot.middle
-    x[:4] = u_of(ALPHA), np.log(LENGTH), 0.0, np.log(0.25)
-    x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
-    parts = np.split(shot.rows(x)[0], 1 + len(cards))
-    seen = [replace(blank, value=one, covariance=np.diag((0.003 * one) ** 2)) for one in parts]
-    shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
-    return replace(shot, medium=seen[0], cards=shown), x
+    return setup.noiseless(SETTING, 1.0, 0.05, rings.edges_of(20.0, 0.1), cards, Beliefs(beam=BEAM))
+
+
+def photographed(radii, light, camera, rng, colour, size):
+    """Rings of one colour in photographs of the light, and of a white and a grey card."""
+    card = simulated.card(OPTICS, radii)
+    spot, white, grey = (
+        workflow.bracketed(bench.exposures(radii, one, camera, rng), size) for one in (light, 0.9 * card, 0.18 * card)
+    )
+    cards = tuple(workflow.carded(one, colour, size, known, spot) for one, known in ((white, None), (grey, GREY)))
+    return Shot(workflow.ringed(spot, colour, size), cards, exact_light(SETTING), Beliefs(beam=BEAM))
 
 
 BEAM = Known(0.5, 0.05)
@@ -243,7 +245,7 @@ GREY = Known(0.18, 0.005)
 @pytest.fixture(scope="module")
 def carded():
     """A shot with both cards, and its coordinates."""
-    return made((None, GREY), beam=BEAM)
+    return made(None, GREY)
 
 
 @pytest.fixture(scope="module")
@@ -307,21 +309,15 @@ def test_a_beam_of_two_pixels_gives_its_medium():
     """Red pixels, of which few lie in the beam: the middle ring counts, and the search starts near the truth."""
     camera, rng = SpotCamera(sides=(300, 225), pitch=0.25), np.random.default_rng(4)
     radii, size = simulated.radii(60.0, OPTICS), PixelScale(np.diag([0.25, 0.25, 1.0]), "known")
-    alpha, length = 1.2 / 1.22, 1.0 / 1.22
-    card = simulated.card(OPTICS, radii)
-    spot, white, grey = (
-        workflow.bracketed(bench.exposures(radii, light, camera, rng), size)
-        for light in (simulated.light(alpha, length, SETTING, OPTICS, radii), 0.9 * card, 0.18 * card)
-    )
-    cards = tuple(workflow.carded(one, "red", size, known, spot) for one, known in ((white, None), (grey, GREY)))
-    fit = medium.fitted(Shot(workflow.ringed(spot, "red", size), cards, exact_light(SETTING), Beliefs(beam=BEAM)))
+    light = simulated.light(1.2 / 1.22, 1.0 / 1.22, SETTING, OPTICS, radii)
+    fit = medium.fitted(photographed(radii, light, camera, rng, "red", size))
     for name, truth in (("mu_s'", 1.2), ("mu_a", 0.02)):
         assert fit.errors[name] < 0.15 * fit.values[name]
         assert abs(np.log(fit.values[name] / truth)) < 3.0 * fit.errors[name] / fit.values[name]
 
 
 def test_cards_are_worth_what_is_said_and_glare_costs_it(carded):
-    shot, x = made((), beam=BEAM)
+    shot, x = made()
     alone, both = medium.fisher(shot, x), medium.fisher(*carded)
     assert both["mu_s'"] < 0.7 * alone["mu_s'"]
     assert both["mu_a"] < 0.6 * alone["mu_a"]
@@ -355,11 +351,7 @@ def test_photons_that_a_camera_sees_give_their_medium():
     """Light that no table knows: traced, of a medium whose g is the fit's, photographed with cards."""
     radii = simulated.radii(bench.FARTHEST, OPTICS)
     traced = simulated.light(ALPHA, LENGTH, SETTING, OPTICS, radii, photons=2**23, seed=7)
-    card, rng = simulated.card(OPTICS, radii), np.random.default_rng(5)
-    seen, white, grey = (workflow.bracketed(bench.exposures(radii, light, CAMERA, rng), SQUARE)
-                         for light in (traced, 0.9 * card, 0.18 * card))  # fmt: skip
-    cards = tuple(workflow.carded(one, "green", SQUARE, known, seen) for one, known in ((white, None), (grey, GREY)))
-    shot = Shot(workflow.ringed(seen, "green", SQUARE), cards, exact_light(SETTING), Beliefs(beam=BEAM))
+    shot = photographed(radii, traced, CAMERA, np.random.default_rng(5), "green", SQUARE)
     fit = medium.fitted(shot)
     for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
         assert fit.errors[name] < 0.06 * fit.values[name]

@@ -43,7 +43,6 @@ def folder(tmp_path_factory):
     (out / "SETUP.toml").write_text(SETUP)
     setup.written(setup.read_setup(out / "SETUP.toml"), out)
     whole = (out / "spot-1.dng").read_bytes()
-    (out / "cut.dng").write_bytes(whole[: len(whole) // 2])
     (out / "empty.dng").write_bytes(b"")
     (out / "notes.txt").write_text("spot")
     tifffile.imwrite(out / "eight.tif", np.zeros((30, 40), np.uint8))
@@ -219,8 +218,6 @@ def test_photographs_of_another_camera_are_not_replaced(command, refused, tmp_pa
         (("sides = [400, 300]", "sides = [400, 30]"), "[camera] sides must be at least 50 pixels each, got [400, 30]"),
         (("pitch", "bits = 8\npitch"), "[camera] black must be less than 255, white of 8 bits, got 256"),
         (("pitch", "uneven = 0.5\npitch"), "[camera] uneven must be a number > 0 and <= 0.1, got 0.5"),
-        (("pitch", "corner = 10\npitch"), "[camera] corner must be a number > 0 and <= 0.9, got 10"),
-        (("pitch", "late = 1\npitch"), "[camera] late must be a number > 0 and <= 0.2, got 1"),
         (("white = true", "white = 1"), "[cards] white must be true or false, got 1"),
         (("[camera]", "[optics]\nfalling = 0.8\n[camera]"), "[optics] falling must be a number > 1, or its light"),
         (("1.0]\nmu_a = [0.05,", "0.001]\nmu_a = [0.05, 0.05, 0.001] #"), "[medium] mu_s + mu_a must be >= 0.01"),
@@ -236,13 +233,10 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
     ("words", "said"),
     [
         ("SPOT", "--scale must be given: 0.05mm/px"),
-        ("SPOT --scale 5", "--scale must be 0.05mm/px, two points"),
         ("SPOT --scale aruco:20mm", "--scale must be a marker that"),
-        ("SPOT --scale 1,1:1,1=5mm", "--scale must have two points that are apart"),
         ("--scale 0.1mm/px", "SHOT must be a photograph"),
         ("missing.dng --scale 0.1mm/px", "missing.dng: cannot be read"),
         ("notes.txt --scale 0.1mm/px", "expected a raw file"),
-        ("cut.dng --scale 0.1mm/px", "cut.dng: cannot be read as a raw file"),
         ("empty.dng --scale 0.1mm/px", "expected a photograph of 1 byte"),
         ("eight.tif --scale 0.1mm/px", "of an unknown curve"),
         ("four.tif --scale 0.1mm/px",
@@ -255,11 +249,8 @@ def test_a_setup_that_makes_no_photograph_is_named(refused, tmp_path, change, sa
         ("cut.jpg --scale 0.1mm/px", "cut.jpg: cannot be read as a picture: image file is truncated"),
         ("none.jpg --scale 0.1mm/px", "none.jpg: cannot be read as a picture: cannot identify image file"),
         ("SPOT other.tif --scale 0.1mm/px", "expected 400 x 300 pixels"),
-        ("none.jpg --scale wide", "scale must be 0.05mm/px"),
-        (f"none.jpg --scale {'9' * 5000}mm/px", f"scale must lie between 1e-40 and 1e+40 mm, got '{'9' * 59}..."),
+        ("none.jpg --scale wide", "--scale must be 0.05mm/px, two points"),
         (f"none.jpg --scale 1,1:{'9' * 5000},1=10mm", "scale must have two points that are apart, on a photo"),
-        ("SPOT --scale 0.1mm/px --beam 0.5mm", "--beam must be a value with its error"),
-        ("SPOT --scale 0.1mm/px --glare much", "--glare must be a value with its error"),
         ("SPOT --scale 0.1mm/px --glare 2+-2", "--glare must be a value between 0 and 1 with an error"),
         ("SPOT --scale 0.1mm/px --reflectance 0.2+-0.01", "--reflectance must be left out"),
         ("SPOT --scale 0.1mm/px --grey SPOT --reflectance 97.1", "got '97.1' (a share: 0.971 for 97.1 %)"),
@@ -308,9 +299,8 @@ def test_files_after_an_equals_sign_are_the_options_too():
 def test_a_jpeg_is_read_with_a_warning(done, folder, tmp_path):
     """Of a spot that eight bits hold; the answer says that it is no measurement."""
     for name in ("spot", "grey"):
-        with rawpy.imread(several(folder, name)[0]) as raw:
-            linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
-        coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        light = linear(folder, name)[0]
+        coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
         cv2.imwrite(str(tmp_path / f"{name}.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
     out = done("photo", "spot.jpg", "--grey", "grey.jpg", *SCALE)
     assert "no exposure time is stated" in " ".join(out.split())

@@ -90,20 +90,6 @@ def test_a_name_of_its_own_and_files(command, mine):
     assert "float my_heart_profile(" in command("export", "mine/stacks/my-heart.json")[1]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--constants published", "--constants must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
-        ("--n 1.4", "--n must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
-        ("--lang json --name x", "name must be left out where lang is json, which has no functions"),
-        ("--lang cobol", "lang must be one of glsl, hlsl, glsl-es, python, json, got 'cobol'"),
-        ("--name 1st", "name must be letters, digits and single underscores"),
-    ],
-)
-def test_what_a_stack_does_not_take_is_one_line(refused, mine, words, said):
-    refused(f"export mine/stacks/heart.json {words}", said)
-
-
 def test_a_mistake_in_the_file_is_one_line_and_writes_nothing(refused, heart):
     Path(heart).write_text(STACK.replace('"diffuse"', '"sun"'), encoding="utf-8")
     said = "heart.toml: illumination must be one of searchlight, diffuse, got 'sun'"
@@ -162,29 +148,28 @@ def test_a_stack_beside_other_records(command, done, heart):
     assert command("report", "skin")[::2] == (0, f"{other}profilefit: stack 'skin' is of {str(fits_folder())!r}\n")
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("heart --quality", "--quality must be left out where NAME is a stack, got 'heart'"),
-        ("heart --figures figures", "--figures must be left out where NAME is a stack, got 'heart'"),
-        ("heart --html page.html", "--html must be left out where NAME is a stack, got 'heart'"),
-        ("hart", "no record 'hart' in mine; did you mean heart? stacks are heart, and `profilefit report` lists "),
-        ("skin", "no record 'skin' in mine; stacks are heart, and `profilefit report` lists records"),
-        ("--json", "mine has no records: `profilefit regenerate` makes them"),
-    ],
-)
-def test_what_a_report_of_a_stack_is_not_is_one_line(refused, mine, words, said):
-    refused(f"report {words} --fits mine --quiet", said)
+def test_what_a_stack_does_not_take_is_one_line(refused, mine):
+    said = "must be left out where NAME is a stack, got"
+    refused("export mine/stacks/heart.json --constants published", f"--constants {said} 'mine/stacks/heart.json'")
+    for option in ("--quality", "--figures=figures", "--html=page.html"):
+        refused(f"report heart {option} --fits mine --quiet", f"{option.partition('=')[0]} {said} 'heart'")
+    lists = "stacks are heart, and `profilefit report` lists "
+    for words, said in {
+        "hart": f"no record 'hart' in mine; did you mean heart? {lists}",
+        "skin": f"no record 'skin' in mine; {lists}records",
+        "--json": "mine has no records: `profilefit regenerate` makes them",
+    }.items():
+        refused(f"report {words} --fits mine --quiet", said)
 
 
-@pytest.mark.parametrize("words", ["report heart", "report heart --json", "report"])
-def test_a_damaged_stack_is_no_report(refused, mine, words):
+def test_a_damaged_stack_is_no_report(refused, mine):
     path = Path("mine/stacks/heart.json")
     content = json.loads(path.read_text(encoding="utf-8"))
     content["interfaces"]["red"]["quality"] = []
     path.write_text(json.dumps(content), encoding="utf-8")
     said = "heart.json: is damaged: interfaces.red.quality must be 1, one an interface, got 0; regenerate it\n"
-    refused(f"{words} --fits mine --quiet", said)
+    for words in ("report heart", "report heart --json", "report"):
+        refused(f"{words} --fits mine --quiet", said)
 
 
 @pytest.mark.slow

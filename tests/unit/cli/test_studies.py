@@ -165,13 +165,6 @@ def test_a_law_of_ours_that_breaks_its_word_is_status_1(command, tmp_path):
     assert "1 of them with red cells" in out
 
 
-@pytest.mark.parametrize(
-    ("words", "said"), [("hazzard", "name must be a law, map or record"), ("--out", "requires an argument")]
-)
-def test_bad_input_is_one_line_and_status_2(refused, words, said):
-    refused(f"stability {words}", said)
-
-
 SKIN, HEART, SEA = (EXAMPLES[f"{name}.toml"] for name in ("skin", "heart", "sea"))
 
 

@@ -15,16 +15,7 @@ import pytest
 
 from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.data import (
-    MOST_ROWS,
-    UNITS,
-    Measured,
-    area_unit,
-    checked_unit,
-    factor,
-    length,
-    require_workable,
-)
+from profilefit.measured.data import MOST_ROWS, UNITS, Measured, area_unit, factor, length, require_workable
 from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
 
 HEAD = "r,value1,value2,value3\n"
@@ -163,18 +154,14 @@ def test_the_most_columns_are_read(table):
 BAD = {
     f"r,{','.join(f'value{i}' for i in range(1, 1001))}\n": r":1: expected at most 1000 columns, got 1001$",
     "r;value;sigma\n" + "0,5;0,12;0,01\n" * 3: r":2: column r: expected a decimal point, as in .* comma '0,5'",
-    "r\tvalue\tsigma\n" + "1\t0,12\t0,01\n" * 3: r":2: column value: expected a decimal point, .* comma '0,12'",
-    "r value sigma\n" + "1 .1 0,01\n" * 3: r":2: column sigma: expected a decimal point, .* comma '0,01'",
     "r,value,sigma\n" + '1,"1,5e-3",1\n' * 3: r":2: column value: expected a decimal point, .* comma '1,5e-3'",
     "r,value,sigma\n0,5,0,12,0,01\n": r":2: expected 3 .*, got 6: if its numbers have decimal commas, write 0.5",
     "r,value,sigma\n1,2,3,x\n": r":2: expected 3 cells .*, got 4$",
     "r value sigma\n1 2\n": r":2: expected 3 cells between spaces, as the header has, got 2",
     "r,value1,value2,value3\n" + "1,2,,3\n" * 3: r":2: column value2: expected a finite number, since every row has",
     "r,value1,value2,value3\n1,1,2,3\n1,2,3,4\n2,1,1,2\n": r":3: column r: .*: replicates stand in one row, as value1,",
-    "r,value1,value2,value3\n1,-1,0,1\n2,-1,0,1\n3,-1,0,1\n4,-1,0,1\n": r": expected a value above 0, got none",
     "r,rho,value,sigma\n": r":1: expected each column once, got 'r' 2 times",
     "r [1/mm^2],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of nm, .*, got '1/mm\^2'",
-    "r [mm],value [1/mm],sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column value: expected light per area .*, got \[1/mm\]",
     f"r,{'v' * 1000},sigma\n": r":1: .*, got the column 'v{37}\.\.\.'$",
     GOOD.replace(
         "0.2", "1e300"
@@ -189,8 +176,6 @@ BAD = {
     "r_in,value,sigma\n1,2,3\n": r":1: .*, got one of r_in and r_out without the other",
     "r,r_in,r_out,value,sigma\n": r":1: .*, got both r and r_in",
     "r,value [a\x1b],sigma\n": r":1: .*, got the column 'value \[a\\x1b\]'",
-    "r,value,sigma,colour\n": r":1: .*, got the column 'colour'",
-    "r,value,value,sigma\n": r":1: expected each column once, got 'value' 2 times",
     "r,value1,value2\n": r":1: .*, got 2 replicates",
     "r,value,value1,value2,value3\n": r":1: .*, got replicates beside value or sigma",
     "1,2,3\n4,5,6\n": r":1: expected a header of r .*, got the column '1'",
@@ -201,8 +186,6 @@ BAD = {
         GOOD.replace("0.2", cell): f":3: column value: expected a finite number, got '{cell}'"
         for cell in ("1e400", "zero", "nan", "", "inf", "1_0")
     },
-    GOOD.replace("0.2", "x" * 90): r":3: column value: expected a finite number, got 'x+\.\.\.'$",
-    GOOD.replace("0.2,0.01", "0.2,-0.01"): r":3: column sigma: expected a standard error > 0, got -0.01",
     GOOD.replace("0.2,0.01", "0.2,0"): r":3: column sigma: expected a standard error > 0, got 0",
     GOOD.replace("\n2,", "\n0.5,"): r":3: column r: expected r to rise above 1, got 0.5",
     GOOD.replace("\n2,", "\n1,"): r":3: column r: expected r to rise above 1, got 1",
@@ -212,7 +195,6 @@ BAD = {
     "r_in,r_out,value,sigma\n1,1,2,.1\n2,3,1,.1\n3,4,1,.1\n": r":2: column r_out: expected more than r_in 1, got 1",
     "r_in,r_out,value,sigma\n0,2,2,.1\n1,3,1,.1\n3,4,1,.1\n": r":3: column r_in: expected at least the r_out 2 before",
     "r,value1,value2,value3\n1,2,2,2\n2,1,1,1\n3,1,1,1\n": r":2: column value1: expected replicates that differ, here",
-    "r [furlong],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of nm, .*, got 'furlong'",
     "r,value [1/mm^2],sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit, as value has one",
     'r,value,sigma\n1,"2,3\n2,1,1\n3,1,1\n': r":2: expected cells between commas, got: unexpected end of data",
     b"\x89PNG\r\n\x1a\n\x00\x00": r":1: expected text in UTF-8, got the byte 0x89",
@@ -231,7 +213,7 @@ def test_faults_are_one_line_with_file_row_and_column(table, tmp_path, text, mes
 def test_units_that_contradict(table):
     with pytest.raises(InputError, match=r":1: column r: expected one unit, here and in `unit`, got cm, mm"):
         table(GOOD.replace("r,", "r [mm],"), unit="cm")
-    with pytest.raises(InputError, match=r"^unit must be a unit of length .*, got 'ell'"):
+    with pytest.raises(InputError, match=r"^unit must be a unit of length \(nm, .*\), got 'ell'"):
         table(GOOD, unit="ell")
     mixed = GOOD.replace("value", "value [1/mm^2]").replace("sigma", "sigma [%]")
     with pytest.raises(InputError, match=r":1: column sigma: expected the unit of value, \[1/mm\^2\], or none, got"):
@@ -364,11 +346,7 @@ def test_light_that_no_run_gives_is_one_line(tmp_path):
     for name, changed_text, message in (
         ("few", text.replace("2097152 \t", "50 \t"), r"expected at least 3 annuli .*, got \d\d in"),
         ("bright", head + mark + rest.replace(rest.split("\n")[1], "1E+20", 1), TOO_MUCH),
-        (
-            "mirror",
-            re.sub(r"0\s*\t#Specular", "1 \t#Specular", text),
-            "expected a specular reflectance below 1, got 1$",
-        ),
+        ("mirror", re.sub(r"0\s*\t#Spec", "1 \t#Spec", text), "expected a specular reflectance below 1, got 1$"),
     ):
         (tmp_path / f"{name}.mco").write_text(changed_text)
         with pytest.raises(InputError, match=f"{name}.mco: {message}"):
@@ -449,19 +427,11 @@ def test_lengths_come_in_the_unit_of_the_data():
     assert length("l", "500nm", "mm") == pytest.approx(5e-4)
     assert length("l", "1 inch", "cm") == pytest.approx(2.54)
     assert factor("in", "mm") == pytest.approx(25.4)
-
-
-@pytest.mark.parametrize("text", ["", "mm", "-1mm", "0", "1.2.3", "1 ft", "nan", "1mm2"])
-def test_what_is_no_length_is_named(text):
-    with pytest.raises(InputError, match=r"^held l must be a length > 0 such as 1.2mm \(units: nm, .*\), got"):
-        length("held l", text, "mm")
-
-
-def test_a_unit_needs_a_unit():
+    for text in ("", "mm", "-1mm", "0", "1.2.3", "1 ft", "nan", "1mm2"):
+        with pytest.raises(InputError, match=r"^held l must be a length > 0 such as 1.2mm \(units: nm, .*\), got"):
+            length("held l", text, "mm")
     with pytest.raises(InputError, match="l must be without a unit where the data has none"):
         length("l", "1mm", "")
-    with pytest.raises(InputError, match=r"^unit must be a unit of length \(nm, .*\), got 'mile'"):
-        checked_unit("unit", "mile")
 
 
 OF_AREA = ("1/mm^2", "1/mm2", "1 / mm ^2", "mm^-2", "mm-2", "1/mm²", "/mm²", "1/(mm^2)", "mm⁻²", "mm^(-2)", "1/mm**2")

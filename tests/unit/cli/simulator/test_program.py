@@ -106,15 +106,9 @@ def test_control_c_is_pythons_own_again_unless_the_process_ends_by_it(capfd):
         signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
     assert capfd.readouterr().err == STOPPING
-
-
-def test_a_handler_of_somebody_else_stays():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with two_interrupts():
-            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with two_interrupts():
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN, "of somebody else, it stays"
 
 
 def test_logs_are_silent_only_inside(caplog):
