@@ -37,26 +37,26 @@ COST_CAPTION = (
 HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16 alone, worst of 24 albedos, l = 1"
 
 
-def check_tables(found: Checked, in_detail: bool = False) -> list[RenderableType]:
+def check_tables(outcome: Checked, in_detail: bool = False) -> list[RenderableType]:
     """Return a line a law and a line a map, costs and half precision; `in_detail` each law's errors as well."""
     parts: list[RenderableType] = []
-    for kind, names, checks in _groups(found):
+    for kind, names, checks in _groups(outcome):
         has_g = any(one.of.setting.g for one in checks)
         header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
         rows = [(one.of.label, *_setting(one.of)[1 : 2 + has_g], *_cells(one)) for one in checks]
-        title, caption = f"{kind.capitalize()}s in float32, {found.device}", CAPTION if kind == "law" else ""
+        title, caption = f"{kind.capitalize()}s in float32, {outcome.device}", CAPTION if kind == "law" else ""
         parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
-    parts += _place_tables(found.laws) if in_detail else []
-    if found.costs:
-        title, header = f"Cost of one evaluation, {found.device}", ("source", *WORKS)
-        parts.append(row_table(title, header, _cost_rows(found.costs), COST_CAPTION, left=("source",)))
-    return [*parts, *([_half_table(found.halves)] if found.halves else [])]
+    parts += _place_tables(outcome.laws) if in_detail else []
+    if outcome.costs:
+        title, header = f"Cost of one evaluation, {outcome.device}", ("source", *WORKS)
+        parts.append(row_table(title, header, _cost_rows(outcome.costs), COST_CAPTION, left=("source",)))
+    return [*parts, *([_half_table(outcome.halves)] if outcome.halves else [])]
 
 
-def _groups(found: Checked) -> list[Group]:
+def _groups(outcome: Checked) -> list[Group]:
     """Return laws and maps, each with their name and the headers of their errors, as far as there are any."""
-    laws: Group = ("law", LAW_COLUMNS, found.laws)
-    maps: Group = ("map", MAP_COLUMNS, found.maps)
+    laws: Group = ("law", LAW_COLUMNS, outcome.laws)
+    maps: Group = ("map", MAP_COLUMNS, outcome.maps)
     return [group for group in (laws, maps) if group[2]]
 
 
@@ -105,29 +105,29 @@ def markdown_check(folder: Path) -> str:
     return markdown_checks(checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder))
 
 
-def markdown_checks(found: Checked) -> str:
+def markdown_checks(outcome: Checked) -> str:
     """Return the README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
-    for kind, names, checks in _groups(found):
+    for kind, names, checks in _groups(outcome):
         header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
         parts.append(markdown_table(header, [(one.of.label, *_setting(one.of), *_cells(one)) for one in checks]))
-    if broken := [f"- `{_called(one)}`: {bound}" for one in found.checks for bound in one.broken]:
+    if broken := [f"- `{_called(one)}`: {bound}" for one in outcome.checks for bound in one.broken]:
         parts.append("\n".join(broken))
-    if found.costs:
-        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(found.costs)))
-    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if found.costs else [])]
-    return "\n\n".join([*parts, f"On {found.device}. {'. '.join(captions)}."])
+    if outcome.costs:
+        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(outcome.costs)))
+    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if outcome.costs else [])]
+    return "\n\n".join([*parts, f"On {outcome.device}. {'. '.join(captions)}."])
 
 
-def content(found: Checked) -> dict[str, Any]:
+def content(outcome: Checked) -> dict[str, Any]:
     """Return all checks as plain numbers and text, for --json; null stands for what is not finite."""
     whole = {
-        "device": found.device,
-        "passed": not found.is_broken,
-        "laws": [{**_check_content(one), "spreads": one.spreads} for one in found.laws],
-        "maps": [_check_content(one) for one in found.maps],
-        "costs": found.costs,
-        "float16": {_at_index(one.of): {"rel": one.rel, "ks": one.ks} for one in found.halves},
+        "device": outcome.device,
+        "passed": not outcome.is_broken,
+        "laws": [{**_check_content(one), "spreads": one.spreads} for one in outcome.laws],
+        "maps": [_check_content(one) for one in outcome.maps],
+        "costs": outcome.costs,
+        "float16": {_at_index(one.of): {"rel": one.rel, "ks": one.ks} for one in outcome.halves},
     }
     return dict(plain(whole))
 
