@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from mcml_sim import __version__
-from mcml_sim.files.text_file import MOST_JSON
 from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record, schema
 from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
@@ -234,13 +233,9 @@ UNSAFE = [
             ('"1; evil()"', r'constants\.s0\.regenerated must be a number, got "1; ev'),
             ("1e400", r"is not a record: the number 1e400, beyond floating point"),
             ('1, "model_error": "x"', r'model_error must be a number or null, got "x"'),
-            ("NaN", r"is not a record: NaN, which is no number"),
-            ("9" * 5000, r"is not a record: a whole number of 5000 digits"),
         )
     ),
     (f'"note": {"[" * 20}{"]" * 20}', r"note.* must not nest deeper than 12 tables and lists"),
-    (f'"note": {"[" * 100_000}{"]" * 100_000}', r"is not a record: "),
-    (f'"note": "{"x" * MOST_JSON}"', r"is not a record: more than 2097152 bytes"),
 ]
 
 
