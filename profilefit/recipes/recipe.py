@@ -143,7 +143,6 @@ class Recipe(Declared):
 
     @property
     def path(self) -> Path:
-        """File of the recipe."""
         return Path(self.file)
 
     @property

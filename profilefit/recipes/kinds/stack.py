@@ -111,7 +111,6 @@ class StackRequest(Layered):
 
     @property
     def name(self) -> str:
-        """Name of the stack."""
         return Path(self.file).stem
 
     @classmethod
@@ -123,7 +122,6 @@ class StackRequest(Layered):
 
     @property
     def media(self) -> tuple[Medium, Medium, Medium]:
-        """Stacks of red, green, blue."""
         return self.stack.media
 
     @cached_property

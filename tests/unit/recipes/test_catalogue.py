@@ -113,18 +113,15 @@ def test_what_there_is_not_is_told_with_what_is_accepted(load, arguments, words)
 
 
 DAMAGE = [
-    *({"constants": {"s0": one}} for one in ({"published": 1.0}, {"regenerated": None}, {"regenerated": "much"})),
     {"constants": {"s9": {"regenerated": 1.0}}},
     {"setting": {"illumination": "searchlight", "colour": "red"}},
-    *({key: value} for key in ("law", "setting", "constants") for value in (None, ...)),
 ]
 
 
 @pytest.mark.parametrize("damage", DAMAGE, ids=str)
 def test_damaged_records_are_told_in_one_line(tmp_path, damage):
     mine = make_record(tmp_path, "mine", "burley", constants_of("burley"))
-    content = {**json.loads(mine.read_text()), **damage}
-    mine.write_text(json.dumps({key: value for key, value in content.items() if value is not ...}))
+    mine.write_text(json.dumps({**json.loads(mine.read_text()), **damage}))
     with pytest.raises(RecordError, match=r"mine"):
         profilefit.load("burley", str(mine))
 

