@@ -311,10 +311,10 @@ def _off(variances: Floats, weights: Floats, lights: Sequence[SumLight]) -> tupl
     return np.concatenate(values), np.concatenate(slopes)
 
 
-def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
+def constant_names(count: int) -> list[str]:
     """Return the names of a sum's constants in their order: v1 ... vN, red.w1 ... red.wN, ..."""
     places = range(1, count + 1)
-    return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in channels for i in places)]
+    return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in CHANNELS for i in places)]
 
 
 def errors(

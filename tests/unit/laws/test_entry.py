@@ -340,11 +340,7 @@ def test_samplers_and_maps_name_theirs(burley, liang_printed):
     np.testing.assert_array_equal(burley.profile(whole, 0.5), burley.profile([0.5, 0.7], 0.5))
     for evaluate, given, said in (
         (burley.sampler.sample, (2.0, 0.5), r"xi must be in \[0, 1\], got 2"),
-        (
-            burley.sampler.sample,
-            (masked, 0.5),
-            "xi must be .*, got an array with masked values: fill them or leave them",
-        ),
+        (burley.sampler.sample, (masked, 0.5), "xi must be .* with masked values: fill them or leave them"),
         (burley.albedo.alpha, (1.2,), r"reflectance must be in \[0, 1\], got 1.2"),
         (liang_printed.largest_radius, (-0.1,), r"alpha must be in \[0, 1\], got -0.1"),
     ):
