@@ -153,7 +153,6 @@ class LoadedLaw:
 
     @property
     def records(self) -> tuple[str, ...]:
-        """Names of those records."""
         return tuple(path.stem for path in self.files)
 
     @property
