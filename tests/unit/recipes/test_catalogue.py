@@ -90,7 +90,6 @@ def test_a_records_path(tmp_path):
         (profilefit.load, ["liang", "best"], r"constants must be one of regenerated, published, corrected, the path"),
         (profilefit.load, ["burley", "published:corrected"], r"got 'published:corrected'"),
         (profilefit.albedo_law, ["rational", "published"], r"constants must be one of regenerated, the path"),
-        (profilefit.load, ["liang", "/nowhere/x.json"], r"/nowhere/x\.json: there is no such record"),
         (profilefit.load, ["burley", "regenerated", "diffuse"], r"setting must be a mcml_sim\.Setting, got 'diffuse'"),
         (profilefit.load, ["dipole", "old"], r"must be one of regenerated, the path of a record .*, got 'old'"),
         (profilefit.albedo_law, ["chiang"], r"of albedo chiang must be one of published, the path .*'regenerated'"),

@@ -275,12 +275,10 @@ def test_pipelines_take_what_they_can_fit(write):
 def test_a_file_that_cannot_be_read(tmp_path):
     """A name that is no printable line would name the record, which nothing could read."""
     (tmp_path / "folder.toml").mkdir()
-    (tmp_path / "latin.toml").write_bytes(b'title = "caf\xe9"')
     (tmp_path / "a\nb.toml").write_text(GOOD)
     for name, words in (
         ("gone.toml", r"gone\.toml: there is no such recipe"),
         ("folder.toml", r"folder\.toml: expected a file that can be read, got: Is a dir"),
-        ("latin.toml", r"latin\.toml: is not TOML: .utf-8. codec"),
         ("a\nb.toml", r"the name of a recipe must be one printable line"),
     ):
         with pytest.raises(RecipeError, match=words) as caught:
