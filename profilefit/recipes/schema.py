@@ -226,7 +226,7 @@ def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
     for name, item in items:
         if isinstance(name, str) and not is_line(name):
             return f"keys in {place or 'it'} must be {TEXT.words}, got {shown(name)}"
-        if type(item) is float and is_number(item):  # most of a record: its place is never told
+        if type(item) is float and math.isfinite(item):  # most of a record: its place is never told
             continue
         if text := _unfit(item, f"{place}.{name}".removeprefix("."), depth + 1):
             return text
