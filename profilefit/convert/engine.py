@@ -91,9 +91,8 @@ def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
 
 
 def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
-    return (
-        UNREAL_SHRINK * lengths.scale_dmfp(reflectance_of(alpha, "searchlight")) * lengths.falloff_searchlight(alpha, g)
-    )
+    scale = lengths.scale_dmfp(reflectance_of(alpha, "searchlight"))
+    return UNREAL_SHRINK * scale * lengths.falloff("searchlight", alpha)
 
 
 # Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface, "entered" is
@@ -114,18 +113,18 @@ COLOURS: dict[str, Colour] = {
 FACTORS: dict[str, Factor] = {
     "l": lengths.transport,
     "unreduced": lengths.unreduced_path,
-    "falloff": lengths.falloff_diffuse,
+    "falloff": partial(lengths.falloff, "diffuse"),
     "Cycles' legacy": lambda alpha, g: lengths.stretch(alpha, g) / SHRINK,
     "Cycles 2": lambda alpha, g: lengths.transport(alpha, g) / SHRINK,
-    "Cycles' Burley": lambda alpha, g: lengths.falloff_diffuse(alpha, g) / SHRINK,
+    "Cycles' Burley": lambda alpha, g: lengths.falloff("diffuse", alpha) / SHRINK,
     "Cycles' skin": lambda alpha, g: (
         lengths.classical(skin_alpha(wrenninge_colour(alpha, g)), g) * lengths.stretch(alpha, g)
     ),
-    "HDRP's radius": lambda alpha, g: HDRP_REACH * lengths.falloff_diffuse(alpha, g),
-    "HDRP's walk": lambda alpha, g: 1.0 / lengths.scale_diffuse(mapped_colour("Chiang", alpha)),
+    "HDRP's radius": lambda alpha, g: HDRP_REACH * lengths.falloff("diffuse", alpha),
+    "HDRP's walk": lambda alpha, g: 1.0 / lengths.scale("diffuse", mapped_colour("Chiang", alpha)),
     "Unreal's": lambda alpha, g: UNREAL_MAGIC * lengths.transport(alpha, g),
     "Unreal's before 5.1": _unreal_dmfp,
-    "appleseed's walk of 2017": lambda alpha, g: 1.0 / lengths.scale_searchlight(mapped_colour("Chiang", alpha)),
+    "appleseed's walk of 2017": lambda alpha, g: 1.0 / lengths.scale("searchlight", mapped_colour("Chiang", alpha)),
 }
 # A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half
 # of the light enters diffusely.

@@ -191,7 +191,6 @@ AT_G = {
     f"{SPANS}cosines = [0.9, 0.5, 0.1]": "cosines must rise",
     f"{SPANS}cosines = [0.1, 0.8, 0.97]": "cosines must rise",
     f"{SPANS}cosines = [0.1, 0.5, 0.8]": "[setting] g must be one of the cosines",
-    "": "[setting] g must be 0 where there are no cosines, got 0.9",
 }
 # Of the light, indices and mean cosines that a recipe is for: lines before it, those of [setting], and words.
 IN_SETTING = [
