@@ -90,11 +90,6 @@ def _beam_diffusion(alpha: Floats, n: float, g: float) -> Floats:
     return np.minimum(np.asarray(law.reflectance(alpha)) / law.entered, 1.0)
 
 
-def _unreal_dmfp(alpha: Floats, g: float) -> Floats:
-    scale = lengths.scale_dmfp(reflectance_of(alpha, "searchlight"))
-    return UNREAL_SHRINK * scale * lengths.falloff("searchlight", alpha)
-
-
 # Colours that are typed; "diffuse" and "searchlight" are A under that light and an index-matched surface, "entered" is
 # A under a pencil beam and the medium's surface, per light that entered.
 COLOURS: dict[str, Colour] = {
@@ -123,7 +118,9 @@ FACTORS: dict[str, Factor] = {
     "HDRP's radius": lambda alpha, g: HDRP_REACH * lengths.falloff("diffuse", alpha),
     "HDRP's walk": lambda alpha, g: 1.0 / lengths.scale("diffuse", mapped_colour("Chiang", alpha)),
     "Unreal's": lambda alpha, g: UNREAL_MAGIC * lengths.transport(alpha, g),
-    "Unreal's before 5.1": _unreal_dmfp,
+    "Unreal's before 5.1": lambda alpha, g: (
+        UNREAL_SHRINK * lengths.scale_dmfp(reflectance_of(alpha, "searchlight")) * lengths.falloff("searchlight", alpha)
+    ),
     "appleseed's walk of 2017": lambda alpha, g: 1.0 / lengths.scale("searchlight", mapped_colour("Chiang", alpha)),
 }
 # A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half
