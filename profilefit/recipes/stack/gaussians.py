@@ -197,9 +197,9 @@ def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
     variances, count = sums.variances, sums.variances.size
     values, jacobian = _off(variances, sums.weights, lights)
     whole, levels = jacobian.T @ jacobian, np.arange(count)
-    parts = np.split(values, np.cumsum([light.energy.size for light in lights])[:-1])
-    for number, (own, light, part) in enumerate(zip(sums.weights, lights, parts, strict=True)):
-        pull = part * light.weight * light.whole / light.energy
+    residuals = np.split(values, np.cumsum([light.energy.size for light in lights])[:-1])
+    for number, (own, light, off) in enumerate(zip(sums.weights, lights, residuals, strict=True)):
+        pull = off * light.weight * light.whole / light.energy
         _, bent, more = (pull @ part for part in _shares(light.edges, variances))
         places = levels + count * (1 + number)
         whole[levels, levels] += more * own
