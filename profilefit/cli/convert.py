@@ -25,7 +25,6 @@ WIDTH = 120  # of the tables
 
 
 def _length(words: str) -> Any:
-    """Return the option of a length."""
     return typer.Option(help=words, rich_help_panel=LENGTH)
 
 

@@ -33,20 +33,9 @@ from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
 from mcml_sim.files.text_file import parse_toml
 from mcml_sim.media.arrays import Floats
+from profilefit.convert import lengths
 from profilefit.convert.colour import MAPS, mapped_colour, reflectance_of, reflectance_rough, wrenninge_colour
-from profilefit.convert.lengths import (
-    Factor,
-    Length,
-    classical,
-    falloff_diffuse,
-    falloff_searchlight,
-    scale_diffuse,
-    scale_dmfp,
-    scale_searchlight,
-    stretch,
-    transport,
-    unreduced_path,
-)
+from profilefit.convert.lengths import Factor, Length
 from profilefit.laws.diffusion import BeamDiffusion
 
 Colour = Callable[[Floats, float, float], Floats]  # of reduced albedo, index n of the surface, and g
@@ -111,20 +100,22 @@ COLOURS: dict[str, Colour] = {
 }
 # Lengths that are typed, over l [-]; each row of `engines.toml` has its formula in words.
 FACTORS: dict[str, Factor] = {
-    "l": transport,
-    "unreduced": unreduced_path,
-    "falloff": falloff_diffuse,
-    "Cycles' legacy": lambda alpha, g: stretch(alpha, g) / SHRINK,
-    "Cycles 2": lambda alpha, g: transport(alpha, g) / SHRINK,
-    "Cycles' Burley": lambda alpha, g: falloff_diffuse(alpha, g) / SHRINK,
-    "Cycles' skin": lambda alpha, g: classical(skin_alpha(wrenninge_colour(alpha, g)), g) * stretch(alpha, g),
-    "HDRP's radius": lambda alpha, g: HDRP_REACH * falloff_diffuse(alpha, g),
-    "HDRP's walk": lambda alpha, g: 1.0 / scale_diffuse(mapped_colour("Chiang", alpha)),
-    "Unreal's": lambda alpha, g: UNREAL_MAGIC * transport(alpha, g),
-    "Unreal's before 5.1": lambda alpha, g: (
-        UNREAL_SHRINK * scale_dmfp(reflectance_of(alpha, "searchlight")) * falloff_searchlight(alpha, g)
+    "l": lengths.transport,
+    "unreduced": lengths.unreduced_path,
+    "falloff": partial(lengths.falloff, "diffuse"),
+    "Cycles' legacy": lambda alpha, g: lengths.stretch(alpha, g) / SHRINK,
+    "Cycles 2": lambda alpha, g: lengths.transport(alpha, g) / SHRINK,
+    "Cycles' Burley": lambda alpha, g: lengths.falloff("diffuse", alpha) / SHRINK,
+    "Cycles' skin": lambda alpha, g: (
+        lengths.classical(skin_alpha(wrenninge_colour(alpha, g)), g) * lengths.stretch(alpha, g)
     ),
-    "appleseed's walk of 2017": lambda alpha, g: 1.0 / scale_searchlight(mapped_colour("Chiang", alpha)),
+    "HDRP's radius": lambda alpha, g: HDRP_REACH * lengths.falloff("diffuse", alpha),
+    "HDRP's walk": lambda alpha, g: 1.0 / lengths.scale("diffuse", mapped_colour("Chiang", alpha)),
+    "Unreal's": lambda alpha, g: UNREAL_MAGIC * lengths.transport(alpha, g),
+    "Unreal's before 5.1": lambda alpha, g: (
+        UNREAL_SHRINK * lengths.scale_dmfp(reflectance_of(alpha, "searchlight")) * lengths.falloff("searchlight", alpha)
+    ),
+    "appleseed's walk of 2017": lambda alpha, g: 1.0 / lengths.scale("searchlight", mapped_colour("Chiang", alpha)),
 }
 # A [-] of a walk that light enters through the node's surface, refracted, seen from the normal; of the skin's walk half
 # of the light enters diffusely.

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,17 +31,14 @@ from profilefit.laws import published
 Factor = Callable[[Floats, float], Floats]  # of reduced albedo and g
 
 
-def scale_searchlight(reflectance: ArrayLike) -> Floats:
-    """Return s = l / d for A under a normal pencil beam [-]: the memo's eq. (5), 5.5 % mean error reported."""
-    return _scale("published", 3, reflectance)
+# Printed constants and power of the memo's s, by illumination: eq. (5) for a normal pencil beam, 5.5 % mean error
+# reported, and eq. (6), 3.9 %.
+SCALES = {"searchlight": ("published", 3), "diffuse": ("diffuse", 2)}
 
 
-def scale_diffuse(reflectance: ArrayLike) -> Floats:
-    """Return s = l / d for A under diffuse illumination [-]: the memo's eq. (6), 3.9 %."""
-    return _scale("diffuse", 2, reflectance)
-
-
-def _scale(printed: str, power: int, reflectance: ArrayLike) -> Floats:
+def scale(illumination: str, reflectance: ArrayLike) -> Floats:
+    """Return s = l / d for A under an illumination [-]."""
+    printed, power = SCALES[illumination]
     a, s = np.asarray(reflectance, float), published.constants("burley", printed)
     return s["s0"] - s["s1"] * a + s["s2"] * np.abs(a - s["s3"]) ** power
 
@@ -83,14 +81,9 @@ def decay(alpha: Floats, g: float = 0.0) -> Floats:
         return 1.0 / np.asarray(exact.decay_rate(alpha), float)
 
 
-def falloff_searchlight(alpha: Floats, g: float = 0.0) -> Floats:
-    """Return 1 / s(A) [-], A under a pencil beam."""
-    return 1.0 / scale_searchlight(reflectance_of(alpha, "searchlight"))
-
-
-def falloff_diffuse(alpha: Floats, g: float = 0.0) -> Floats:
-    """Return 1 / s(A) [-], A under diffuse illumination."""
-    return 1.0 / scale_diffuse(reflectance_of(alpha, "diffuse"))
+def falloff(illumination: str, alpha: Floats, g: float = 0.0) -> Floats:
+    """Return 1 / s(A) [-], A under an illumination."""
+    return 1.0 / scale(illumination, reflectance_of(alpha, illumination))
 
 
 def falloff_dmfp(alpha: Floats, g: float = 0.0) -> Floats:
@@ -119,7 +112,7 @@ QUANTITIES = (
     Length("dmfp", grosjean, "diffuse mean free path", "", "Grosjean's"),
     Length("dmfp_classical", classical, "  classical", "", "1 / sqrt(3 mu_a (mu_a + mu_s'))"),
     Length("decay_length", decay, "  exact, of g = 0", "", "far away R_d ~ exp(-r / it)"),
-    Length("falloff_searchlight", falloff_searchlight, "falloff d", "searchlight", "l / s(A)"),
-    Length("falloff_diffuse", falloff_diffuse, "falloff d", "diffuse", "l / s(A)"),
+    Length("falloff_searchlight", partial(falloff, "searchlight"), "falloff d", "searchlight", "l / s(A)"),
+    Length("falloff_diffuse", partial(falloff, "diffuse"), "falloff d", "diffuse", "l / s(A)"),
     Length("falloff_dmfp", falloff_dmfp, "falloff d of l_d", "searchlight", "l_d / s(A), l_d Grosjean's"),
 )

@@ -92,8 +92,14 @@ def _constants(
         raise InputError(f"setting must be a mcml_sim.Setting, got {requested!r}")
     entry = kind.entry
     if which == REGENERATED or (which == "published" and not kind.constant_names()):
-        where = requested or SEARCHLIGHT
-        return _all_regenerated(kind, where, records), where
+        if kind.constant_names() and not entry.records:
+            accepted = f"constants of {entry.key} must be one of {_accepted(entry.printed)}"
+            raise RecordError(f"{accepted}: none were regenerated, got 'regenerated'")
+        where, values = requested or SEARCHLIGHT, dict[str, float]()
+        for base in entry.records:  # none of a law without constants
+            path = records.path(base, where)
+            values |= _of_record(records.read(path), where, path.stem)
+        return values, where
     if which.endswith(".json"):
         content = records.read(Path(which))
         owner = content.get("law")
@@ -109,21 +115,6 @@ def _constants(
         belong = f"the {which} constants of {entry.printed} belong to {chosen.setting}"
         raise SettingError(f"{belong}, got a request for {requested}")
     return dict(chosen.constants), chosen.setting
-
-
-def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) -> dict[str, float]:
-    """Return the constants of every record that a law is made of; none for a law that has none."""
-    if not kind.constant_names():
-        return {}
-    entry = kind.entry
-    if not entry.records:
-        accepted = f"constants of {entry.key} must be one of {_accepted(entry.printed)}"
-        raise RecordError(f"{accepted}: none were regenerated, got 'regenerated'")
-    values: dict[str, float] = {}
-    for base in entry.records:
-        path = records.path(base, setting)
-        values |= _of_record(records.read(path), setting, path.stem)
-    return values
 
 
 def _accepted(law: str) -> str:
@@ -162,7 +153,6 @@ class LoadedLaw:
 
     @property
     def records(self) -> tuple[str, ...]:
-        """Names of those records."""
         return tuple(path.stem for path in self.files)
 
     @property

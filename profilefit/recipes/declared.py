@@ -65,7 +65,6 @@ class OneOf:
         self.names = names
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of a literal."""
         return core_schema.literal_schema(list(self.names))
 
 
@@ -91,11 +90,9 @@ class NumberRange:
         return float(ends[0]), float(ends[1])
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of `read`."""
         return core_schema.no_info_plain_validator_function(self.read)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Return the JSON Schema."""
         number = {"type": "number", "exclusiveMinimum": 0}
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
         return {"accepted": self.words, "anyOf": [number, pair]}

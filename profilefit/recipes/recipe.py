@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -14,8 +14,7 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, printable, words
-from profilefit.recipes.folder import available as available_files
-from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
 
 SEARCHLIGHT = Setting()
@@ -144,7 +143,6 @@ class Recipe(Declared):
 
     @property
     def path(self) -> Path:
-        """File of the recipe."""
         return Path(self.file)
 
     @property
@@ -258,14 +256,10 @@ def read(path: Path) -> Recipe:
     return Recipe.of(str(path), table, RecipeError)
 
 
-available = partial(available_files, ending="toml")
-"""Recipes of a folder by name, in order."""
-
-
 def is_recipe(name: str) -> bool:
     """Return whether a name is that of a shipped recipe, or of a .toml file that is none of layers."""
     if not name.endswith(".toml"):
-        return name in available(fits_folder())
+        return name in available(fits_folder(), "toml")
     path = Path(name)
     return not (path.is_file() and "layers" in read_toml(path))
 
@@ -274,7 +268,7 @@ def find(name: str, folder: Path) -> Recipe:
     """Return a recipe by its name in `folder`, or by the path of a .toml file."""
     if name.endswith(".toml"):
         return read(Path(name))
-    known = available(folder)
+    known = available(folder, "toml")
     if name not in known:
         raise RecipeError(f"recipe must be one of {', '.join(known) or '(none)'} or a .toml file, got {name!r}")
     return read(known[name])

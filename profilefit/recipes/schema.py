@@ -7,11 +7,13 @@ constants: what passes here is safe for both.
 from __future__ import annotations
 
 import json
+import math
 import re
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from mcml_sim.media import checks
 
 LONGEST_TEXT = 1000  # characters; ours have 256
 LONGEST_SHOWN = 60  # characters of a value in a message
@@ -24,9 +26,7 @@ def is_line(value: Any) -> bool:
 
 def is_number(value: Any) -> bool:
     """Return whether a value is a number that float64 can hold; true and false are none."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
+    return checks.is_number(value) and math.isfinite(value)
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
     for name, item in items:
         if isinstance(name, str) and not is_line(name):
             return f"keys in {place or 'it'} must be {TEXT.words}, got {shown(name)}"
-        if type(item) is float and is_number(item):  # most of a record: its place is never told
+        if type(item) is float and math.isfinite(item):  # most of a record: its place is never told
             continue
         if text := _unfit(item, f"{place}.{name}".removeprefix("."), depth + 1):
             return text

@@ -45,20 +45,19 @@ TRACED_NOTE = (
 ARRAYS = ("edges", "energy", "weight", "noise", "ends")  # of a colour's light; the last A and what is inside [-]
 COUNTS = range(1, MOST + 1)
 MEASURED = ("rel", "rms", "ks", "alone")  # of red, green and blue
-# What tables and pictures take from a record.
-USED: Fields = {
-    **dict.fromkeys(("title", "equations", "note", "unit"), TEXT),
-    "layers": LIST,
-    "sums": TABLE,
-    "data_digest": DIGEST,
-}
 OF_LIGHT: Fields = {
     "reflectance share": NUMBERS,
     "by_count": LIST,
     **under("by_count.*", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE, " ".join(MEASURED): NUMBERS}),
 }
-SUMS_SHOWN = {key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()}
-SHOWN: Fields = {**USED, **SUMS_SHOWN}
+# What tables and pictures take from a record.
+SHOWN: Fields = {
+    **dict.fromkeys(("title", "equations", "note", "unit"), TEXT),
+    "layers": LIST,
+    "sums": TABLE,
+    "data_digest": DIGEST,
+    **{key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()},
+}
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
 
 
@@ -135,7 +134,7 @@ def load(path: Path) -> SumRecord:
     content = record.read_of(path, PIPELINE, "a record of sums of Gaussians", SHOWN, _mismatched)
     record.record_setting(content)
     with damage(path):
-        return SumRecord(recorded_stack(str(path), content, USED), content, path)
+        return SumRecord(recorded_stack(str(path), content), content, path)
 
 
 def _of_lights(media: tuple[Medium, ...], tracing: Tracing) -> dict[str, dict[str, Any]]:
@@ -186,9 +185,8 @@ def _content(
 ) -> dict[str, Any]:
     of_default = [of_light["by_count"][DEFAULT - 1] for of_light in lights.values()]
     return {
-        **header(of, run, PIPELINE, (NOTE, TRACED_NOTE)),
+        **header(of, run, PIPELINE, EQUATIONS, (NOTE, TRACED_NOTE)),
         "title": TITLE,
-        "equations": EQUATIONS,
         "constants": {
             f"{light}.{name}": value for light, one in lights.items() for name, value in one["constants"].items()
         },

@@ -87,7 +87,6 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Recor
 
 
 def _by_name(names: Sequence[str], values: Floats) -> dict[str, float]:
-    """Return values by their names."""
     return dict(zip(names, values.tolist(), strict=True))
 
 

@@ -111,7 +111,6 @@ class StackRequest(Layered):
 
     @property
     def name(self) -> str:
-        """Name of the stack."""
         return Path(self.file).stem
 
     @classmethod
@@ -123,7 +122,6 @@ class StackRequest(Layered):
 
     @property
     def media(self) -> tuple[Medium, Medium, Medium]:
-        """Stacks of red, green, blue."""
         return self.stack.media
 
     @cached_property
@@ -222,9 +220,8 @@ def read(path: Path) -> dict[str, Any]:
 
 def load(path: Path) -> StackRecord:
     """Return the laws of a record; RecordError if it is damaged, or if its half spaces have other constants by now."""
-    content = of_stack(path)
+    content, stack, setting = _opened(path)
     with damage(path):
-        stack, setting = recorded_stack(str(path), content), record.record_setting(content)
         if setting.n != stack.media[0].layers[0].n:
             raise InputError(f"setting.n must be that of its layers, got {setting.n:g}")
         red, green, blue = (
@@ -242,21 +239,29 @@ def matching(of: StackRequest, folder: Path) -> StackRecord | None:
     media = record.plain(of.media)  # to the digits of a record: the mean of an image has more
     for path in record.available(folder / STACKS).values():
         try:
-            content = of_stack(path)
-            with damage(path):
-                own, setting = recorded_stack(str(path), content).media, record.record_setting(content)
+            _, own, setting = _opened(path)
         except RecordError as error:
             text = f"{path} is passed over: {str(error).removeprefix(f'{path}: ')}"
             warnings.warn(text, DamagedRecord, stacklevel=2)
             continue
-        if record.plain(own) == media and setting.illumination == of.illumination:
+        if record.plain(own.media) == media and setting.illumination == of.illumination:
             return load(path)
     return None
 
 
-def of_stack(path: Path) -> dict[str, Any]:
-    """Return what a record says; RecordError on one that cannot be read or is of no stack."""
-    return record.read_of(path, PIPELINE, "the record of a stack")
+def _opened(path: Path) -> tuple[dict[str, Any], LayerStack, Setting]:
+    """Return what a record says, its layers and its setting; RecordError where it is damaged, or of no stack."""
+    content = record.read_of(path, PIPELINE, "the record of a stack")
+    with damage(path):
+        for key, kind in USED.items():
+            value: Any = content
+            for name in key.split("."):
+                if not isinstance(value, Mapping):
+                    raise InputError(f"{key} must be {kind.words}, got nothing")
+                value = value[name]
+            if not kind.accepts(value):
+                raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
+        return content, recorded_stack(str(path), content), record.record_setting(content)
 
 
 @contextmanager
@@ -277,16 +282,8 @@ def interfaces(content: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
     return ((channel, number) for channel in CHANNELS for number in range(1, len(content["layers"])))
 
 
-def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED) -> LayerStack:
-    """Return the layers of a record; InputError where one of `fields` is of another type, or where no law fits them."""
-    for key, kind in fields.items():
-        value: Any = content
-        for name in key.split("."):
-            if not isinstance(value, Mapping):
-                raise InputError(f"{key} must be {kind.words}, got nothing")
-            value = value[name]
-        if not kind.accepts(value):
-            raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
+def recorded_stack(file: str, content: Mapping[str, Any]) -> LayerStack:
+    """Return the layers of a record that has a list of them; InputError where no law fits them."""
     layers = []
     for layer in content["layers"]:
         if not TABLE.accepts(layer):
@@ -300,13 +297,14 @@ def recorded_stack(file: str, content: Mapping[str, Any], fields: Fields = USED)
     return stack
 
 
-def header(of: StackRequest, run: RecipeRun, pipeline: str, notes: tuple[str, str]) -> dict[str, Any]:
+def header(of: StackRequest, run: RecipeRun, pipeline: str, equations: str, notes: tuple[str, str]) -> dict[str, Any]:
     """Return what the records of a stack say of its layers and light; notes  on exact light, and on traced light."""
     first = of.media[0].layers[0]
     is_traced = any(layer.g > 0 for layer in of.media[0].layers)
     return {
         "law": pipeline,
         "pipeline": pipeline,
+        "equations": equations,
         "note": notes[is_traced] + ("" if is_traced else run.unused()),
         "setting": Setting(of.illumination, n=first.n, g=first.g),
         "unit": of.stack.unit,
@@ -380,9 +378,8 @@ def _content(of: StackRequest, run: RecipeRun, channels: Mapping[str, Mapping[st
     rel, ks, of_a = ([value for each in measured for value in each[key]] for key in ("rel", "ks", "delta_A"))
     digests = "".join(one["data_digest"] for one in channels.values())
     return {
-        **header(of, run, PIPELINE, (NOTE, TRACED_NOTE)),
+        **header(of, run, PIPELINE, EQUATIONS, (NOTE, TRACED_NOTE)),
         "title": of.title,
-        "equations": EQUATIONS,
         "half_spaces": {channel: one["half_spaces"] for channel, one in channels.items()},
         "constants": {
             f"{channel}.{name}": value for channel, one in channels.items() for name, value in one["constants"].items()

@@ -175,7 +175,6 @@ class LayerTable(Declared):
 
     @property
     def map(self) -> ThicknessMap | None:
-        """Image of the thickness."""
         return self.thickness._map if isinstance(self.thickness, ImageTable) else None
 
     @property

@@ -423,12 +423,10 @@ def _as_slabs_add(top: LayerLaw, below: Below) -> Floats:
 
 def _solved(start, top: LayerLaw, below: Below, d: Floats, lights: Lights) -> Solution:
     """Return the optimum from a start; fits to traced light stay near it where nothing speaks against that."""
+    arrays = tuple(np.stack(column) for column in zip(*lights, strict=True))
     if isinstance(lights[0], TracedRings):
-        rings = [light for light in lights if isinstance(light, TracedRings)]
-        arrays = tuple(np.stack([np.asarray(part) for part in column]) for column in zip(*rings, strict=True))
         return least_squares(_ring_residual, start, (*arrays, d, top, below, np.asarray(start)))
-    exactly = (np.stack(columns) for columns in zip(*lights, strict=True))
-    return least_squares(_residual, start, (*exactly, d, top, below))
+    return least_squares(_residual, start, (*arrays, d, top, below))
 
 
 def _law_of(parameters: Floats, top: LayerLaw, below: Below, thickness: float) -> StackLaw:

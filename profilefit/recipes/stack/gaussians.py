@@ -196,11 +196,10 @@ def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
     """Return the Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     variances, count = sums.variances, sums.variances.size
     values, jacobian = _off(variances, sums.weights, lights)
-    whole, end = jacobian.T @ jacobian, 0
-    levels = np.arange(count)
-    for number, (own, light) in enumerate(zip(sums.weights, lights, strict=True)):
-        begin, end = end, end + light.energy.size
-        pull = values[begin:end] * light.weight * light.whole / light.energy
+    whole, levels = jacobian.T @ jacobian, np.arange(count)
+    residuals = np.split(values, np.cumsum([light.energy.size for light in lights])[:-1])
+    for number, (own, light, off) in enumerate(zip(sums.weights, lights, residuals, strict=True)):
+        pull = off * light.weight * light.whole / light.energy
         _, bent, more = (pull @ part for part in _shares(light.edges, variances))
         places = levels + count * (1 + number)
         whole[levels, levels] += more * own
@@ -312,10 +311,10 @@ def _off(variances: Floats, weights: Floats, lights: Sequence[SumLight]) -> tupl
     return np.concatenate(values), np.concatenate(slopes)
 
 
-def constant_names(count: int, channels: Sequence[str] = CHANNELS) -> list[str]:
+def constant_names(count: int) -> list[str]:
     """Return the names of a sum's constants in their order: v1 ... vN, red.w1 ... red.wN, ..."""
     places = range(1, count + 1)
-    return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in channels for i in places)]
+    return [*(f"v{i}" for i in places), *(f"{channel}.w{i}" for channel in CHANNELS for i in places)]
 
 
 def errors(
@@ -384,12 +383,10 @@ def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     # With r = w (m / e - 1): the slope J^T r moves by -J^T (w + 2 r) d ln e.
     slope = found.best.jacobian * (weight + 2.0 * found.best.residuals)[:, None]
     raw = scaled_inverse(curvature(found, lights)) @ slope.T
-    parts, end = [], 0
-    for light in lights:
-        begin, end = end, end + len(light.energy)
-        block = raw[:, begin:end]  # of what a sum is fitted to, e / A, not of e
-        parts.append(block - np.outer(block.sum(axis=1), light.energy / light.whole))
-    return np.concatenate(parts, axis=1)
+    parts = np.split(raw, np.cumsum([light.energy.size for light in lights])[:-1], axis=1)
+    # Those are of what a sum is fitted to, e / A, not of e.
+    each = zip(parts, lights, strict=True)
+    return np.hstack([part - np.outer(part.sum(axis=1), light.energy / light.whole) for part, light in each])
 
 
 def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium], gain: Floats) -> Floats:

@@ -75,8 +75,8 @@ def test_every_length_there_and_back_and_scaled(name):
 
 def test_lengths_by_hand():
     """1.85 - A + 7 |A - .8|^3, 1.9 - A + 3.5 (A - .8)^2, 3.5 + 100 (A - .33)^4 at A = 0.3 and 1 by hand."""
-    np.testing.assert_allclose(lengths.scale_searchlight([0.3, 1.0]), [1.55 + 0.875, 0.85 + 0.056], rtol=1e-14)
-    np.testing.assert_allclose(lengths.scale_diffuse([0.3, 1.0]), [1.6 + 0.875, 0.9 + 0.14], rtol=1e-14)
+    np.testing.assert_allclose(lengths.scale("searchlight", [0.3, 1.0]), [1.55 + 0.875, 0.85 + 0.056], rtol=1e-14)
+    np.testing.assert_allclose(lengths.scale("diffuse", [0.3, 1.0]), [1.6 + 0.875, 0.9 + 0.14], rtol=1e-14)
     np.testing.assert_allclose(lengths.scale_dmfp([0.3, 1.0]), [3.500081, 3.5 + 20.151121], rtol=1e-14)
     for light, s in (("diffuse", 2.475), ("searchlight", 2.425)):  # a falloff is of its own light
         medium = Optical.from_length(f"falloff_{light}", 0.4, alpha_of(0.3, light))
@@ -92,7 +92,7 @@ def test_lengths_by_hand():
     alpha = 1 - np.linspace(0.98, 0.005, 100) ** 2
     a = reflectance_of(alpha, "searchlight")
     inside = (a > 0.02) & (a < 0.95)
-    implied = lengths.scale_dmfp(a) / lengths.scale_searchlight(a)
+    implied = lengths.scale_dmfp(a) / lengths.scale("searchlight", a)
     medium = Optical(alpha, 1.0)
     names = "dmfp", "decay_length", "dmfp_classical"
     off = [np.mean(np.abs(medium.length(name) / implied - 1)[inside]) for name in names]

@@ -14,15 +14,13 @@ from profilefit.laws.phases import FORMS, backscattered, haltrin
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import phase as record
 from profilefit.recipes.phases import MOMENTS, fit_phase, read_phase
-from profilefit.recipes.run import RecipeRun
 from tests.fixtures import recorded, slow
-from tests.unit.recipes.stack.test_record import GONE, refused, spoil
+from tests.unit.recipes.stack.test_record import GONE, RUN, refused, spoil
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = shipped("fits") / "phases"
 PETZOLD = read_phase(FOLDER / "petzold.csv")
 SHIPPED = record.load(FOLDER / "petzold.json")
-RUN = RecipeRun("quick", 1, Path(), None, None)
 KNOWN = Mixture((0.7, 0.3), (HenyeyGreenstein(0.95), HenyeyGreenstein(0.3)))
 
 

@@ -71,9 +71,8 @@ def _hand_made(value):
 def test_fit_finds_a_rational_profile_whatever_it_starts_from():
     profiles = _hand_made(lambda r: np.maximum((-0.004 * r + 0.03) / (r + 0.4), 0.0))
     for protocol in (Protocol7(), Protocol7(stop="stride before")):
-        assert reproduction.fit_coefficients(profiles, protocol).values[0] == pytest.approx(
-            [-0.004, 0.03, 0.4], rel=1e-6
-        )
+        found = reproduction.fit_coefficients(profiles, protocol)
+        assert found.values[0] == pytest.approx([-0.004, 0.03, 0.4], rel=1e-6)
 
 
 def test_strides_stay_while_the_mean_free_path_grows():

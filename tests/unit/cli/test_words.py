@@ -22,8 +22,8 @@ from profilefit.cli import options
 from profilefit.cli.options import in_options, records_folder
 from profilefit.cli.schema import FILES
 from profilefit.errors import InputError, OtherRecords
-from profilefit.recipes import catalogue, recipe, record
-from profilefit.recipes.folder import fits_folder
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.report.tables.keys_table import models, schema_of
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.atlas import FUNCTIONS
@@ -157,7 +157,7 @@ def completed(done, monkeypatch):
         (("export", "hazard", "--lang", "glsl"), {"glsl", "glsl-es"}),
         (("fit", "x.csv", "--law", "quan"), {"quantile"}),
         (("check", "--constants", "c"), {"corrected"}),
-        (("regenerate", "reprod"), {name for name in recipe.available(FITS) if name.startswith("reprod")}),
+        (("regenerate", "reprod"), {name for name in available(FITS, "toml") if name.startswith("reprod")}),
         (("stability", "sol"), {"solver"}),
         (("tradeoff", "l"), {"laws"}),
     ],

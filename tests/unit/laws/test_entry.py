@@ -321,7 +321,7 @@ OUT_OF_RANGE = [
             (10**400, f"{A_NUMBER} one of 401 digits"),
             ([[1.0], [1.0, 2.0]], rf"{A_NUMBER} \[\[1.0\], "),
             (np.array([0.5, None]), r"r must be a number .*, got array\(.* dtype=object\)"),
-            (np.ma.masked_greater([0.5, 9.0], 1.0), "r must be .*, got an array with masked values"),
+            (np.ma.masked_greater([0.5, 9.0], 1.0), "r must be .*, got an array with masked values: fill"),
         )
     ),
 ]
@@ -336,15 +336,10 @@ def test_numbers_out_of_range_are_named(burley, words, said):
 
 
 def test_samplers_and_maps_name_theirs(burley, liang_printed):
-    whole, masked = np.ma.masked_greater([0.5, 0.7], 1.0), np.ma.masked_less([0.1, 0.5], 0.3)
+    whole = np.ma.masked_greater([0.5, 0.7], 1.0)
     np.testing.assert_array_equal(burley.profile(whole, 0.5), burley.profile([0.5, 0.7], 0.5))
     for evaluate, given, said in (
         (burley.sampler.sample, (2.0, 0.5), r"xi must be in \[0, 1\], got 2"),
-        (
-            burley.sampler.sample,
-            (masked, 0.5),
-            "xi must be .*, got an array with masked values: fill them or leave them",
-        ),
         (burley.albedo.alpha, (1.2,), r"reflectance must be in \[0, 1\], got 1.2"),
         (liang_printed.largest_radius, (-0.1,), r"alpha must be in \[0, 1\], got -0.1"),
     ):

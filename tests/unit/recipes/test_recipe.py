@@ -14,11 +14,11 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError, SettingError
 from profilefit.fitting.estimate import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
-from profilefit.recipes.declared import LISTED, Declared, NumberRange, OneOf, Refused, Shares, Text, at
+from profilefit.recipes.declared import LISTED, Declared, NumberRange, Refused, Shares, Text, at
 from profilefit.recipes.declared import words as in_words
-from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.kinds import albedo_map, law
-from profilefit.recipes.recipe import available, find, read
+from profilefit.recipes.recipe import find, read
 from profilefit.recipes.record import record_name, spanning_name
 from profilefit.recipes.schema import PIPELINES
 from profilefit.recipes.targets import require_known
@@ -71,7 +71,10 @@ def write(tmp_path):
     return to_file
 
 
-@pytest.mark.parametrize("path", available(fits_folder()).values(), ids=lambda path: path.stem)
+SHIPPED = available(fits_folder(), "toml")
+
+
+@pytest.mark.parametrize("path", SHIPPED.values(), ids=SHIPPED)
 def test_every_shipped_recipe_reads_and_is_named_after_its_setting(path):
     """So the catalogue finds its record, and no other."""
     recipe = read(path)
@@ -86,7 +89,7 @@ def test_every_shipped_recipe_reads_and_is_named_after_its_setting(path):
 
 
 def test_every_objective_has_a_pipeline_and_the_other_way_round():
-    assert {"liang-whole", "liang-as-published", "burley-whole", "albedo-rational"} <= set(available(fits_folder()))
+    assert {"liang-whole", "liang-as-published", "burley-whole", "albedo-rational"} <= set(SHIPPED)
     named = [objective for objectives, _ in PIPELINES.values() for objective in objectives]
     assert sorted(named) == sorted(OBJECTIVES)
     assert list(PIPELINES) == [*albedo_map.PIPELINES, *law.PIPELINES]
@@ -116,7 +119,7 @@ def test_a_good_recipe_holds_what_its_file_says(write):
 SHARE, LIMIT, LENGTHS = "a number > 0 and <= 1", "a number in 0 ... 1000000", "a list of lengths from 0.001 to 1000"
 KEYS = "title, law, equations, pipeline, truth, start, setting, indices,"
 COUNT, STARTS = "a whole number in 3 ... 1000", "random_starts must be a whole number in 0 ... 1000, got"
-TEXT, DEEP = "a text of 1000 characters at most", "is not TOML: tables or lists nested more than 32 deep"
+TEXT = "a text of 1000 characters at most"
 # A key, the line of a good recipe that says it or after which it may stand, what it must be; what is given, as shown.
 VALUES = [
     ("title", 'title = "A fit"', TEXT, {"": "nothing", "7": "7"}),
@@ -166,12 +169,7 @@ IN_GOOD = [
     ("low = 0.1", "low = 0.9", "[albedos] high must be a number > low, which is 0.9, and <= 1, got 0.9"),
     ("first = 0.01", "first = 0.01\ndr = 0.1", "either dr > 0 or both first > 0 and count > 0"),
     ("energy_limit = 3.0", f"energy_limit = {10**400}", "401 digits, of 300 at most, of 'energy_limit' (at line"),
-    ("count = 9", f"count = {10**400}", "401 digits, of 300 at most, of 'count' (at line"),
-    ("count = 9", f"count = {'9' * 5000}", "5000 digits, of 300 at most, of 'count' (at line"),
     ("count = 9", f"{'x' * 5000} = 9", "[albedos] keys must be of low, high, count, spacing, got 'xxx"),
-    ("count = 9", f"count = {'[' * 100_000}", DEEP),
-    ("count = 9", f"{'a.' * 100_000}a = 9", DEEP),
-    ("count = 9", "count = 1e400", "is not TOML: the number 1e400, beyond floating point"),
     ("\ntitle", '\nsetting = "diffuse"\ntitle', "setting must be a table [setting], got 'diffuse'"),
     (RINGS, "", "mine.toml: a recipe of pipeline 'profile' needs a table [rings]"),
     (ALBEDOS, "", "mine.toml: missing [albedos]"),
@@ -193,7 +191,6 @@ AT_G = {
     f"{SPANS}cosines = [0.9, 0.5, 0.1]": "cosines must rise",
     f"{SPANS}cosines = [0.1, 0.8, 0.97]": "cosines must rise",
     f"{SPANS}cosines = [0.1, 0.5, 0.8]": "[setting] g must be one of the cosines",
-    "": "[setting] g must be 0 where there are no cosines, got 0.9",
 }
 # Of the light, indices and mean cosines that a recipe is for: lines before it, those of [setting], and words.
 IN_SETTING = [
@@ -277,12 +274,10 @@ def test_pipelines_take_what_they_can_fit(write):
 def test_a_file_that_cannot_be_read(tmp_path):
     """A name that is no printable line would name the record, which nothing could read."""
     (tmp_path / "folder.toml").mkdir()
-    (tmp_path / "latin.toml").write_bytes(b'title = "caf\xe9"')
     (tmp_path / "a\nb.toml").write_text(GOOD)
     for name, words in (
         ("gone.toml", r"gone\.toml: there is no such recipe"),
         ("folder.toml", r"folder\.toml: expected a file that can be read, got: Is a dir"),
-        ("latin.toml", r"latin\.toml: is not TOML: .utf-8. codec"),
         ("a\nb.toml", r"the name of a recipe must be one printable line"),
     ):
         with pytest.raises(RecipeError, match=words) as caught:
@@ -293,7 +288,7 @@ def test_a_file_that_cannot_be_read(tmp_path):
 def test_find_by_name_or_path(write, tmp_path):
     path = write(GOOD)
     write(GOOD, "another.toml")
-    assert list(available(tmp_path)) == ["another", "mine"]
+    assert list(available(tmp_path, "toml")) == ["another", "mine"]
     assert find("mine", tmp_path) == read(path)
     assert find(str(path), Path("/")).path == path
     with pytest.raises(RecipeError, match=r"recipe must be one of another, mine or a \.toml file, got 'yours'"):
@@ -308,7 +303,6 @@ def test_find_by_name_or_path(write, tmp_path):
 
 class Lamp(Declared):
     colour: Shares = (1.0, 1.0, 1.0)
-    kind: Annotated[str, OneOf("spot", "sun")] = "sun"
     reach: Annotated[float, Field(gt=0.0, allow_inf_nan=True)] = math.inf
     size: Annotated[tuple[float, float], NumberRange(0.5, 4.0)] = (1.0, 1.0)
 
@@ -341,21 +335,8 @@ IN_A_HOUSE = [
     ({"floors": True}, "floors must be a whole number in 1 ... 9, got True"),
     ({"floors": 2.0}, "floors must be a whole number in 1 ... 9, got 2.0"),
     ({"floors": 0, "cellar": 1}, "keys must be of name, lamp, shelves, floors, got 'cellar'"),
-    ({"name": "a\nb"}, "name must be a text of 60 characters at most, got 'a\\nb'"),
-    ({"lamp": 3}, "lamp must be a table [lamp], got 3"),
-    *(
-        ({"lamp": lamp}, f"[lamp] {said}")
-        for lamp, said in (
-            ({"watts": 3}, "keys must be of colour, kind, reach, size, got 'watts'"),
-            ({"colour": [1, 2, 0]}, "colour must be three numbers in 0 ... 1, got [1, 2, 0]"),
-            ({"kind": "moon"}, "kind must be one of spot, sun, got 'moon'"),
-            ({"reach": math.nan}, "reach must be a number > 0, got nan"),
-            ({"size": [2, 1]}, f"size must be {WORDS}, got [2, 1]"),
-        )
-    ),
-    ({"shelves": {"height": 1}}, "shelves must be tables [[shelves]], got {'height': 1}"),
-    ({"shelves": [{}]}, "[shelves 1] height must be a finite number, got nothing"),
-    ({"shelves": [{"height": math.inf}]}, "[shelves 1] height must be a finite number, got inf"),
+    ({"lamp": {"colour": [1, 2, 0]}}, "[lamp] colour must be three numbers in 0 ... 1, got [1, 2, 0]"),
+    ({"lamp": {"size": [2, 1]}}, f"[lamp] size must be {WORDS}, got [2, 1]"),
     ({"shelves": [{"height": 1.0, "marks": [1, "a"]}]}, "[shelves 1] marks must be whole numbers, got [1, 'a']"),
     ({"shelves": [{"height": 1}, {"height": 2}]}, "[shelves 2] height must be at most the floors, got 2.0"),
     ({"name": "dark"}, "[lamp] a dark house has no lamp"),
@@ -377,6 +358,6 @@ def test_what_is_right_is_read():
     content = {"floors": 2, "lamp": {"reach": math.inf, "size": 2, "colour": [0, 1, 0.5]}}
     house = House.of("house.toml", {**content, "shelves": [{"height": 1}]})
     assert (house.file, house.floors, house.lamp.size, house.lamp.colour) == ("house.toml", 2, (2.0, 2.0), (0, 1, 0.5))
-    other = house.changed("other.toml", lamp={"kind": "spot"}, floors=3)
-    assert (other.file, other.floors, other.lamp.kind, other.lamp.size) == ("other.toml", 3, "spot", (2.0, 2.0))
-    assert house.lamp.kind == "sun"
+    other = house.changed("other.toml", lamp={"reach": 1.0}, floors=3)
+    assert (other.file, other.floors, other.lamp.reach, other.lamp.size) == ("other.toml", 3, 1.0, (2.0, 2.0))
+    assert house.lamp.reach == math.inf

@@ -18,8 +18,7 @@ from mcml_sim import Layer, Medium
 from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE
-from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.recipe import available
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.stack.file import LARGEST_FILE, LayerStack, LayerTable, read_layers
 
 STACK = """\
@@ -135,7 +134,7 @@ def test_shipped_stacks(path):
 def test_stacks_are_no_recipes():
     names = ["heart", "marble-on-potato", "skimmilk-on-marble", "skimmilk-on-potato", "skin"]
     assert [path.stem for path in SHIPPED] == names
-    assert not set(available(fits_folder())) & {path.stem for path in SHIPPED}
+    assert not set(available(fits_folder(), "toml")) & {path.stem for path in SHIPPED}
 
 
 def test_values_are_thicknesses(of_image, tmp_path):
@@ -347,9 +346,7 @@ WRONG = [
     (D, IMAGE.replace("thickness.png", "x" * 400), r"image must be a grey PNG .* got 'xx*"),
     ("g = 0\n", f"g = 0\n{IMAGE}\n", r"\[layers 2\] thickness must be a number > 0 below the first layer, got {"),
     ("mu_s = 9", "mu_s = 9\nmaterial = 'marble'", r"\[layers 1\] material must be left out where mu_a, mu_s, g are"),
-    (A, f"mu_a = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'mu_a'"),
     (A, "mu_a = 1e308\n[x]", r"\[layers 1\] mu_s must be a coefficient .*, got nothing"),
-    ("mu_s = 9", f"mu_s = [1, {10**308 * 9}, 1]", r"a whole number of 309 digits, of 300 at most, of 'mu_s'"),
     ("", "n = 1", r"table \[\[layers\]\] is missing"),
     *(
         ("", given, rf"layers must be tables \[\[layers\]\], got {got}")
@@ -361,12 +358,10 @@ WRONG = [
     ("", "unit = 3\n[[layers]]\nn = 1", rf"unit {TEXT.format(60)}, got 3"),
     ("", "[[layers]]\nn = 1\nmu_a = 0\nmu_s = 0\ng = 0", r"\[layers\] an infinitely thick layer must scatter"),
     ("", "[[layers]]\nn = 1\nmu_a = 1e308\nmu_s = 1e308\ng = 0", r"\[layers 1\] mu_a \+ mu_s must be finite"),
-    ("", f"[[layers]]\nn = 1\nmu_a = {10**308}\nmu_s = 1\ng = 0", r"a whole number of 309 digits, of 300 at most"),
     ("", "[[layers]]\nmaterial = 'marble'", r"\[layers 1\] n must be a finite number, got nothing"),
     ("", f"{M}'wood'", r"\[layers 1\] material must be one of apple, .*, got 'wood'"),
     ("", f"{M}['marble']", r"\[layers 1\] material must be one of .*, got \['marble'\]"),
     ("", f"unit = 'cm'\n{M}'marble'", 'material must be left out unless unit = "mm", .* got'),
-    ("", "[[layers]]\n" * 21, r"skin.toml: layers must be at most 20, got 21$"),
 ]  # fmt: skip
 
 

@@ -10,15 +10,14 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, RecordError
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.folder import STACKS, SUMS, fits_folder
+from profilefit.recipes.folder import SUMS, fits_folder
 from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
 from tests.fixtures import recorded
-from tests.unit.recipes.stack.test_record import GONE, RUN, STACK, refused, spoil
+from tests.unit.recipes.stack.test_record import GONE, RUN, SHIPPED, STACK, refused, spoil
 
-SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
 EDGES = np.geomspace(0.01, 10.0, 6)
 
 
@@ -79,7 +78,6 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
 
 DAMAGE = [
     ("pipeline", "stack", r"must be a record of sums of Gaussians, got pipeline 'stack'"),
-    ("format", 9, r"is not a record of format 1 or 2, got 9"),
     ("sums", GONE, r"sums must be a table, got nothing"),
     ("sums/diffuse", GONE, r"sums.diffuse must be a table, got nothing"),
     ("sums/diffuse/by_count/7", GONE, r"sums.diffuse.by_count must be 8, one a number of Gaussians, got 7"),
@@ -87,11 +85,9 @@ DAMAGE = [
     ("sums/searchlight/by_count/3/ks", [0.1, 0.2], r"sums.searchlight.by_count.3.ks must be 3, one a colour, got 2"),
     ("sums/searchlight/reflectance", [0.5, 0.4, -0.3], r"sums.searchlight.reflectance must be in \(0, 1\]"),
     ("constants/diffuse.6.green.w2", GONE, r"constants.diffuse.6.green.w2 must be a table, got nothing"),
-    ("constants/diffuse.6.v2/regenerated", "x", r"constants.diffuse.6.v2.regenerated must be a number, got \"x\""),
     ("constants/diffuse.6.v2/regenerated", 1e-9, r"constants.diffuse.6.v1 and on must rise from above 0"),
     ("constants/diffuse.1.v1/regenerated", -1.0, r"constants.diffuse.1.v1 and on must rise from above 0"),
     ("constants/diffuse.6.red.w2/regenerated", 0.9, r"diffuse.6: weights of a colour must be >= 0 and sum to 1"),
-    ("constants/diffuse.6.v1/jackknife_error", "x", r"constants.diffuse.6.v1.jackknife_error must be a number or null"),
     ("layers", "x", r"layers must be a list, got \"x\""),
     ("layers/1/thickness", 2.0, r"the last layer must be infinitely thick, got 2"),
     ("setting/illumination", "sun", r"it has no valid setting"),
