@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.by_albedo import BLOCK
@@ -23,36 +22,10 @@ DIGITS = {
 PRINTED = {light: [float(f"0.{digits}") for digits in row.split()] for light, row in DIGITS.items()}
 
 
-def h_by_quadrature(mu, alpha):
-    """H(mu) of the infinite medium's half by adaptive quadrature of ln H, x = tan(t)."""
-
-    def integrand(t):
-        x = np.tan(t)
-        return np.log1p(-alpha * np.arctan(x) / x) / (np.cos(t) ** 2 + (mu * np.sin(t)) ** 2)
-
-    return np.exp(-mu / np.pi * quad(integrand, 0, np.pi / 2, epsabs=1e-12, epsrel=1e-12, limit=200)[0])
-
-
-# Printed values
-
-
 @BOTH
 def test_reflectance_is_the_printed_one(setting):
     printed = PRINTED[setting.illumination]
     np.testing.assert_allclose(exact.reflectance(ALPHAS, setting), printed, rtol=0, atol=0.5001e-6)  # rounded digits
-
-
-@pytest.mark.parametrize("alpha", [0.05, 0.5, 0.9, 0.99])
-def test_reflectance_is_chandrasekhars(alpha):
-    """1 - H(1) sqrt(1 - alpha), and 1 - 2 sqrt(1 - alpha) int H(mu) mu dmu, by adaptive quadrature."""
-    s = np.sqrt(1 - alpha)
-    # quad's own 1e-10, over the smallest A = .008 that the difference from 1 cancels to
-    assert exact.reflectance(alpha) == pytest.approx(1 - h_by_quadrature(1.0, alpha) * s, rel=1e-7, abs=1e-9)
-    moment = quad(lambda mu: h_by_quadrature(mu, alpha) * mu, 0, 1, epsabs=1e-9, epsrel=1e-9)[0]
-    assert exact.reflectance(alpha, DIFFUSE) == pytest.approx(1 - 2 * s * moment, rel=1e-6, abs=1e-8)
-
-
-# Slow twins
 
 
 @BOTH
@@ -94,9 +67,6 @@ def test_little_scattering_is_single_scattering():
     np.testing.assert_allclose(exact.profile(r, alpha) / alpha, once, rtol=1e-5)
     shares = ring_shares([0.0, 0.2, 1.0, 4.0], SEARCHLIGHT)
     np.testing.assert_allclose(exact.cdf([0.2, 1.0, 4.0], 0.0), np.cumsum(shares)[:-1] / shares.sum(), rtol=1e-7)
-
-
-# Conservation and identities
 
 
 @BOTH
@@ -147,9 +117,6 @@ def test_how_many_radii_are_asked_for_changes_no_bit(count):
     r = np.geomspace(0.1, 9.0, 3 * BLOCK)
     np.testing.assert_array_equal(exact.profile(r[:count], 0.7), exact.profile(r, 0.7)[:count])
     np.testing.assert_array_equal(exact.reflectance(r[:count] / 10), exact.reflectance(r / 10)[:count])
-
-
-# Ends
 
 
 # Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and

@@ -28,18 +28,6 @@ LAYER = Layer(1.3, 1.0, 1.0, 0.0, 1.0)
 UNDER_GLASS = Medium((Layer(1.3, 0.1, 2.0, 0.0, 0.3), Layer(1.3, 0.5, 1.5, 0.0, 0.4)), n_above=1.5)
 
 
-def upside_down(medium):
-    """The first two layers swapped."""
-    first, second, *others = medium.layers
-    return replace(medium, layers=(second, first, *others))
-
-
-def milkier(medium):
-    """The second layer scatters a fifth more."""
-    first, second, *others = medium.layers
-    return replace(medium, layers=(first, replace(second, mu_s=1.2 * second.mu_s), *others))
-
-
 def cut(alpha, n=1.0, change=1e-9):
     """A half space of one mean free path cut into three layers, none quite equal to another."""
     absorbs, scatters = 1 - alpha, alpha
@@ -107,7 +95,8 @@ def test_adding_and_doubling_agrees(stacks, seed, angles):
         reflected = adding_doubling.solve(medium, angles=angles, nodes=8).reflected.sum()
         assert exact.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
         if seed == 4:
-            assert exact.solve(upside_down(medium)).reflectance != pytest.approx(reflected, rel=1e-3)
+            swapped = replace(medium, layers=(*medium.layers[1::-1], *medium.layers[2:]))
+            assert exact.solve(swapped).reflectance != pytest.approx(reflected, rel=1e-3)
 
 
 @BOTH
@@ -225,7 +214,9 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
     tally = simulate(medium, Grid.from_edges(r=edges), 2 * 10**6, seed=9)
     found = exact.solve(medium)
     assert likelihood(tally, found) > CHANCE
-    assert likelihood(tally, exact.solve(milkier(medium))) < CHANCE
+    first, second, *others = medium.layers
+    milkier = replace(medium, layers=(first, replace(second, mu_s=1.2 * second.mu_s), *others))
+    assert likelihood(tally, exact.solve(milkier)) < CHANCE
     totals = tally.diffuse_reflectance, tally.specular_reflectance, tally.absorbed_per_layer
     for seen, known in zip(totals, (found.reflectance, found.specular, found.absorbed), strict=True):
         assert np.all(np.abs(seen.value - known) <= 4 * seen.standard_error + 1e-12)
