@@ -20,8 +20,6 @@ BATCH = layered_batch.BATCH_PHOTONS
 
 @dataclass
 class Found:
-    """What became of each photon."""
-
     side: np.ndarray  # -1 above, 1 below, 2 below without scattering, 0 if it ended inside
     rho: np.ndarray
     cosine: np.ndarray
@@ -136,7 +134,6 @@ def means_of_twin(found):
 
 
 def means_of_fast(d):
-    """The same of Deposits."""
     sums = np.concatenate([d.reflected.ravel(), d.transmitted.ravel(), [d.ballistic], d.absorbed])
     squares = [d.reflected_squares.ravel(), d.transmitted_squares.ravel(), [d.ballistic_squares], d.absorbed_squares]
     variance = np.concatenate(squares) - sums**2 / d.started

@@ -169,11 +169,7 @@ def test_albedo_must_be_in_0_to_1(run, alpha):
             [Grid.from_edges(r=[0, 1, 1 + 1e-12, 2])],
             r"annuli wider than 1e-05 of their place.*got one from 1\.0 to 1\.0",
         ),
-        (
-            "grid",
-            [Grid.from_edges(r=[0, *edges]) for edges in ([1e-40, 1], [1e40])],
-            "must have edges from 1e-30 to 1e",
-        ),
+        ("grid", [Grid.from_edges(r=[0, *e]) for e in ([1e-40, 1], [1e40])], "must have edges from 1e-30 to 1e"),
     ],
 )
 def test_bad_input_is_named(name, values, message):

@@ -3,24 +3,13 @@
 import numpy as np
 import pytest
 
-from mcml_sim import (
-    Grid,
-    InputError,
-    Layer,
-    Medium,
-    Setting,
-    StoreError,
-    read_results,
-    simulate,
-    simulate_orders,
-    write_mco,
-    write_results,
-)
+from mcml_sim import Grid, InputError, Layer, Medium, Setting, StoreError, simulate, simulate_orders
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Mixture, Tabulated
+from mcml_sim.results.mco import write_mco
+from mcml_sim.results.tally import read_results, write_results
 from mcml_sim.tracing import pool
 from tests.fixtures import slow
 
-ONE = HenyeyGreenstein(0.9)
 GRID = Grid.from_edges(r=np.append(0.0, np.geomspace(0.1, 20, 12)))
 SEA = Mixture((0.317, 0.6813, 0.0017), (HenyeyGreenstein(0.9933), HenyeyGreenstein(0.8957), HenyeyGreenstein(-0.635)))
 ANGLES = np.radians(np.append(np.geomspace(0.05, 10, 60), np.linspace(12, 180, 80)))
@@ -37,20 +26,9 @@ def few_lanes(monkeypatch):
     monkeypatch.setattr(pool, "lanes", lambda: 1024)
 
 
-def tally(phase, g=0.0, seed=1, photons=50_000, **given):
-    layers = (Layer(1.2, 0.1, 1.0, 0.3, 2.0), Layer(1.2, 0.3, 1.0, g, phase=phase))
+def tally(phase, seed=1, photons=50_000, **given):
+    layers = (Layer(1.2, 0.1, 1.0, 0.3, 2.0), Layer(1.2, 0.3, 1.0, 0.0, phase=phase))
     return simulate(Medium(layers), GRID, photons, seed, **given)
-
-
-@pytest.mark.slow
-@PHOTONS
-def test_an_empty_term_changes_no_bit(photons):
-    mixed = Mixture((1, 0), (ONE, HenyeyGreenstein(0.1)))
-    plain, same = tally(None, 0.9), tally(mixed)
-    np.testing.assert_array_equal(plain.deposits.reflected, same.deposits.reflected)
-    np.testing.assert_array_equal(plain.deposits.absorbed, same.deposits.absorbed)
-    orders = [simulate_orders(GRID, photons, 3, Setting(n=1.2, phase=one)) for one in (ONE, mixed)]
-    np.testing.assert_array_equal(orders[0].counts.exits, orders[1].counts.exits)
 
 
 @pytest.mark.parametrize(

@@ -26,13 +26,11 @@ def traced(photons, lanes=LANES):
 
 @pytest.fixture(scope="module")
 def ends():
-    """Ends of the first photons of batch 0, seed 0, as numpy arrays."""
     found = traced(PHOTONS)
     return np.asarray(found.rho)[:PHOTONS], np.asarray(found.order)[:PHOTONS]
 
 
 def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
-    """And a twin that is off by 5 % is seen."""
     rho, order = slow_twin(Setting(), PHOTONS, 64, seed=3)
     z, off = (deviations(table(*ends, 64), table(scale * rho, order, 64)) for scale in (1.0, 1.05))
     assert z.size > 40
@@ -89,7 +87,6 @@ EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
 
 @pytest.fixture(scope="module", params=["searchlight", "diffuse"])
 def lit(request):
-    """Half a million photons of either light."""
     grid = Grid.from_edges(r=EDGES[:-1])
     return request.param, orders_batch.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
 
@@ -101,7 +98,6 @@ def from_exact(counts, illumination):
 
 
 def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
-    """And the exact answer to the other light is told apart."""
     illumination, counts = lit
     other = {"searchlight": "diffuse", "diffuse": "searchlight"}[illumination]
     assert np.abs(from_exact(counts, other)).max() > 3 * sidak(4 * 13)
