@@ -59,7 +59,6 @@ def test_coarsened_is_the_mean_of_blocks():
 
 
 def test_seen_is_the_render_in_view_space():
-    """And what the shaders take for inside."""
     surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
@@ -209,10 +208,7 @@ def test_refined_says_what_coarse_pixels_cost():
 
 
 def test_a_table_of_ones_own():
-    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself.
-
-    In a picture, where nothing scatters inside, the map is A all the same.
-    """
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
 
     def stretched(values):
         assert values.size % 3 == 0
@@ -225,6 +221,7 @@ def test_a_table_of_ones_own():
     np.testing.assert_array_equal(found.light, truth.light)
     np.testing.assert_array_equal(found.share, truth.share)
     assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
+    # In a picture, where nothing scatters inside, the map is A all the same.
     half = SimpleNamespace(curves=lambda values: exact_table(DIFFUSE).curves(0.5 * values))
     mask = np.ones((4, 6), np.float32)
     mask[:, 0] = 0.0

@@ -1,7 +1,4 @@
-"""Both parts of a kernel and their balance: light is counted once, and each end is one method alone.
-
-Random scenes: what is kept of them is what the passes draw, and a balance is found again.
-"""
+"""Both parts of a kernel and their balance: light is counted once; random scenes, and a balance found again."""
 
 import numpy as np
 import pytest

@@ -98,7 +98,6 @@ def photons(medium: Medium, cos_in: float, count: int, seed: int):
 
 
 def _cross(random, index, place, course, i):
-    """Snell's law, or back by Fresnel's chance."""
     here, side = place[i] + 1, np.where(course[i, 2] > 0, 1, -1)
     n1, n2 = index[here], index[here + side]
     mu1, sine2 = np.abs(course[i, 2]), n1 / n2 * np.hypot(course[i, 0], course[i, 1])
@@ -111,7 +110,6 @@ def _cross(random, index, place, course, i):
 
 
 def _turned(random, course, g):
-    """By an angle of Henyey and Greenstein's."""
     cosine, around = HenyeyGreenstein(g).sample(random.random(g.size)), 2 * np.pi * random.random(g.size)
     aside = np.cross(course, [0.3, 0.5, 0.8])
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)

@@ -103,7 +103,6 @@ def points(low, high):
 
 @pytest.mark.parametrize("pose", scene.POSES)
 def test_the_foot_of_the_neck_stays(pose):
-    """At rest, all does."""
     foot = points(-np.inf, np.inf if pose == "rest" else FOOT)
     assert len(foot) > 100
     np.testing.assert_allclose(scene.posed(foot, pose), foot, atol=1e-12)
@@ -179,8 +178,7 @@ def test_laws_are_those_of_a_record_where_there_is_one(monkeypatch):
 
 @pytest.mark.slow
 def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, monkeypatch):
-    """Root mean square error of scattered light over its mean: 1.1 to 1.4 % by the stack's law were found, and 14 to
-    16 % by the dipole of the first layer. At half as many pixels a mean free path is less than a tenth of one.
+    """Error over the mean: 1.1 to 1.4 % by the stack's law were found, and 14 to 16 % by the first layer's dipole.
 
     Poses show other edges of light and shadow: their errors are within a fifth of their mean.
     """
@@ -204,7 +202,6 @@ def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, mon
 
 
 def test_nothing_to_see_is_one_line(context, monkeypatch):
-    """Before the minutes that exact light takes."""
     monkeypatch.setattr(scene, "stack_table", lambda *_: pytest.fail("nothing is lit"))
     none = {"irradiance": (0.0,) * 3, "ambient": (0.0,) * 3}
     dark = scene.read("head.toml", EXAMPLE).changed(camera_table={"resolution": (16, 12)}, light_table=none)

@@ -80,7 +80,6 @@ def test_photons_in_boxes_against_photons_at_points():
 
 
 def test_photons_keep_the_light():
-    """What enters comes to the floor."""
     waves = sea(BEYOND)
     x = (np.arange(512) + 0.5) * TILE / 512
     entered = refracted(0.0, waves.lattice(x, x)[1:], N)[2].mean()
