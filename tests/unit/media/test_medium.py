@@ -116,7 +116,6 @@ def test_a_medium_names_what_is_wrong():
 
 
 def test_settings_are_values():
-    """By default the matched searchlight; numbers of numpy are numbers."""
     assert Setting() == Setting("searchlight", 1.0, 0.0)
     assert str(Setting()) == "searchlight, n = 1, g = 0"
     assert str(Setting("diffuse", 1.4, 0.75)) == "diffuse, n = 1.4, g = 0.75"
@@ -153,9 +152,6 @@ def test_bad_arguments_are_named(make, values, message):
     for value in values:
         with pytest.raises(InputError, match=f"{message}, got"):
             make(value)
-
-
-# Reflection and refraction at interfaces
 
 
 def polarised(n1, n2, angle):

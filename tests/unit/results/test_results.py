@@ -150,9 +150,6 @@ def test_misuse_is_named(tmp_path):
             write_results(tally, wrong)
 
 
-# Counts, and estimates from them
-
-
 def photon_by_photon(counts, weights, photons):
     """Weights of every photon of one row: the tally undone."""
     return np.concatenate([np.repeat(weights, counts), np.zeros(photons - counts.sum())])

@@ -231,9 +231,6 @@ def test_what_is_no_share_is_said(tmp_path):
         trace_share(0, 1, GRID, 1000, store=None)
 
 
-# The bar's words, and that it is there for a terminal only
-
-
 @pytest.mark.parametrize(
     ("speed", "unit", "said"),
     [
@@ -280,9 +277,6 @@ def test_nobody_else_does(monkeypatch, screen, quiet):
     assert sys.stderr.getvalue() == ""
     monkeypatch.setattr(sys, "stderr", None)
     assert not is_watched(), "a closed stderr is no terminal"
-
-
-# Seconds of compiling, told from those of running
 
 
 def test_the_first_call_compiles_and_the_second_does_not():

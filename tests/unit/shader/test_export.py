@@ -47,12 +47,10 @@ def expected() -> list[float]:
 
 
 def line_of(text, name):
-    """The line that declares a constant."""
     return next(line for line in text.splitlines() if f"{name} =" in line)
 
 
 def record(name):
-    """What a shipped record holds, and its digest."""
     data = (FITS / f"{name}.json").read_bytes()
     return json.loads(data), hashlib.sha256(data).hexdigest()
 

@@ -55,7 +55,6 @@ def twin(law, rounded=False, coarse=0.0):
 
 
 def labels(*kinds):
-    """Those of the laws of some kinds."""
     return [label for label, law in LAWS.items() if isinstance(law, kinds)]
 
 

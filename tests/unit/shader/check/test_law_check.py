@@ -1,7 +1,4 @@
-"""Texts on the GPU give the numbers of the float64 laws, in any shape and number; what does not compile says why.
-
-Right texts pass their check; a wrong constant, sign or density, or a number that is none, does not.
-"""
+"""Texts on the GPU give the numbers of the float64 laws, and pass their check; wrong ones do not, and say why."""
 
 import json
 import re
