@@ -11,6 +11,7 @@ import pytest
 
 from mcml_sim import Grid, InputError, Layer
 from mcml_sim.results.mci import MAX_BYTES, MAX_CELLS, parse_mci, read_mci
+from tests.fixtures import refused
 
 DATA = Path(__file__).parent / "data"
 
@@ -167,8 +168,7 @@ def test_two_runs_cannot_have_one_output(tmp_path):
     run = SMALL.split("\n", 2)[2]
     for again in ("out.mco", "./out.mco"):
         text = f"1.0\n2\n{run}{run.replace('out.mco', again)}"
-        with pytest.raises(InputError, match=rf"small.mci:12: expected an output file that no .*, got '{again}'"):
-            read_mci(written(tmp_path, text))
+        refused(rf"small.mci:12: expected an output file that no .*, got '{again}'", read_mci, written(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -184,8 +184,7 @@ def test_two_runs_cannot_have_one_output(tmp_path):
     ],
 )
 def test_what_is_no_text_is_said(tmp_path, content, message):
-    with pytest.raises(InputError, match=message):
-        read_mci(written(tmp_path, content))
+    refused(message, read_mci, written(tmp_path, content))
 
 
 def test_what_cannot_be_opened_is_said(tmp_path):

@@ -14,6 +14,7 @@ from mcml_sim.results.mci import read_mci
 from mcml_sim.results.mco import begins_mco, parse_mco
 from mcml_sim.results.tally import Tally
 from mcml_sim.tracing.deposits import Deposits, shapes
+from tests.fixtures import refused
 from tests.unit.results.test_mci import SECOND as INPUT
 
 DATA = Path(__file__).parent / "data"
@@ -215,8 +216,7 @@ def test_arguments_may_come_in_either_order(tally, tmp_path):
     ],
 )
 def test_grids_that_an_mco_cannot_say(tally, tmp_path, grid, message):
-    with pytest.raises(InputError, match=message):
-        write_mco(made_up(tally.medium, grid), tmp_path / "out.mco")
+    refused(message, write_mco, made_up(tally.medium, grid), tmp_path / "out.mco")
     assert not list(tmp_path.iterdir())
 
 
@@ -227,8 +227,7 @@ def test_misuse_is_named(tally, tmp_path):
         (tally, tally, "path must be the name of a file, got Tally"),
         (tally, 3, "path must be the name of a file, got 3"),
     ):
-        with pytest.raises(InputError, match=message):
-            write_mco(given, path)
+        refused(message, write_mco, given, path)
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tally, tmp_path, monkeypatch):
@@ -239,8 +238,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tally, tmp_path, monke
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OutputError, match=r"cannot write .*out.mco: No space left on device"):
-        write_mco(tally, path)
+    refused(r"cannot write .*out.mco: No space left on device", write_mco, tally, path, error=OutputError)
     assert [one.name for one in tmp_path.iterdir()] == ["out.mco"]
     assert path.read_text() == "old"
 
@@ -326,18 +324,15 @@ def test_what_was_written_comes_back(tally, tmp_path):
     ],
 )
 def test_faults_are_named_by_line(change, message):
-    with pytest.raises(InputError, match=message):
-        parse_mco(V1.replace(*change, 1).encode(), "x.mco")
+    refused(message, parse_mco, V1.replace(*change, 1).encode(), "x.mco")
 
 
 def test_what_is_no_mco(tmp_path):
     with pytest.raises(InputError, match=r"x.mco:.*: expected the section Rd_r, got the end of the file"):
         parse_mco(V1.partition("\nRd_r #")[0].encode(), "x.mco")
     for content in (b"", b"\x00\xff", b"\x89PNG"):
-        with pytest.raises(InputError, match=r"x.mco:\d+: expected"):
-            parse_mco(content, "x.mco")
-    with pytest.raises(InputError, match=r"nothing.mco: expected a file that can be read, got: No such file"):
-        read_mco(tmp_path / "nothing.mco")
+        refused(r"x.mco:\d+: expected", parse_mco, content, "x.mco")
+    refused(r"nothing.mco: expected a file that can be read, got: No such file", read_mco, tmp_path / "nothing.mco")
 
 
 # Written after the format of MCML 2, since its own examples may not be passed on: the input, whose first run it is, and
@@ -401,5 +396,4 @@ def test_mcml_2_is_read(tmp_path):
 )
 def test_what_is_wrong_in_mcml_2_is_named(old, new, told):
     assert old in SECOND
-    with pytest.raises(InputError, match=re.escape("one.mco") + told):
-        parse_mco(SECOND.replace(old, new).encode(), "one.mco")
+    refused(re.escape("one.mco") + told, parse_mco, SECOND.replace(old, new).encode(), "one.mco")

@@ -15,6 +15,7 @@ from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
 from mcml_sim.tracing.deposits import Deposits, shapes
 from mcml_sim.tracing.order_bins import Counts
+from tests.fixtures import refused
 
 GRID = Grid(0.5, 3)
 MADE_BY = {"seed": 1, "grid": "abc"}
@@ -104,24 +105,21 @@ def test_a_run_that_ended_before_its_first_batch_blocks_no_other(tmp_path, text)
     Store(tmp_path, MADE_BY, READ).save(0, COUNTS)
     assert json.loads((tmp_path / "run.json").read_text()).items() >= MADE_BY.items()
     assert Store(tmp_path, MADE_BY, READ).load(0).started == 15
-    with pytest.raises(StoreError, match="seed is 1 there, 2 here"):
-        Store(tmp_path, {"seed": 2, "grid": "abc"}, READ)
+    refused("seed is 1 there, 2 here", Store, tmp_path, {"seed": 2, "grid": "abc"}, READ, error=StoreError)
 
 
 def test_looking_at_a_store_writes_nothing_and_another_versions_is_refused(store, tmp_path):
     store.save(0, COUNTS)
     require_ours(tmp_path / "none", MADE_BY)
     require_ours(tmp_path, MADE_BY)
-    with pytest.raises(StoreError, match="seed is 1 there, 3 here"):
-        require_ours(tmp_path, MADE_BY | {"seed": 3})
+    refused("seed is 1 there, 3 here", require_ours, tmp_path, MADE_BY | {"seed": 3}, error=StoreError)
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match=r"cannot use .*file as a store: it is there already, and no folder"):
         require_ours(tmp_path / "file", MADE_BY)
     assert {path.name for path in tmp_path.iterdir()} == {"run.json", "batch-00000000.npz", "file"}
     manifest = json.loads((tmp_path / "run.json").read_text())
     (tmp_path / "run.json").write_text(json.dumps(manifest | {"jaxlib": "0.0.1"}))
-    with pytest.raises(StoreError, match=r'jaxlib is "0.0.1" there, "'):
-        Store(tmp_path, MADE_BY, READ)
+    refused(r'jaxlib is "0.0.1" there, "', Store, tmp_path, MADE_BY, READ, error=StoreError)
 
 
 def test_a_batch_from_another_store_is_refused(store, tmp_path):
@@ -129,8 +127,7 @@ def test_a_batch_from_another_store_is_refused(store, tmp_path):
     other.save(0, COUNTS)
     (tmp_path / "other" / "batch-00000000.npz").rename(tmp_path / "batch-00000000.npz")
     remedy = "if that is still at work, use another folder; if not, delete that file to redo just that batch"
-    with pytest.raises(StoreError, match=rf"batch-00000000.npz was made by another run; {remedy}"):
-        store.load(0)
+    refused(rf"batch-00000000.npz was made by another run; {remedy}", store.load, 0, error=StoreError)
 
 
 @pytest.mark.parametrize(
@@ -233,8 +230,7 @@ def test_a_full_disk_is_named_and_the_run_goes_on_when_there_is_room(store, tmp_
     sync = os.fsync
     monkeypatch.setattr(os, "fsync", full)
     said = r"cannot write .*batch-0+2.npz: No space left on device; what the store holds is whole, .* resumes"
-    with pytest.raises(StoreError, match=said):
-        run_batches(trace, 15, 60, workers=1, store=store)
+    refused(said, run_batches, trace, 15, 60, workers=1, store=store, error=StoreError)
     assert trace.batches == [0, 1, 2]
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"run.json", "batch-00000000.npz", "batch-00000001.npz"}
@@ -249,8 +245,7 @@ def test_what_is_no_folder_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     reasons = {"/dev/full/store": "Not a directory", str(tmp_path / "file"): "File exists"}
     for place, reason in reasons.items():
-        with pytest.raises(StoreError, match=rf"cannot use {place} as a store: {reason}"):
-            simulate_orders(GRID, 100, store=place)
+        refused(rf"cannot use {place} as a store: {reason}", simulate_orders, GRID, 100, store=place, error=StoreError)
 
 
 def test_leftovers_of_killed_runs_are_swept_when_old(tmp_path):
