@@ -144,16 +144,6 @@ def test_ends_of_every_argument_between_which_the_cdf_rises(setting):
 
 
 @BOTH
-@pytest.mark.parametrize("alpha", [0.2, 0.9, 1.0])
-def test_at_the_source_half_of_alpha_is_left(alpha, setting):
-    r = np.array([1e-9, 1e-6, 1e-5])
-    found = 2 * np.pi * r * exact.profile(r, alpha, setting=setting)
-    np.testing.assert_allclose(found, alpha / 2, rtol=1e-3)  # the next term is of order r ln r
-    inside = exact.cdf(r, alpha, setting=setting) * exact.reflectance(alpha, setting)
-    np.testing.assert_allclose(inside, r * found, rtol=1e-3)
-
-
-@BOTH
 def test_nothing_jumps_where_the_limit_at_the_source_takes_over_and_quantile_inverts_below(setting):
     r = NEAREST_RADIUS * np.array([1 - 1e-9, 1 + 1e-9])
     for found in (exact.profile(r, 0.9, setting=setting), exact.cdf(r, 0.9, setting=setting)):

@@ -145,7 +145,6 @@ def test_stopping_early_leaves_the_errors_honest(monkeypatch):
     [
         ({"medium": "glass"}, "medium must be a mcml_sim.Medium, got 'glass'"),
         ({"photons": 0}, "photons must be a whole number >= 1"),  # and all else that `simulate_orders` refuses, too
-        ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, "workers must be None where a scheduler is given"),
         ({"store": 5}, "store must be the path of a folder, got 5"),
         ({"precision": 0.0}, r"precision must be a relative standard error in \(0, 1\), got 0.0"),
         ({"precision": "high"}, "precision must be"),

@@ -68,12 +68,6 @@ def kept(store, name="*"):
     return len(list(store.glob(f"{name}/batch-*.npz")))
 
 
-def wait_for(batches, store, child):
-    deadline = time.monotonic() + 60
-    while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.002)
-
-
 @pytest.mark.slow
 def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     whole = finish(start())
@@ -82,7 +76,9 @@ def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     hit = set()
     for more in random.integers(1, 4, size=KILLS):
         child = start(str(store))
-        wait_for(kept(store) + more, store, child)
+        batches, deadline = kept(store) + more, time.monotonic() + 60
+        while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.002)
         time.sleep(random.uniform(0, 0.03))  # in the middle of a batch, or of writing one
         child.kill()
         child.communicate()

@@ -33,7 +33,6 @@ void main() {
 
 
 def drawn(context, fragment):
-    """The four numbers that a fragment shader makes."""
     target = context.simple_framebuffer((1, 1), components=4, dtype="f4")
     target.use()
     full_screen(context, program(context, "exported", fragment)).render(moderngl.TRIANGLES, vertices=3)

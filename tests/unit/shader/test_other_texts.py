@@ -209,17 +209,6 @@ def test_roots_are_the_truths(theta):
         np.testing.assert_allclose(found[clean], want[clean], rtol=1e-9)
 
 
-def test_a_cast_ray_is_the_nearest_root():
-    patch, theta = truth.random_patch(0.5, 0.3, 4.0, 6.0, seed=4), np.radians(50.0)
-    start = truth.rays(patch, 2000, seed=4)
-    away = start[:, None] - patch.feet
-    shifts = 6.0 * np.stack(np.meshgrid([-1, 0, 1, 2], [-1, 0, 1]), axis=-1).reshape(-1, 2)
-    qx, qy = (away[..., None, :] + shifts).T
-    down = functions(TEXT)["law_swept"](qx, qy, -np.tan(theta), 0.0, 0.0, 0.3 / 4.0)
-    nearest = np.min(np.where((down >= 0) & (down <= 4.0), down, 4.0), axis=(0, 1))
-    np.testing.assert_allclose(4.0 - nearest, truth.cast(patch, theta, start), atol=1e-7)
-
-
 def shares():
     """radius, first, second, turn: tips over the root's edge, and any to 89.9 degrees."""
     random = np.random.default_rng(8)

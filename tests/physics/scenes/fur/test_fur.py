@@ -124,13 +124,7 @@ def rms(found, true):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "lean"),
-    [
-        (3.0, (0.0, 0.0)),
-        (80.0, (0.3, -0.5)),
-        *slow(*((degrees, (0.0, 0.0)) for degrees in (0.0, 50.0, 80.0))),
-        *slow(*((degrees, (0.3, -0.5)) for degrees in (0.0, 3.0, 50.0))),
-    ],
+    ("degrees", "lean"), [(3.0, (0.0, 0.0)), (80.0, (0.3, -0.5)), *slow((0.0, (0.3, -0.5)), (50.0, (0.0, 0.0)))]
 )
 def test_against_steps_along_each_ray(degrees, lean):
     """Four hundred heights, at each of them all images of all strands: the first inside is within a step of the hit."""

@@ -185,11 +185,6 @@ def test_a_table_has_a_row_of_each(kind):
     assert not np.allclose(found[..., 0], found[..., 1])
 
 
-def test_what_no_haze_has():
-    for call, *given in ((ways, 0.5, 1.0, 1.0), (sunlit_haze, 0.5, 1.0, 0.0)):
-        refused(r"^kind must be one of broadened, scaled, single, got 'double'$", call, *given, LOBES, "double")
-
-
 TILE, N, LIKE_AIR = 5.0, 1.34, 1.0 + 1e-7  # a world's water must be denser than the air
 MILD = ((1.0, 0.8),)
 RATES = np.array([0.6, 1.0, 1.6])
@@ -404,7 +399,9 @@ def test_a_pixel_is_the_mean_over_its_area():
     assert abs(seen(corner) - known) > 40.0 * spread
 
 
-def test_what_no_truth_has():
+def test_what_no_haze_and_no_truth_has():
+    for call, *given in ((ways, 0.5, 1.0, 1.0), (sunlit_haze, 0.5, 1.0, 0.0)):
+        refused(r"^kind must be one of broadened, scaled, single, got 'double'$", call, *given, LOBES, "double")
     refused(r"^paths must be a whole number >= 2.*, got 1$", rays_of_furnace, 1, 0, number=1)
     for name, given in (("levels", 1), ("pixels", 0), ("rays", 9000)):
         named = {"levels": 2, "pixels": 4, "rays": 8, name: given}

@@ -30,7 +30,6 @@ RATIONAL = catalogue.find("albedo-rational-refracting", FITS)
 
 @cache
 def exact(name):
-    """The law in float64 on the whole grid."""
     return dense_grid.reference(NAMED[name].law, dense_grid.arguments())
 
 
