@@ -20,6 +20,9 @@ DIGITS = {
     "diffuse": "021698 046265 074451 107335 146544 194716 256557 341867 478024 596669 794564 929713 977187",
 }
 PRINTED = {light: [float(f"0.{digits}") for digits in row.split()] for light, row in DIGITS.items()}
+# Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and
+# Weir's (Mon. Not. R. Astron. Soc. 119, 1959).
+H_NORMAL_CONSERVATIVE = 2.907810529
 
 
 @BOTH
@@ -117,11 +120,6 @@ def test_how_many_radii_are_asked_for_changes_no_bit(count):
     r = np.geomspace(0.1, 9.0, 3 * BLOCK)
     np.testing.assert_array_equal(exact.profile(r[:count], 0.7), exact.profile(r, 0.7)[:count])
     np.testing.assert_array_equal(exact.reflectance(r[:count] / 10), exact.reflectance(r / 10)[:count])
-
-
-# Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and
-# Weir's (Mon. Not. R. Astron. Soc. 119, 1959).
-H_NORMAL_CONSERVATIVE = 2.907810529
 
 
 @BOTH

@@ -21,6 +21,10 @@ from tests.unit.scenes.scenes import refused
 
 SETTINGS = SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")
 BESIDE = (np.arange(16) - 7.5) / 2.0
+PLACES = np.array([-30.0, -4.0, -0.5, -1e-3, -1e-7, 0.0, 1e-4, 0.03, 1.0, 4.0])
+LONG = 8.0  # mean free path [mm]
+ASLANT, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))
+BOUND = 0.006  # of A: at 85 degrees a pixel is 1.4 mfp, and is lit in its middle or not; standard errors are 0.001
 
 
 def noise(gather, points, alpha, setting):
@@ -124,9 +128,6 @@ def test_points_by_default_are_the_stage_s(samples):
     assert np.all(shares(shifted_points(samples, 200, seed=2)))
     torus = shares((base + np.random.default_rng(2).random((200, 1, 2))) % 1.0)
     assert samples == 1 or np.mean(torus) < 0.2
-
-
-PLACES = np.array([-30.0, -4.0, -0.5, -1e-3, -1e-7, 0.0, 1e-4, 0.03, 1.0, 4.0])
 
 
 def plane_sum(distance, alpha, setting):
@@ -294,11 +295,6 @@ def test_short_paths_fade_to_lambert_without_a_seam(small):
     truth = step_response(-0.5 / lengths, ALPHA, setting=edges.DIFFUSE)
     assert np.all((light >= 0) & (np.abs(light - truth) < 0.003))
     assert np.all((np.diff(light) > 0) & (np.diff(light) < 0.006))
-
-
-LONG = 8.0  # mean free path [mm]
-ASLANT, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))
-BOUND = 0.006  # of A: at 85 degrees a pixel is 1.4 mfp, and is lit in its middle or not; standard errors are 0.001
 
 
 def bias(context, degrees, depth, area=True, seeds=4):

@@ -18,6 +18,12 @@ from tests.unit.scenes.scenes import refused
 FORWARD = np.array([0.0, 0.0, -1.0])
 NORMAL = np.array([0.5, -0.3, np.sqrt(1.0 - 0.34)])
 THROUGH = np.array([0.2, 0.1, -40.0])
+VIEW = View(0.5)
+MFP = np.array([1.5, 0.8, 2.2])
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
+SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])
+RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
 def hit(view, column, row):
@@ -68,11 +74,6 @@ def test_seen_is_the_render_in_view_space():
     plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
-
-
-VIEW = View(0.5)
-MFP = np.array([1.5, 0.8, 2.2])
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 def flat(h, w, reflectance, irradiance=1.0, pixel=0.5):
@@ -238,11 +239,6 @@ def test_what_cannot_be_gathered():
     refused(r"pixels must be visible ones, got \(4, 0\)", gathered, surface, VIEW, MFP, pixels=[[4, 0]])
     refused("pixels must be pairs", gathered, surface, VIEW, MFP, pixels=[[1.0, 2.0]])
     refused("factor must divide 2 and 3, got 2", flat(2, 3, 0.5).coarsened, 2)
-
-
-REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
-SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])
-RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
 @pytest.mark.slow

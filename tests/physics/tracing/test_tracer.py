@@ -17,6 +17,11 @@ from tests.physics.tracing.test_half_space_event import deviations, slow_twin, t
 STOPS = OrderBins().stops
 PHOTONS = 200_000
 LANES = pool.LANES
+EDGES = np.concatenate([[0.0], np.geomspace(0.03, 5, 12), [np.inf]])
+EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
+KEY = jnp.asarray(rng.batch_key(0, 0))
+ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
+FLY = jax.jit(half_space_event.fly, static_argnames="events")
 
 
 def traced(photons, lanes=LANES):
@@ -81,10 +86,6 @@ def test_rings_are_those_of_float64_edges(ends):
     assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
-EDGES = np.concatenate([[0.0], np.geomspace(0.03, 5, 12), [np.inf]])
-EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
-
-
 @pytest.fixture(scope="module", params=["searchlight", "diffuse"])
 def lit(request):
     grid = Grid.from_edges(r=EDGES[:-1])
@@ -134,11 +135,6 @@ def placed(z, order, last=MAX_ORDER, count=2**14):
     place = jnp.full(count, 1 + 1j * z, jnp.complex64)
     numbers = (jnp.full(count, n, jnp.int32) for n in (order, last))
     return OrderLanes(place, None, *numbers, jnp.arange(count, dtype=jnp.uint32))
-
-
-KEY = jnp.asarray(rng.batch_key(0, 0))
-ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
-FLY = jax.jit(half_space_event.fly, static_argnames="events")
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():

@@ -49,6 +49,9 @@ XI = (np.arange(2**16) + 0.5) / 2**16
 # A bin of radii is that of an interval of xi for each half space's and each image's part, two where a surface refracts,
 # and each end of one may lose or gain a number; the maps follow their densities to 9e-6.
 PARTS, FOLLOWED = 8, 2e-5
+SUMS = [
+    MediumGaussians(Setting("diffuse", n=1.4), 0.5 + 0.1 * i, (0.01, 0.3 + i, 9.0), (0.2, 0.5, 0.3)) for i in range(3)
+]
 
 
 def stack(setting, layers, *interfaces):
@@ -281,11 +284,6 @@ def refused_media():
         "media must have one number of layers in all channels, two or more, got 2, 2, 3": [*media(2)[:2], good[2]],
         "two or more, got 1, 1, 1": [Medium((layer,))] * 3,
     }
-
-
-SUMS = [
-    MediumGaussians(Setting("diffuse", n=1.4), 0.5 + 0.1 * i, (0.01, 0.3 + i, 9.0), (0.2, 0.5, 0.3)) for i in range(3)
-]
 
 
 def test_sums_of_gaussians_are_the_laws():

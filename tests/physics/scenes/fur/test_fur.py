@@ -25,6 +25,7 @@ from tests.fixtures import slow
 from tests.unit.scenes.scenes import refused
 
 PATCHES, RAYS = 10, 800
+SIZE = 64, 64
 
 
 def seen(density, theta, lean, heights):
@@ -280,9 +281,6 @@ def test_what_no_patch_has():
     refused("each must be a whole number >= 1, got 0", tufted_patch, 9.0, 0.1, 1.0, 1.0, 0, 0.1)
     refused("spread must be a finite length >= 0, got -0.1", tufted_patch, 9.0, 0.1, 1.0, 1.0, 3, -0.1)
     refused(many, tufted_patch, 1e9, 0.1, 1.0, 1.0, 3, 0.1)
-
-
-SIZE = 64, 64
 
 
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.3, -0.2)])

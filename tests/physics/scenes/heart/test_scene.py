@@ -29,6 +29,7 @@ REFUSED = [
     ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
     ("layers.2.g", 0.9, r"\[layers 2\] g must be 0, and mu_s reduced"),
 ]
+KEPT = 300  # pixels
 
 
 @pytest.mark.parametrize(("place", "value", "message"), REFUSED)
@@ -83,9 +84,6 @@ def test_a_view_of_nothing_that_is_judged_is_one_line(context):
     of = scene.read("sheet.toml", told)
     drawn = scene.reference_render(context, of, scene.light_of(of, of.technique.gaussians))
     refused("the view must show some of the sheet that", drawn.__enter__)
-
-
-KEPT = 300  # pixels
 
 
 @pytest.fixture

@@ -24,6 +24,10 @@ SHARP = HenyeyGreenstein(0.924)
 OMEGAS = np.array([0.2, 0.5, 0.8])
 NONE, ONE = (0.0,) * 3, (1.0,) * 3
 DEPTHS, RADII = np.array([0.3, 1.0, 2.5]), np.array([0.05, 0.5, 2.0])
+TILE, N, LIKE_AIR = 5.0, 1.34, 1.0 + 1e-7  # a world's water must be denser than the air
+MILD = ((1.0, 0.8),)
+RATES = np.array([0.6, 1.0, 1.6])
+VIEWS = [(0.5, 0.0, 0.5), (0.5, -0.6, 2.0), (0.0, 0.0, 2.0)]
 
 
 def test_one_scattering_is_its_integral(sidak):
@@ -185,11 +189,6 @@ def test_a_table_has_a_row_of_each(kind):
     assert not np.allclose(found[..., 0], found[..., 1])
 
 
-TILE, N, LIKE_AIR = 5.0, 1.34, 1.0 + 1e-7  # a world's water must be denser than the air
-MILD = ((1.0, 0.8),)
-RATES = np.array([0.6, 1.0, 1.6])
-
-
 def coarse(world):
     """Sunlight where its detail does not matter."""
     return Sunlight(world, levels=4, pixels=32, rays=128)
@@ -241,9 +240,6 @@ def other_photons(lobes, tilt, cosine, level, photons, rays, seed=3):
     once = scattered_once(world.phase, depths, (-aside, 0.0, cosine), (np.sin(tilt), 0.0, np.cos(tilt)))
     others = np.array([(one.value[i], one.standard_error[i]) for i, one in enumerate(each)]).T
     return found.mean(axis=0), others[0], OMEGAS * once, found.std(axis=0) / np.sqrt(rays), others[1]
-
-
-VIEWS = [(0.5, 0.0, 0.5), (0.5, -0.6, 2.0), (0.0, 0.0, 2.0)]
 
 
 @pytest.mark.parametrize(("tilt", "cosine", "level"), [(0.0, 0.0, 0.5), (0.0, -0.5, 2.0), *VIEWS])

@@ -18,6 +18,8 @@ from tests.unit.scenes.scenes import refusals, refused
 TILE = 10.0
 STEP = 2.0 * np.pi / TILE
 SEA = random_sea(0.15, TILE, seed=3)
+DEPTH = 5.0
+DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def test_heights_and_slopes_of_a_sea():
@@ -98,10 +100,6 @@ def test_what_no_waves_are():
     refused(f"^depth {length} -1.0", random_floor, 0.1, TILE, -1.0)
     wanted = "ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"
     refused(wanted, waves.wrong_shares, ["bisect"], [1.0])
-
-
-DEPTH = 5.0
-DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def lit_floor(steep, count=2000, seed=0):

@@ -26,6 +26,8 @@ REFRACTING = catalogue.find("hazard-refracting", FITS, n=1.2)
 BURLEY, MAP = profilefit.load("burley", "published"), catalogue.albedo_law("rational")
 NAMED = {"hazard": HAZARD, "two parts": REFRACTING}
 RATIONAL = catalogue.find("albedo-rational-refracting", FITS)
+DENSITY, OWN_DENSITY = "return hazard_density(x, s);", f"{OWN}, 99 % of it"
+FLOAT32 = 5e-6  # some ten operations, and an exponential of up to ten
 
 
 @cache
@@ -65,9 +67,6 @@ def test_a_law_of_two_parts_passes_with_room(context):
     assert max(found.rounding.values()) < 1e-6  # float32
     assert 0 < found.spreads[OWN].most < 1e-5
     assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-4)
-
-
-DENSITY, OWN_DENSITY = "return hazard_density(x, s);", f"{OWN}, 99 % of it"
 
 
 @pytest.mark.parametrize(
@@ -201,9 +200,6 @@ def test_costs_are_counted_in_normalized_diffusion(context):
 def test_a_stored_reflectance_loses_less_than_a_stored_albedo(context):
     found = check_half(context, HAZARD)
     assert 1e-5 < found.rel[HALVES[1]] < 0.5 * found.rel[HALVES[0]] < 0.01
-
-
-FLOAT32 = 5e-6  # some ten operations, and an exponential of up to ten
 
 
 def test_all_four_functions_are_the_laws(context):
