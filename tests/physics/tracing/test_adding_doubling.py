@@ -10,8 +10,6 @@ from tests.physics.tracing import test_published as published
 from tests.physics.tracing.adding_doubling import solve
 
 ANGLES = 18
-PHOTONS = 2**19
-SEED = 21
 TWO_LAYERS = Medium((Layer(n=1.4, mu_a=1.0, mu_s=30.0, g=0.8, thickness=0.05), Layer(1.4, 2.0, 10.0, 0.0, 0.1)))
 
 
@@ -30,7 +28,7 @@ def deviations(tally, answer):
     ],
 )
 def tally(request):
-    return simulate(request.param, Grid(1.0, 1, na=ANGLES), PHOTONS, seed=SEED)
+    return simulate(request.param, Grid(1.0, 1, na=ANGLES), 2**19, seed=21)
 
 
 def another_phase(medium):

@@ -337,7 +337,6 @@ def test_what_is_no_mco(tmp_path):
 
 # Written after the format of MCML 2, since its own examples may not be passed on: the input, whose first run it is, and
 # what it gave.
-RINGS = [12.5, 3.25, 1.5, 0.25]
 SECOND = f"""mcmloA2.0 	# Version number of the file format.
 
 ####
@@ -380,7 +379,7 @@ def test_mcml_2_is_read(tmp_path):
     assert (found.specular_reflectance, found.diffuse_reflectance) == (0.027778, 0.237859)
     assert (found.run.photons, found.run.dr, found.run.nr, found.run.medium.n_above) == (1000, 0.02, 4, 1.0)
     assert found.run.medium.layers == (Layer(1.5, 0, 0, 0, 0.1), Layer(1.4, 1, 100, 0.9, 0.2))
-    np.testing.assert_array_equal(found.reflectance_r, RINGS)
+    np.testing.assert_array_equal(found.reflectance_r, [12.5, 3.25, 1.5, 0.25])
     assert not begins_mco(tmp_path / "one.mco"), "a run of V1 replaces none but its own"
 
 

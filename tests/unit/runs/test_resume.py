@@ -10,7 +10,6 @@ import time
 import numpy as np
 import pytest
 
-KILLS = 4
 BATCHES = {"orders": 6, "layers": 12}
 # It prints the digest of all numbers found.
 CHILD = f"""
@@ -74,7 +73,7 @@ def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     store = tmp_path / "store"
     random = np.random.default_rng(2)
     hit = set()
-    for more in random.integers(1, 4, size=KILLS):
+    for more in random.integers(1, 4, size=4):
         child = start(str(store))
         batches, deadline = kept(store) + more, time.monotonic() + 60
         while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
