@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from mcml_sim import Grid, Setting, simulate_orders
 from mcml_sim.results.estimate import covariance_factor
-from profilefit.errors import ShaderError
+from profilefit.errors import InputError, ShaderError
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.burley import Burley
@@ -34,6 +34,14 @@ NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 def slow(*values):
     """Values of a parameter that only `make test-all` takes, beside others of every run; a tuple is of several."""
     return [pytest.param(*(one if type(one) is tuple else (one,)), marks=pytest.mark.slow) for one in values]
+
+
+def refused(message, call, *given, error=InputError, **named):
+    """Text of the error that a call raises: one line, in which this message is found, a regular expression."""
+    with pytest.raises(error, match=message) as caught:
+        call(*given, **named)
+    assert str(caught.value).isprintable()
+    return str(caught.value)
 
 
 def recorded(work, out, say=silent):

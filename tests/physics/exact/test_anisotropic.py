@@ -15,18 +15,13 @@ N = 1.4
 LIGHTS = "searchlight", "diffuse"
 
 
-def sphere(degree):
-    """Directions by mu and phi, even harmonics there, and weights."""
-    t, weight = np.polynomial.legendre.leggauss(80)
-    phi = 2 * np.pi * (np.arange(120) + 0.5) / 120
-    mu, phi = (one.ravel() for one in np.meshgrid(t, phi, indexing="ij"))
-    return mu, phi, harmonics.harmonics(degree, mu, phi), np.repeat(weight, 120) * 2 * np.pi / 120
-
-
 def test_flight_among_harmonics_is_the_integral_over_the_sphere():
     degree, k, x = 3, 0.7, np.array([0.3, 1.2])
+    t, weight = np.polynomial.legendre.leggauss(80)
+    mu, phi = (one.ravel() for one in np.meshgrid(t, 2 * np.pi * (np.arange(120) + 0.5) / 120, indexing="ij"))
+    weight = np.repeat(weight, 120) * 2 * np.pi / 120
     with jax.enable_x64(True):
-        mu, phi, z, weight = sphere(degree)
+        z = harmonics.harmonics(degree, mu, phi)
         wave = jnp.sqrt(k * k + x * x + 0j)
         turns = harmonics.rotations(degree, 1j * jnp.log((x + 1j * k) / wave))
         flights = harmonics.flights(degree, wave)

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import InputError, Setting, exact
+from mcml_sim import Setting, exact
+from tests.fixtures import refused
 
 # The last ones are out of range.
 ALPHAS = np.array([[0.0], [0.05], [0.8], [0.999], [1.0], [1.1]])
@@ -130,11 +131,8 @@ def test_numbers_inside_a_jitted_function_stay_numbers():
 def test_single_precision_is_refused():
     double = jnp.ones(2)
     within = r"must be a float64 array within jax\.enable_x64\(True\), got "
-    with pytest.raises(InputError, match=f"^r {within}float32$"):
-        exact.profile(jnp.ones(2, jnp.float32), 0.5)
+    refused(f"^r {within}float32$", exact.profile, jnp.ones(2, jnp.float32), 0.5)
     with jax.enable_x64(False):
         for call in (exact.reflectance, exact.decay_rate, lambda a: exact.quantile(0.5, a)):
-            with pytest.raises(InputError, match=f"^alpha {within}float32 outside of it$"):
-                call(jnp.asarray(0.5))
-        with pytest.raises(InputError, match=f"^mfp {within}float64 outside of it$"):
-            exact.cdf(1.0, 0.5, double)
+            refused(f"^alpha {within}float32 outside of it$", call, jnp.asarray(0.5))
+        refused(f"^mfp {within}float64 outside of it$", exact.cdf, 1.0, 0.5, double)

@@ -20,20 +20,17 @@ def energy(alpha, edges, setting=exact.SEARCHLIGHT):
     return within[..., 1:] - within[..., :-1]
 
 
-def chi_squared(run, alpha, expected):
-    """Of the rings that enough photons reached, and their number; rings are independent but for 1/N of themselves."""
-    found = run.energy(alpha)
-    sampled = found.is_sampled()
-    return np.sum(((found.value - expected) / found.standard_error)[sampled] ** 2), np.count_nonzero(sampled)
-
-
 def is_likely(run, setting, alphas, wrong=0.0):
-    """Whether neither tail of chi-square is too unlikely at any albedo; `wrong` takes that share of the loss."""
+    """Whether neither tail of chi-square is too unlikely at any albedo; `wrong` takes that share of the loss.
+
+    Over rings that enough photons reached, which are independent but for 1/N of themselves.
+    """
     p = []
     for alpha in alphas:
-        value, degrees = chi_squared(run, alpha, energy(alpha + wrong * (1 - alpha), run.grid.r_edges, setting))
-        assert degrees > 10
-        p.append(chi2.cdf(value, degrees))
+        found, expected = run.energy(alpha), energy(alpha + wrong * (1 - alpha), run.grid.r_edges, setting)
+        z = ((found.value - expected) / found.standard_error)[found.is_sampled()]
+        assert z.size > 10
+        p.append(chi2.cdf(np.sum(z**2), z.size))
     return CHANCE / len(p) < min(p) and max(p) < 1 - CHANCE / len(p)
 
 

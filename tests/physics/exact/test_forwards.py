@@ -23,10 +23,7 @@ def compared(request):
 
 
 def test_photons_agree(compared):
-    """Rings of 1e8 to 6e8 photons at n and g that are no nodes, by albedo; all albedos have the same photons.
-
-    In dark media light of many l* is less well known.
-    """
+    """Rings of 1e8 to 6e8 photons at n and g that are no nodes; in dark media light of many l* is less well known."""
     setting, found = compared
     for one in found:
         assert one.worst[0] < (0.01 + 2 * one.worst[1] if one.alpha >= 0.5 else 0.06)
@@ -154,7 +151,6 @@ def test_derivatives_at_the_ends_of_shares():
 
 
 def test_it_has_derivatives():
-    """Of jax, against differences."""
     with jax.enable_x64(True):
         for function, first in ((exact.profile, 1.3), (exact.cdf, 1.3), (exact.quantile, 0.4)):
             slope = jax.jit(jax.grad(lambda a, f=function, x=first: f(x, a, setting=TISSUE)))(jnp.float64(0.97))

@@ -15,20 +15,16 @@ from profilefit.scenes.stage import pattern, step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import KINDS, WRAPS, Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.step_edge import (
-    EdgeGather,
-    by_law,
-    by_quantile,
-    edge_estimate,
-    random_points,
-    shifted_points,
-    step_response,
-)
+from profilefit.scenes.stage.step_edge import by_quantile, edge_estimate, random_points, shifted_points, step_response
 from tests.physics.scenes import edges
 from tests.unit.scenes.scenes import refused
 
 SETTINGS = SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")
 BESIDE = (np.arange(16) - 7.5) / 2.0
+PLACES = np.array([-30.0, -4.0, -0.5, -1e-3, -1e-7, 0.0, 1e-4, 0.03, 1.0, 4.0])
+LONG = 8.0  # mean free path [mm]
+ASLANT, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))
+BOUND = 0.006  # of A: at 85 degrees a pixel is 1.4 mfp, and is lit in its middle or not; standard errors are 0.001
 
 
 def noise(gather, points, alpha, setting):
@@ -49,7 +45,7 @@ def test_is_the_obvious_loop():
             total += weight
             lit += weight * (0.3 + r * np.cos(angle[trial, i]) > 0)
         found.append(lit / total)
-    estimate = edge_estimate(by_law(law, 0.8), points, [0.3], 0.8, SEARCHLIGHT)
+    estimate = edge_estimate(step_edge.by_law(law, 0.8), points, [0.3], 0.8, SEARCHLIGHT)
     assert estimate.mean == pytest.approx(np.mean(found), abs=1e-12)
     assert estimate.variance == pytest.approx(np.var(found, ddof=1), abs=1e-12)
 
@@ -79,7 +75,7 @@ def test_quantile_curve():
 @pytest.mark.slow
 def test_mean_tends_to_the_law_and_not_to_the_truth(sidak):
     law = profilefit.load("liang", "corrected")
-    found = edge_estimate(by_law(law, 0.8), random_points(256, 2000, seed=3), BESIDE, 0.8, SEARCHLIGHT)
+    found = edge_estimate(step_edge.by_law(law, 0.8), random_points(256, 2000, seed=3), BESIDE, 0.8, SEARCHLIGHT)
     of_law = step_response(BESIDE, 0.8, law=law) - found.truth
     # The ratio of two sums has a bias of order 1/n: for weights of this spread below 3e-4 at n = 256.
     assert np.all(np.abs(found.bias - of_law) < sidak(BESIDE.size) * found.standard_error + 3e-4)
@@ -95,7 +91,7 @@ def test_project_law_is_as_good_as_the_exact_quantile(alpha, setting):
     for draw in (random_points, shifted_points):
         points = draw(64, 200, seed=5)
         floor = noise(by_quantile(alpha, setting), points, alpha, setting)
-        assert noise(by_law(law, alpha), points, alpha, setting) < 1.1 * floor
+        assert noise(step_edge.by_law(law, alpha), points, alpha, setting) < 1.1 * floor
         assert noise(by_uniform(alpha, setting), points, alpha, setting) > 1.2 * floor
 
 
@@ -107,11 +103,11 @@ def test_lattice_beats_random_points():
 
 def test_what_weighs_nothing():
     """Where that is all there is to gather, a point keeps its own light; an atom of a law that ends."""
-    empty = EdgeGather(lambda xi: xi, np.zeros_like)
+    empty = step_edge.EdgeGather(lambda xi: xi, np.zeros_like)
     found = edge_estimate(empty, random_points(4, 3, seed=1), [-1.0, 1.0], 0.5, SEARCHLIGHT)
     np.testing.assert_array_equal(found.mean, [0.0, 1.0])
     law = profilefit.load("liang", "corrected")
-    gather = by_law(law, 0.95)
+    gather = step_edge.by_law(law, 0.95)
     last = gather.sample(np.array([1.0 - 1e-6]))
     np.testing.assert_allclose(last, law.largest_radius(0.95))
     assert gather.weight(last) == 0.0
@@ -132,9 +128,6 @@ def test_points_by_default_are_the_stage_s(samples):
     assert np.all(shares(shifted_points(samples, 200, seed=2)))
     torus = shares((base + np.random.default_rng(2).random((200, 1, 2))) % 1.0)
     assert samples == 1 or np.mean(torus) < 0.2
-
-
-PLACES = np.array([-30.0, -4.0, -0.5, -1e-3, -1e-7, 0.0, 1e-4, 0.03, 1.0, 4.0])
 
 
 def plane_sum(distance, alpha, setting):
@@ -254,10 +247,7 @@ def rmse(light, truth):
 @pytest.mark.slow
 @pytest.mark.parametrize(("alpha", "size", "seeds"), [(0.8, (128, 96), 8), (0.95, (512, 512), 32)])
 def test_our_law_is_as_good_as_the_exact_quantile(context, alpha, size, seeds):
-    """The same points: noise at most 1.1 times as large, and a bias of at most 0.3 % of A; uniform radii have more.
-
-    White-ish light goes far: the screen must hold it.
-    """
+    """The same points: noise at most 1.1 times as large, and a bias of at most 0.3 % of A; uniform radii have more."""
     exact_light, truth = gathered(context, ExactLaw((alpha,)), alpha, size, seeds)
     hazard, other = (profilefit.load("hazard", setting=setting) for setting in (edges.DIFFUSE, Setting()))
     ours, _ = gathered(context, hazard, alpha, size, seeds)
@@ -305,11 +295,6 @@ def test_short_paths_fade_to_lambert_without_a_seam(small):
     truth = step_response(-0.5 / lengths, ALPHA, setting=edges.DIFFUSE)
     assert np.all((light >= 0) & (np.abs(light - truth) < 0.003))
     assert np.all((np.diff(light) > 0) & (np.diff(light) < 0.006))
-
-
-LONG = 8.0  # mean free path [mm]
-ASLANT, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))
-BOUND = 0.006  # of A: at 85 degrees a pixel is 1.4 mfp, and is lit in its middle or not; standard errors are 0.001
 
 
 def bias(context, degrees, depth, area=True, seeds=4):

@@ -18,6 +18,12 @@ from tests.unit.scenes.scenes import refused
 FORWARD = np.array([0.0, 0.0, -1.0])
 NORMAL = np.array([0.5, -0.3, np.sqrt(1.0 - 0.34)])
 THROUGH = np.array([0.2, 0.1, -40.0])
+VIEW = View(0.5)
+MFP = np.array([1.5, 0.8, 2.2])
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
+SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])
+RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
 def hit(view, column, row):
@@ -59,7 +65,6 @@ def test_coarsened_is_the_mean_of_blocks():
 
 
 def test_seen_is_the_render_in_view_space():
-    """And what the shaders take for inside."""
     surface, view = seen(planes.step_edge((6, 4), 0.5, [0.2, 0.5, 1.0]))
     across, along = view.footprint(surface.position, surface.normal)
     np.testing.assert_allclose(across[1, 2], surface.position[1, 3] - surface.position[1, 2])
@@ -69,11 +74,6 @@ def test_seen_is_the_render_in_view_space():
     plane = planes.flat((4, 1), 0.5, 0.5)
     mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
     np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
-
-
-VIEW = View(0.5)
-MFP = np.array([1.5, 0.8, 2.2])
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
 def flat(h, w, reflectance, irradiance=1.0, pixel=0.5):
@@ -209,10 +209,7 @@ def test_refined_says_what_coarse_pixels_cost():
 
 
 def test_a_table_of_ones_own():
-    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself.
-
-    In a picture, where nothing scatters inside, the map is A all the same.
-    """
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
 
     def stretched(values):
         assert values.size % 3 == 0
@@ -225,6 +222,7 @@ def test_a_table_of_ones_own():
     np.testing.assert_array_equal(found.light, truth.light)
     np.testing.assert_array_equal(found.share, truth.share)
     assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
+    # In a picture, where nothing scatters inside, the map is A all the same.
     half = SimpleNamespace(curves=lambda values: exact_table(DIFFUSE).curves(0.5 * values))
     mask = np.ones((4, 6), np.float32)
     mask[:, 0] = 0.0
@@ -241,11 +239,6 @@ def test_what_cannot_be_gathered():
     refused(r"pixels must be visible ones, got \(4, 0\)", gathered, surface, VIEW, MFP, pixels=[[4, 0]])
     refused("pixels must be pairs", gathered, surface, VIEW, MFP, pixels=[[1.0, 2.0]])
     refused("factor must divide 2 and 3, got 2", flat(2, 3, 0.5).coarsened, 2)
-
-
-REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
-SKIN, REFRACTED = Setting("diffuse", n=1.4), np.concatenate([np.linspace(0.013, 0.905, 24), [1e-4, 2e-3, 0.922]])
-RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
 @pytest.mark.slow

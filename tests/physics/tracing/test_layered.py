@@ -16,12 +16,13 @@ pytestmark = pytest.mark.slow
 SMALL = Medium((Layer(1.4, 0.5, 9.5, 0.8, 0.2), Layer(1.2, 1, 4, 0, 0.3), Layer(1.5, 2, 3, -0.4, 0.3)), 1.0, 1.3)
 GRID = Grid(0.1, 8, 0.1, 8, na=6)
 BATCH = layered_batch.BATCH_PHOTONS
+# Sums of weights of all sizes: with float64 added in the order of lanes, six arrays would differ.
+ABSORBING = Medium((Layer(1.37, 5, 1, 0.3, 0.5), Layer(1.5, 30, 1, -0.3, 0.5), Layer(1.2, 0.2, 3, 0.8, 1.0)))
+UNEVEN = Grid.from_edges(r=[0, 0.5, 1.5, 5], z=[0, 0.3, 0.9])
 
 
 @dataclass
 class Found:
-    """What became of each photon."""
-
     side: np.ndarray  # -1 above, 1 below, 2 below without scattering, 0 if it ended inside
     rho: np.ndarray
     cosine: np.ndarray
@@ -136,7 +137,6 @@ def means_of_twin(found):
 
 
 def means_of_fast(d):
-    """The same of Deposits."""
     sums = np.concatenate([d.reflected.ravel(), d.transmitted.ravel(), [d.ballistic], d.absorbed])
     squares = [d.reflected_squares.ravel(), d.transmitted_squares.ravel(), [d.ballistic_squares], d.absorbed_squares]
     variance = np.concatenate(squares) - sums**2 / d.started
@@ -186,10 +186,6 @@ def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one():
     assert more.reflected.sum() - some.reflected.sum() < 10_000
     for seed, batch in ((1, 1), (2, 0)):  # different photons
         assert layered_batch.trace_batch(SMALL, GRID, seed, batch, 50_000).reflected.sum() != some.reflected.sum()
-
-
-# Sums of weights of all sizes: with float64 added in the order of lanes, six arrays would differ.
-ABSORBING = Medium((Layer(1.37, 5, 1, 0.3, 0.5), Layer(1.5, 30, 1, -0.3, 0.5), Layer(1.2, 0.2, 3, 0.8, 1.0)))
 
 
 @pytest.mark.parametrize(("medium", "photons"), [(SMALL, 50_000), (ABSORBING, 30_000)], ids=["any", "small weights"])
@@ -280,9 +276,6 @@ def test_extremes_are_numbers_that_add_up(g, thickness):
     error = np.sqrt(max(d.accounted_squares - d.accounted**2 / d.started, 0))
     assert abs(sum(shares(d)) - d.started) < 4 * error + 1e-6 * d.started
     assert (d.absorbed[-1] / d.started < 1e-5) == (thickness == 1e-7)
-
-
-UNEVEN = Grid.from_edges(r=[0, 0.5, 1.5, 5], z=[0, 0.3, 0.9])
 
 
 @pytest.mark.parametrize(("layers", "grid", "inner"), [(3, GRID, 5), (9, UNEVEN, 1)])

@@ -12,7 +12,6 @@ from tests.physics.tracing.adding_doubling import solve
 VAN_DE_HULST_SLAB = Medium((Layer(n=1.0, mu_a=10.0, mu_s=90.0, g=0.75, thickness=0.02),))
 VAN_DE_HULST_REFLECTANCE, VAN_DE_HULST_TRANSMITTANCE = 0.09739, 0.66096
 """Total; the transmittance includes the unscattered e^-2. Half a unit of the last digit is 5e-6."""
-VAN_DE_HULST_ROUNDING = 5e-6
 # The same by adding-doubling (Prahl, van Gemert & Welch, Appl. Opt. 32, 1993), with a digit more.
 ADDING_DOUBLING_REFLECTANCE, ADDING_DOUBLING_TRANSMITTANCE = 0.097395, 0.660958
 
@@ -30,12 +29,9 @@ THREE_LAYERS_SPECULAR = 0.0243729
 THREE_LAYERS_REFLECTANCE, THREE_LAYERS_ABSORBED, THREE_LAYERS_TRANSMITTANCE = 0.237826, 0.641779, 0.0960224
 THREE_LAYERS_ABSORBED_BY_LAYER = (0.2619, 0.1488, 0.2311)
 THREE_LAYERS_ERROR = 4e-5
-THREE_LAYERS_ROUNDING_BY_LAYER = 5e-5
-THREE_LAYERS_TRANSMITTANCE_OF_RAN3 = 0.096355
 
 GRID = Grid(0.05, 20)
 FEW, MANY = 2**19, 10**7
-EIGHT_ALBEDOS = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 HALF_SPACES = dict(zip(ALPHAS, PRINTED["searchlight"], strict=True))  # which `test_exact` holds the exact solution to
 sizes = pytest.mark.parametrize("photons", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])
 
@@ -49,9 +45,8 @@ def is_met(estimate, published_value, published_error=0.0, rounding=0.0):
 @sizes
 def test_slab_of_van_de_hulst(photons):
     tally = simulate(VAN_DE_HULST_SLAB, GRID, photons, seed=30)
-    rounding = VAN_DE_HULST_ROUNDING
-    assert is_met(tally.diffuse_reflectance, VAN_DE_HULST_REFLECTANCE, rounding=rounding)
-    assert is_met(tally.transmittance, VAN_DE_HULST_TRANSMITTANCE, rounding=rounding)
+    assert is_met(tally.diffuse_reflectance, VAN_DE_HULST_REFLECTANCE, rounding=5e-6)
+    assert is_met(tally.transmittance, VAN_DE_HULST_TRANSMITTANCE, rounding=5e-6)
     assert is_met(tally.diffuse_reflectance, ADDING_DOUBLING_REFLECTANCE)
     assert is_met(tally.transmittance, ADDING_DOUBLING_TRANSMITTANCE)
     assert tally.diffuse_reflectance.standard_error < 0.5 / np.sqrt(photons)
@@ -68,8 +63,7 @@ def test_three_layers_of_mcml(photons):
     assert is_met(tally.diffuse_reflectance, THREE_LAYERS_REFLECTANCE, error)
     assert is_met(tally.absorbed, THREE_LAYERS_ABSORBED, error)
     assert is_met(tally.transmittance, THREE_LAYERS_TRANSMITTANCE, error)
-    by_layer, rounding = THREE_LAYERS_ABSORBED_BY_LAYER, THREE_LAYERS_ROUNDING_BY_LAYER
-    assert is_met(tally.absorbed_per_layer, by_layer, error, rounding)
+    assert is_met(tally.absorbed_per_layer, THREE_LAYERS_ABSORBED_BY_LAYER, error, rounding=5e-5)
     # By adding and doubling they are known to 1e-7, so only the run's own error counts.
     answer = solve(THREE_LAYERS, angles=10)
     transmittance = answer.transmitted.sum() + answer.ballistic
@@ -77,7 +71,7 @@ def test_three_layers_of_mcml(photons):
     assert is_met(tally.transmittance, transmittance)
     assert is_met(tally.absorbed, 1 - answer.specular - answer.reflected.sum() - transmittance)
     # The biased generator of MCML would be seen.
-    biased = abs(tally.transmittance.value - THREE_LAYERS_TRANSMITTANCE_OF_RAN3)
+    biased = abs(tally.transmittance.value - 0.096355)
     assert photons == FEW or biased > 3.5 * tally.transmittance.standard_error
 
 
@@ -90,7 +84,7 @@ def test_adding_doubling_confirms_what_was_published_by_photons():
 
 
 @sizes
-@pytest.mark.parametrize("alpha", EIGHT_ALBEDOS)
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99])
 def test_half_space_of_chandrasekhar(alpha, photons):
     tally = simulate(half_space(alpha), GRID, photons // (1 if photons == MANY else 2), seed=32)
     assert is_met(tally.diffuse_reflectance, exact.reflectance(alpha))

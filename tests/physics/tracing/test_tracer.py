@@ -17,6 +17,11 @@ from tests.physics.tracing.test_half_space_event import deviations, slow_twin, t
 STOPS = OrderBins().stops
 PHOTONS = 200_000
 LANES = pool.LANES
+EDGES = np.concatenate([[0.0], np.geomspace(0.03, 5, 12), [np.inf]])
+EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
+KEY = jnp.asarray(rng.batch_key(0, 0))
+ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
+FLY = jax.jit(half_space_event.fly, static_argnames="events")
 
 
 def traced(photons, lanes=LANES):
@@ -26,13 +31,11 @@ def traced(photons, lanes=LANES):
 
 @pytest.fixture(scope="module")
 def ends():
-    """Ends of the first photons of batch 0, seed 0, as numpy arrays."""
     found = traced(PHOTONS)
     return np.asarray(found.rho)[:PHOTONS], np.asarray(found.order)[:PHOTONS]
 
 
 def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
-    """And a twin that is off by 5 % is seen."""
     rho, order = slow_twin(Setting(), PHOTONS, 64, seed=3)
     z, off = (deviations(table(*ends, 64), table(scale * rho, order, 64)) for scale in (1.0, 1.05))
     assert z.size > 40
@@ -83,13 +86,8 @@ def test_rings_are_those_of_float64_edges(ends):
     assert counts.cut == np.sum(ends[1] == -MAX_ORDER)
 
 
-EDGES = np.concatenate([[0.0], np.geomspace(0.03, 5, 12), [np.inf]])
-EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
-
-
 @pytest.fixture(scope="module", params=["searchlight", "diffuse"])
 def lit(request):
-    """Half a million photons of either light."""
     grid = Grid.from_edges(r=EDGES[:-1])
     return request.param, orders_batch.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
 
@@ -101,7 +99,6 @@ def from_exact(counts, illumination):
 
 
 def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
-    """And the exact answer to the other light is told apart."""
     illumination, counts = lit
     other = {"searchlight": "diffuse", "diffuse": "searchlight"}[illumination]
     assert np.abs(from_exact(counts, other)).max() > 3 * sidak(4 * 13)
@@ -138,11 +135,6 @@ def placed(z, order, last=MAX_ORDER, count=2**14):
     place = jnp.full(count, 1 + 1j * z, jnp.complex64)
     numbers = (jnp.full(count, n, jnp.int32) for n in (order, last))
     return OrderLanes(place, None, *numbers, jnp.arange(count, dtype=jnp.uint32))
-
-
-KEY = jnp.asarray(rng.batch_key(0, 0))
-ENTER = jax.jit(half_space_event.enter, static_argnames="illumination")
-FLY = jax.jit(half_space_event.fly, static_argnames="events")
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():

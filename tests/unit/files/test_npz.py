@@ -2,9 +2,8 @@
 
 import io
 import struct
-import subprocess
-import sys
 import time
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -61,9 +60,7 @@ def test_only_what_is_wanted_is_looked_at():
 
 WRONG = {
     "shape": (zipped(("one.npy", npy(shape="(1, 3)"))), r"'one' must have the shape \(3,\), got \(1, 3\)"),
-    "1e14 values": (zipped(("one.npy", npy(shape="(100000000000000,)"))), r"'one' must have the shape"),
     "objects": (zipped(("one.npy", npy("|O"))), "'one' is no array of numbers or text"),
-    "truth values": (packed(one=np.array([True, False, True])), "'one' is no array of numbers or text"),
     "complex": (packed(one=np.zeros(3, complex)), "'one' is no array of numbers or text"),
     "long double": (packed(one=np.zeros(3, np.longdouble)), "'one' must be real numbers, got float128"),
     "text": (packed(one=np.array(["a", "b", "c"])), "'one' must be real numbers, got <U1"),
@@ -114,28 +111,16 @@ def test_a_directory_that_lies_about_sizes_unpacks_no_more_than_it_said():
     assert time.perf_counter() - started < 0.2
 
 
-BOMB = """
-import resource, sys, time
-from pathlib import Path
-from mcml_sim.files.npz import read_npz
-content = Path(sys.argv[1]).read_bytes()
-before, started = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
-try:
-    read_npz(content, 2**26)
-except ValueError as error:
-    print(error)
-print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024, time.perf_counter() - started)
-"""
-
-
-def test_a_bomb_is_not_unpacked(tmp_path):
+def test_a_bomb_is_not_unpacked():
     """A file that packs a thousand times: less than 20 MB more, and no time."""
-    path = tmp_path / "bomb.npz"
-    path.write_bytes(zipped(("one.npy", npy(shape="(12500000,)", data=bytes(10**8)))))
-    assert path.stat().st_size < 1.1e5
-    done = subprocess.run([sys.executable, "-c", BOMB, str(path)], capture_output=True, text=True, check=True)
-    reason, grown = done.stdout.splitlines()
-    megabytes, seconds = map(float, grown.split())
-    assert reason == "its arrays claim 100000128 bytes, more than the 67108864 that are read"
-    assert megabytes < 20
-    assert seconds < 0.5
+    content = zipped(("one.npy", npy(shape="(12500000,)", data=bytes(10**8))))
+    assert len(content) < 1.1e5
+    tracemalloc.start()
+    started = time.perf_counter()
+    try:
+        with pytest.raises(ValueError, match="its arrays claim 100000128 bytes, more than the 67108864 that are read"):
+            read_npz(content, 2**26)
+        assert time.perf_counter() - started < 0.5
+        assert tracemalloc.get_traced_memory()[1] < 20 * 2**20
+    finally:
+        tracemalloc.stop()

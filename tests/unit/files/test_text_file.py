@@ -1,7 +1,4 @@
-"""JSON and TOML that others wrote: one line for everything that is not to be trusted, and no time lost over it.
-
-What is written is JSON that any reader takes, whatever was found.
-"""
+"""JSON and TOML of others: one line for everything that is not to be trusted; what is written any reader takes."""
 
 import enum
 import json
@@ -14,17 +11,8 @@ import numpy as np
 import pytest
 
 from mcml_sim.errors import InputError
-from mcml_sim.files.text_file import (
-    MOST_JSON,
-    MOST_LEVELS,
-    MOST_TOML,
-    as_json,
-    parse_json,
-    parse_toml,
-    plain,
-    read_json,
-    read_toml,
-)
+from mcml_sim.files import text_file
+from mcml_sim.files.text_file import MOST_LEVELS, MOST_TOML, as_json, parse_json, parse_toml, read_json, read_toml
 
 
 def test_json_comes_back(tmp_path):
@@ -61,7 +49,7 @@ NO_JSON = {
     b'{"a": 1, "b": {"a": 2, "a": 3}}': "the key 'a' twice in one object",
     b'["\\ud800"]': "'utf-8' codec can't encode character",
     b'{"\\ud800": 1}': "'utf-8' codec can't encode character",
-    b" " * (MOST_JSON + 1): f"more than {MOST_JSON} bytes",
+    b" " * (text_file.MOST_JSON + 1): f"more than {text_file.MOST_JSON} bytes",
 }
 NO_TOML = {
     b"a = ": "Invalid value",
@@ -150,8 +138,8 @@ def test_every_kind_of_number_text_and_container():
 
 def test_no_digit_is_lost_unless_asked():
     value = 0.1 + 0.2
-    assert plain(value) == value
-    assert plain(value, 12) == 0.3
+    assert text_file.plain(value) == value
+    assert text_file.plain(value, 12) == 0.3
     assert json.loads(as_json(math.pi)) == math.pi
 
 

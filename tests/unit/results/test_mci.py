@@ -11,6 +11,7 @@ import pytest
 
 from mcml_sim import Grid, InputError, Layer
 from mcml_sim.results.mci import MAX_BYTES, MAX_CELLS, parse_mci, read_mci
+from tests.fixtures import refused
 
 DATA = Path(__file__).parent / "data"
 
@@ -109,7 +110,6 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
     ("number", "line", "expected", "got"),
     [
         (1, "mcmli_3.0", "the file version, 1.0 or mcmli2.0", "'mcmli_3.0'"),
-        (1, "2.0", "the file version, 1.0 or mcmli2.0", "'2.0'"),
         (2, "0", "the number of runs, a whole number from 1 to 10000", "'0'"),
         (2, "10001", "the number of runs, a whole number from 1 to 10000", "'10001'"),
         (2, "2", "the name of an output file, and A or B", "the end of the file"),
@@ -132,14 +132,12 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
         (7, "1001", "the number of layers, a whole number from 1 to 1000", "'1001'"),
         (7, "3", "5 values, n, mu_a, mu_s, g and thickness of layer 3 of 3", "1: '1.2'"),
         (3, "my file.mco A", r"A or B after the name \(a name holds no spaces\)", "'file.mco'"),
-        (3, "a band.mco", r"A or B after the name .*", "'band.mco'"),
         (3, "out.mco x", r"A or B after the name .*", "'x'"),
         (3, "out.mco A 7", "the name of an output file, and A or B alone", "3 values"),
         (4, "1000 5", "the number of photons alone", "2 values"),
         (5, "0.01 0.02 1e-3 mm", "dz and dr alone", "3 values"),
         (7, "1", "n below the layers alone", "5 values"),
         (9, "1.4 1 90 0.9 0.1 .5", "n, mu_a, mu_s, g and thickness of layer 1 of 2 alone", "6 values"),
-        (9, "1.4 1 90 0.9 0.1 inf 3", "n, mu_a, mu_s, g and thickness of layer 1 of 2 alone", "7 values"),
         (9, "1.4 1e-38 90 0.9 0.1", "mu_a of layer 1 of 2 in 1/cm, 0 or a number .*", "'1e-38'"),
         (8, "0", "n above the layers, a number from 0.01 to 100", "'0'"),
         (9, "1.4 1 90 0.9", "5 values, n, mu_a, mu_s, g and thickness of layer 1 of 2", "4: '1.4 1 90 0.9'"),
@@ -170,8 +168,7 @@ def test_two_runs_cannot_have_one_output(tmp_path):
     run = SMALL.split("\n", 2)[2]
     for again in ("out.mco", "./out.mco"):
         text = f"1.0\n2\n{run}{run.replace('out.mco', again)}"
-        with pytest.raises(InputError, match=rf"small.mci:12: expected an output file that no .*, got '{again}'"):
-            read_mci(written(tmp_path, text))
+        refused(rf"small.mci:12: expected an output file that no .*, got '{again}'", read_mci, written(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -187,8 +184,7 @@ def test_two_runs_cannot_have_one_output(tmp_path):
     ],
 )
 def test_what_is_no_text_is_said(tmp_path, content, message):
-    with pytest.raises(InputError, match=message):
-        read_mci(written(tmp_path, content))
+    refused(message, read_mci, written(tmp_path, content))
 
 
 def test_what_cannot_be_opened_is_said(tmp_path):

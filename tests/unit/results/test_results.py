@@ -10,6 +10,7 @@ from mcml_sim.results.estimate import Estimate, covariance_factor, estimate
 from mcml_sim.results.tally import read_results, write_results
 from mcml_sim.runs.simulation import simulate
 from mcml_sim.tracing.order_bins import Counts
+from tests.fixtures import refused
 from tests.unit.results.test_mco import made_up
 
 LAYERS = Medium((Layer(1.3, 1, 9, 0.7, 0.1), Layer(1.4, 2, 8, 0.5)), n_above=1.1, n_below=1.2)
@@ -61,11 +62,9 @@ def test_a_damaged_file_is_named(tmp_path):
     whole = path.read_bytes()
     for content in (whole[: len(whole) // 2], b"not a zip file", b""):
         path.write_bytes(content)
-        with pytest.raises(InputError, match=r"out.npz: expected results of mcml_sim, got: not a whole .npz file"):
-            read_results(path)
+        refused(r"out.npz: expected results of mcml_sim, got: not a whole .npz file", read_results, path)
     path.unlink()
-    with pytest.raises(InputError, match=r"out.npz: expected results of mcml_sim, got: No such file or directory"):
-        read_results(path)
+    refused(r"out.npz: expected results of mcml_sim, got: No such file or directory", read_results, path)
 
 
 def layer(**changes):
@@ -143,14 +142,9 @@ def test_misuse_is_named(tmp_path):
     tally = made_up(LAYERS, Grid(0.1, 4))
     orders = simulate_orders(Grid(1, 2), 10, progress=False)
     for wrong in (orders, None, tmp_path / "out.npz"):
-        with pytest.raises(InputError, match=r"^tally must be what simulate gave, got [^\n]{1,40}$"):
-            write_results(wrong, tally)
+        refused(r"^tally must be what simulate gave, got [^\n]{1,40}$", write_results, wrong, tally)
     for wrong in (None, 3, tally):
-        with pytest.raises(InputError, match=r"^path must be the name of a file, got [^\n]{1,40}$"):
-            write_results(tally, wrong)
-
-
-# Counts, and estimates from them
+        refused(r"^path must be the name of a file, got [^\n]{1,40}$", write_results, tally, wrong)
 
 
 def photon_by_photon(counts, weights, photons):

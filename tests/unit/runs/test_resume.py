@@ -1,8 +1,7 @@
-"""Runs that are killed, or meet a full disk, and go on: the bits of a run that nothing happened to."""
+"""Runs that are killed, and go on: the bits of a run that nothing happened to."""
 
 import contextlib
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import time
 import numpy as np
 import pytest
 
-KILLS = 4
 BATCHES = {"orders": 6, "layers": 12}
 # It prints the digest of all numbers found.
 CHILD = f"""
@@ -69,21 +67,17 @@ def kept(store, name="*"):
     return len(list(store.glob(f"{name}/batch-*.npz")))
 
 
-def wait_for(batches, store, child):
-    deadline = time.monotonic() + 60
-    while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.002)
-
-
 @pytest.mark.slow
 def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     whole = finish(start())
     store = tmp_path / "store"
     random = np.random.default_rng(2)
     hit = set()
-    for more in random.integers(1, 4, size=KILLS):
+    for more in random.integers(1, 4, size=4):
         child = start(str(store))
-        wait_for(kept(store) + more, store, child)
+        batches, deadline = kept(store) + more, time.monotonic() + 60
+        while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.002)
         time.sleep(random.uniform(0, 0.03))  # in the middle of a batch, or of writing one
         child.kill()
         child.communicate()
@@ -91,62 +85,3 @@ def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
         hit |= {next(name for name, batches in BATCHES.items() if kept(store, name) < batches)}
     assert hit == set(BATCHES), "else only one of the two was killed"
     assert finish(start(str(store))) == whole
-
-
-# Batches of rising size, so that a small limit for a file is met in the middle, as the end of a small disk would be.
-FULL = """
-import resource, signal, sys
-from dataclasses import dataclass
-from pathlib import Path
-import numpy as np
-from mcml_sim import StoreError
-from mcml_sim.runs.batches import run_batches
-from mcml_sim.runs.store import Store
-
-@dataclass
-class Bytes:
-    started: int
-    random: np.ndarray
-    def __add__(self, other):
-        return Bytes(self.started + other.started, self.random + other.random[:1])
-    def arrays(self):
-        return {"started": np.array(self.started), "random": self.random}
-    @classmethod
-    def read(cls, arrays):
-        return cls(int(arrays["started"]), arrays["random"])
-
-traced = []
-def trace(batch, photons):
-    traced.append(batch)
-    return Bytes(photons, np.random.default_rng(batch).normal(size=1 + 300 * batch))
-
-(folder,) = sys.argv[1:]
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))
-store = Store(Path(folder), {}, Bytes.read)
-try:
-    run_batches(trace, 1, 20, workers=1, store=store)
-except StoreError as error:
-    print(error)
-kept = sorted(path.name for path in Path(folder).iterdir())
-print(traced, len(kept))
-resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-traced.clear()
-again = run_batches(trace, 1, 20, workers=1, store=store)
-first = again.random.tobytes() == run_batches(trace, 1, 20).random.tobytes()
-print(traced[:20 - len(kept) + 1], first)
-"""
-
-
-@pytest.mark.slow
-def test_a_batch_that_finds_no_room_is_named_and_the_run_goes_on_when_there_is_some(tmp_path):
-    words = [sys.executable, "-c", FULL, str(tmp_path)]
-    child = subprocess.run(words, capture_output=True, text=True, timeout=60)
-    assert child.returncode == 0, child.stderr
-    error, before, after = child.stdout.splitlines()
-    named = rf"cannot write {tmp_path}/batch-0+[0-9]+.npz: File too large; what the store holds is whole, .*"
-    assert re.fullmatch(named, error)
-    failed = int(before.split("]")[0].split(",")[-1])
-    assert 3 < failed < 19
-    assert before == f"{list(range(failed + 1))} {failed + 1}", "the manifest and the batches before, nothing half-done"
-    assert after == f"{list(range(failed, 20))} True"

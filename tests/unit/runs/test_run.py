@@ -14,14 +14,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, simulate_orders, trace_share
+from mcml_sim import Grid, simulate_orders, trace_share
 from mcml_sim.runs.batches import AHEAD, run_batches
 from mcml_sim.runs.input_runs import EVENTS, Compiling
 from mcml_sim.runs.progress import is_watched, rate, tracked, working
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing.order_bins import Counts
 from mcml_sim.tracing.orders_batch import BATCH_PHOTONS
-from tests.fixtures import slow
+from tests.fixtures import refused, slow
 
 GRID = Grid(0.5, 8)
 PHOTONS = 5 * BATCH_PHOTONS // 2  # two batches and a half
@@ -223,15 +223,9 @@ def test_shares_are_the_run_and_a_share_again_is_nothing(tmp_path):
 
 
 def test_what_is_no_share_is_said(tmp_path):
-    with pytest.raises(InputError, match=r"share must be a whole number >= 0 and <= 1, got 2"):
-        trace_share(2, 2, GRID, 1000, store=tmp_path)
-    with pytest.raises(InputError, match=r"shares must be a whole number >= 1, got 0"):
-        trace_share(0, 0, GRID, 1000, store=tmp_path)
-    with pytest.raises(InputError, match=r"store must be the path of a folder, got None"):
-        trace_share(0, 1, GRID, 1000, store=None)
-
-
-# The bar's words, and that it is there for a terminal only
+    refused(r"share must be a whole number >= 0 and <= 1, got 2", trace_share, 2, 2, GRID, 1000, store=tmp_path)
+    refused(r"shares must be a whole number >= 1, got 0", trace_share, 0, 0, GRID, 1000, store=tmp_path)
+    refused(r"store must be the path of a folder, got None", trace_share, 0, 1, GRID, 1000, store=None)
 
 
 @pytest.mark.parametrize(
@@ -280,9 +274,6 @@ def test_nobody_else_does(monkeypatch, screen, quiet):
     assert sys.stderr.getvalue() == ""
     monkeypatch.setattr(sys, "stderr", None)
     assert not is_watched(), "a closed stderr is no terminal"
-
-
-# Seconds of compiling, told from those of running
 
 
 def test_the_first_call_compiles_and_the_second_does_not():

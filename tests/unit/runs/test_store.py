@@ -15,6 +15,7 @@ from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
 from mcml_sim.tracing.deposits import Deposits, shapes
 from mcml_sim.tracing.order_bins import Counts
+from tests.fixtures import refused
 
 GRID = Grid(0.5, 3)
 MADE_BY = {"seed": 1, "grid": "abc"}
@@ -25,6 +26,18 @@ READ = partial(Counts.from_arrays, shape=(2, 3))
 @pytest.fixture
 def store(tmp_path):
     return Store(tmp_path, MADE_BY, READ)
+
+
+@pytest.fixture
+def trace():
+    """A tracer that keeps the numbers of its batches."""
+
+    def trace(batch, photons):
+        trace.batches.append(batch)
+        return Counts(COUNTS.exits, batch, photons - batch - 6, photons)
+
+    trace.batches = []
+    return trace
 
 
 def test_batches_come_back_as_they_were(store, tmp_path):
@@ -92,24 +105,21 @@ def test_a_run_that_ended_before_its_first_batch_blocks_no_other(tmp_path, text)
     Store(tmp_path, MADE_BY, READ).save(0, COUNTS)
     assert json.loads((tmp_path / "run.json").read_text()).items() >= MADE_BY.items()
     assert Store(tmp_path, MADE_BY, READ).load(0).started == 15
-    with pytest.raises(StoreError, match="seed is 1 there, 2 here"):
-        Store(tmp_path, {"seed": 2, "grid": "abc"}, READ)
+    refused("seed is 1 there, 2 here", Store, tmp_path, {"seed": 2, "grid": "abc"}, READ, error=StoreError)
 
 
 def test_looking_at_a_store_writes_nothing_and_another_versions_is_refused(store, tmp_path):
     store.save(0, COUNTS)
     require_ours(tmp_path / "none", MADE_BY)
     require_ours(tmp_path, MADE_BY)
-    with pytest.raises(StoreError, match="seed is 1 there, 3 here"):
-        require_ours(tmp_path, MADE_BY | {"seed": 3})
+    refused("seed is 1 there, 3 here", require_ours, tmp_path, MADE_BY | {"seed": 3}, error=StoreError)
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match=r"cannot use .*file as a store: it is there already, and no folder"):
         require_ours(tmp_path / "file", MADE_BY)
     assert {path.name for path in tmp_path.iterdir()} == {"run.json", "batch-00000000.npz", "file"}
     manifest = json.loads((tmp_path / "run.json").read_text())
     (tmp_path / "run.json").write_text(json.dumps(manifest | {"jaxlib": "0.0.1"}))
-    with pytest.raises(StoreError, match=r'jaxlib is "0.0.1" there, "'):
-        Store(tmp_path, MADE_BY, READ)
+    refused(r'jaxlib is "0.0.1" there, "', Store, tmp_path, MADE_BY, READ, error=StoreError)
 
 
 def test_a_batch_from_another_store_is_refused(store, tmp_path):
@@ -117,8 +127,7 @@ def test_a_batch_from_another_store_is_refused(store, tmp_path):
     other.save(0, COUNTS)
     (tmp_path / "other" / "batch-00000000.npz").rename(tmp_path / "batch-00000000.npz")
     remedy = "if that is still at work, use another folder; if not, delete that file to redo just that batch"
-    with pytest.raises(StoreError, match=rf"batch-00000000.npz was made by another run; {remedy}"):
-        store.load(0)
+    refused(rf"batch-00000000.npz was made by another run; {remedy}", store.load, 0, error=StoreError)
 
 
 @pytest.mark.parametrize(
@@ -126,22 +135,16 @@ def test_a_batch_from_another_store_is_refused(store, tmp_path):
     [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: data + b"\0", lambda data: b"not a batch"],
     ids=["cut short", "emptied", "lengthened", "overwritten"],
 )
-def test_a_damaged_batch_is_named_and_just_that_one_is_redone(store, tmp_path, spoiled):
-    traced = []
-
-    def trace(batch, photons):
-        traced.append(batch)
-        return Counts(COUNTS.exits, batch, photons - batch - 6, photons)
-
+def test_a_damaged_batch_is_named_and_just_that_one_is_redone(store, tmp_path, trace, spoiled):
     good = run_batches(trace, 15, 40, store=store)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     path = tmp_path / "batch-00000001.npz"
     path.write_bytes(spoiled(path.read_bytes()))
-    traced.clear()
+    trace.batches.clear()
     with pytest.warns(DamagedBatch, match=r"batch-00000001.npz is damaged \(.*\); just that batch is traced again"):
         again = run_batches(trace, 15, 40, store=store)
     assert again.ledger == good.ledger
-    assert traced == [1]
+    assert trace.batches == [1]
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
@@ -216,23 +219,33 @@ def test_a_damaged_manifest_is_named_and_rewritten_once_deleted(store, tmp_path,
     assert Store(tmp_path, MADE_BY, READ).load(0).started == 15
 
 
-def test_a_full_disk_is_named_and_leaves_nothing_half_written(store, tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
+def test_a_full_disk_is_named_and_the_run_goes_on_when_there_is_room(store, tmp_path, monkeypatch, trace):
+    """What the store holds is whole, and nothing half-written is beside it."""
 
+    def full(file):
+        if len(list(tmp_path.glob("batch-*.npz"))) == 2:
+            raise OSError(28, "No space left on device")
+        sync(file)
+
+    sync = os.fsync
     monkeypatch.setattr(os, "fsync", full)
-    said = r"cannot write .*batch-0+.npz: No space left on device; what the store holds is whole, .* resumes"
-    with pytest.raises(StoreError, match=said):
-        store.save(0, COUNTS)
-    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+    said = r"cannot write .*batch-0+2.npz: No space left on device; what the store holds is whole, .* resumes"
+    refused(said, run_batches, trace, 15, 60, workers=1, store=store, error=StoreError)
+    assert trace.batches == [0, 1, 2]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"run.json", "batch-00000000.npz", "batch-00000001.npz"}
+    monkeypatch.setattr(os, "fsync", sync)
+    trace.batches.clear()
+    again = run_batches(trace, 15, 60, workers=1, store=store)
+    assert trace.batches == [2, 3]
+    assert again.ledger == run_batches(trace, 15, 60).ledger
 
 
 def test_what_is_no_folder_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     reasons = {"/dev/full/store": "Not a directory", str(tmp_path / "file"): "File exists"}
     for place, reason in reasons.items():
-        with pytest.raises(StoreError, match=rf"cannot use {place} as a store: {reason}"):
-            simulate_orders(GRID, 100, store=place)
+        refused(rf"cannot use {place} as a store: {reason}", simulate_orders, GRID, 100, store=place, error=StoreError)
 
 
 def test_leftovers_of_killed_runs_are_swept_when_old(tmp_path):

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from profilefit.errors import InputError
 from profilefit.scenes.skin import material
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
+from tests.fixtures import refused
 
 RADIUS = 10.0
 
@@ -33,14 +33,6 @@ def outward(mesh):
     face = np.cross(b - a, c - a)
     agree = np.einsum("ij,ij->i", face, mesh.normal[mesh.triangles[:, 0]])
     return np.mean(agree[np.linalg.norm(face, axis=1) > 1e-6] > 0)
-
-
-def refused(message, call, *given, error=InputError, **named):
-    """Text of the error that a call raises: one line, in which this message is found, a regular expression."""
-    with pytest.raises(error, match=message) as caught:
-        call(*given, **named)
-    assert str(caught.value).isprintable()
-    return str(caught.value)
 
 
 def changed(example: dict[str, Any], place: str = "", value: Any = None) -> dict[str, Any]:

@@ -33,7 +33,6 @@ void main() {
 
 
 def drawn(context, fragment):
-    """The four numbers that a fragment shader makes."""
     target = context.simple_framebuffer((1, 1), components=4, dtype="f4")
     target.use()
     full_screen(context, program(context, "exported", fragment)).render(moderngl.TRIANGLES, vertices=3)
@@ -47,12 +46,10 @@ def expected() -> list[float]:
 
 
 def line_of(text, name):
-    """The line that declares a constant."""
     return next(line for line in text.splitlines() if f"{name} =" in line)
 
 
 def record(name):
-    """What a shipped record holds, and its digest."""
     data = (FITS / f"{name}.json").read_bytes()
     return json.loads(data), hashlib.sha256(data).hexdigest()
 

@@ -32,6 +32,8 @@ XI = np.concatenate([np.geomspace(1e-6, 9e-3, 20), np.linspace(0.0123, 0.99, 80)
 ALPHA_32 = np.concatenate([[0.0, 1e-30, 1e-6], np.linspace(1e-3, 1.0, 40), 1.0 - np.geomspace(6e-8, 1e-3, 9)])[:, None]
 X_32 = np.concatenate([[0.0, 1e-30, 1e-10], np.geomspace(1e-6, 200.0, 150), [1e3, 1e8, 1e15, 1e30]])
 XI_32 = np.concatenate([[0.0, 1e-30], XI, [1.0 - 6e-8, 1.0]])
+# A record of another setting has the text of its law and other constants.
+ELSEWHERE = [one for one in LAWS if "-" in one and one != "gaussians-2"]
 
 
 class CoarseLog(Rounded):
@@ -55,7 +57,6 @@ def twin(law, rounded=False, coarse=0.0):
 
 
 def labels(*kinds):
-    """Those of the laws of some kinds."""
     return [label for label, law in LAWS.items() if isinstance(law, kinds)]
 
 
@@ -79,10 +80,6 @@ def mismatch(names, law):
         made = names[f"law_{what}"](argument, alpha, 1.0)
         found[what] = float(np.max(np.abs(made - right) / np.maximum(right, floor)))
     return found
-
-
-# A record of another setting has the text of its law and other constants.
-ELSEWHERE = [one for one in LAWS if "-" in one and one != "gaussians-2"]
 
 
 @pytest.mark.parametrize("label", [*(one for one in LAWS if one not in ELSEWHERE), *slow(*ELSEWHERE)])

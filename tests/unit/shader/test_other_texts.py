@@ -1,7 +1,4 @@
-"""Texts that are no law's are the library's functions: of phase functions, of light in water, of cones of fur.
-
-In float64, in float32 in numpy and on OpenGL; and as whole files.
-"""
+"""Texts that are no law's are the library's functions: of phase functions, of light in water, of cones of fur."""
 
 import json
 from functools import partial
@@ -80,8 +77,6 @@ def test_phases_in_float32_on_opengl(context, phase):
 LOBES = ((0.7, 0.95), (0.3, 0.6))
 C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
 BLURS = [water.water_gaussians(omega, c * DEPTH, LOBES, 3) for omega, c in zip(OMEGA, C, strict=True)]
-WATER = """found = vec4(sea_blur_share(q.x, 2.0), sea_blur_mtf(q.y, 1.0),
-        sea_segment_integral(0.4, 1.0, 0.5, q.z, 3.0), 0.0);"""
 WAY = np.append(0.0, np.geomspace(1e-4, 1e3, 4095))  # [m]
 
 
@@ -104,13 +99,11 @@ def test_the_blur_in_float64(channel):
     assert {one: made[f"sea_blur_{one}"](float(channel)) for one in numbers} == pytest.approx(numbers, rel=1e-10)
 
 
-def test_water_in_float32_on_opengl(context):
-    text = segment_text("glsl") + blur_text(BLURS, C, "glsl")
-    m = np.linspace(-1.0, 1.0, WAY.size).astype(np.float32).astype(float)
-    share, mtf, segment, _ = on_opengl(context, text, WATER)(WAY, WAY, m, 0.0)
+def test_the_blur_in_float32_on_opengl(context):
+    calls = "found = vec4(sea_blur_share(q.x, 2.0), sea_blur_mtf(q.y, 1.0), 0.0, 0.0);"
+    share, mtf, *_ = on_opengl(context, blur_text(BLURS, C, "glsl"), calls)(WAY, WAY, 0.0, 0.0)
     np.testing.assert_allclose(share, BLURS[2].share(C[2] * WAY), rtol=3e-6)
     np.testing.assert_allclose(mtf, BLURS[1].mtf(WAY / C[1]), rtol=3e-6)
-    np.testing.assert_allclose(segment, water.segment_integral(0.4, 1.0, 0.5, m, 3.0), rtol=3e-6)
 
 
 TEXT = strand_text("python", "law")
@@ -214,17 +207,6 @@ def test_roots_are_the_truths(theta):
         found = np.where((found >= 0) & (found <= 1.0), found, np.inf)
         assert 500 < np.sum(np.isfinite(found)) < 4900
         np.testing.assert_allclose(found[clean], want[clean], rtol=1e-9)
-
-
-def test_a_cast_ray_is_the_nearest_root():
-    patch, theta = truth.random_patch(0.5, 0.3, 4.0, 6.0, seed=4), np.radians(50.0)
-    start = truth.rays(patch, 2000, seed=4)
-    away = start[:, None] - patch.feet
-    shifts = 6.0 * np.stack(np.meshgrid([-1, 0, 1, 2], [-1, 0, 1]), axis=-1).reshape(-1, 2)
-    qx, qy = (away[..., None, :] + shifts).T
-    down = functions(TEXT)["law_swept"](qx, qy, -np.tan(theta), 0.0, 0.0, 0.3 / 4.0)
-    nearest = np.min(np.where((down >= 0) & (down <= 4.0), down, 4.0), axis=(0, 1))
-    np.testing.assert_allclose(4.0 - nearest, truth.cast(patch, theta, start), atol=1e-7)
 
 
 def shares():

@@ -49,6 +49,9 @@ XI = (np.arange(2**16) + 0.5) / 2**16
 # A bin of radii is that of an interval of xi for each half space's and each image's part, two where a surface refracts,
 # and each end of one may lose or gain a number; the maps follow their densities to 9e-6.
 PARTS, FOLLOWED = 8, 2e-5
+SUMS = [
+    MediumGaussians(Setting("diffuse", n=1.4), 0.5 + 0.1 * i, (0.01, 0.3 + i, 9.0), (0.2, 0.5, 0.3)) for i in range(3)
+]
 
 
 def stack(setting, layers, *interfaces):
@@ -199,7 +202,6 @@ def test_every_number_stands_in_the_text_once_by_its_name():
 
 
 def whole(label, lang="glsl", name="stack"):
-    """Both texts of a stack."""
     count = 3 if label.startswith("three") else 2
     return stack_text(LAWS[label], lang, name) + single_text(media(count), lang, f"{name}_once")
 
@@ -222,19 +224,16 @@ def media(count, n=1.4, g=0.0):
     return [Medium(tuple(one)) for one in layers]
 
 
-def directions():
-    """Cosines of beam and eye, some of them grazing, and the cosine of the angle between, as float32 holds them."""
-    random = np.random.default_rng(5)
-    cosines = 1.0 - np.append(random.random((2, 300)), 1.0 - 10.0 ** -random.uniform(1.0, 4.0, (2, 100)), axis=1)
-    turned = np.cos(random.uniform(0.0, 2.0 * np.pi, 400))
-    return [np.float32(one).astype(float) for one in (*cosines, turned)]
-
-
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("g", [0.0, 0.9])
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_light_scattered_once(context, n, g, count):
-    three, (cos_in, cos_out, turned) = media(count, n, g), directions()
+    """In directions of which some graze, as float32 holds them."""
+    random = np.random.default_rng(5)
+    cosines = 1.0 - np.append(random.random((2, 300)), 1.0 - 10.0 ** -random.uniform(1.0, 4.0, (2, 100)), axis=1)
+    turned = np.cos(random.uniform(0.0, 2.0 * np.pi, 400))
+    cos_in, cos_out, turned = (np.float32(one).astype(float) for one in (*cosines, turned))
+    three = media(count, n, g)
     names = functions(single_text(three, "python", "s"))
     found = on_opengl(context, single_text(three, name="s"), ONCE)
     for thickness in np.float32(THICKNESS).astype(float):
@@ -287,11 +286,6 @@ def refused_media():
     }
 
 
-SUMS = [
-    MediumGaussians(Setting("diffuse", n=1.4), 0.5 + 0.1 * i, (0.01, 0.3 + i, 9.0), (0.2, 0.5, 0.3)) for i in range(3)
-]
-
-
 def test_sums_of_gaussians_are_the_laws():
     names = functions(gaussians_text(SUMS, "python", "sums"))
     x, xi = np.geomspace(1e-3, 20.0, 50), np.linspace(0.0, 0.999, 50)
@@ -306,12 +300,9 @@ def test_sums_of_gaussians_are_the_laws():
     assert np.max(np.abs(names["sums_cumulated"](x, other) - SUMS[2].cdf(x, 0.5))) > 0.1
 
 
-def refused_sums():
-    unlike = replace(SUMS[0], variance=(1.0,), weight=(1.0,))
-    return {"got 3, 3, 1$": [*SUMS[:2], unlike], "got 3, 3$": SUMS[:2], "got none$": []}
-
-
-REFUSED = {stack_text: refused_laws(), single_text: refused_media(), gaussians_text: refused_sums()}
+UNLIKE = replace(SUMS[0], variance=(1.0,), weight=(1.0,))
+REFUSED_SUMS = {"got 3, 3, 1$": [*SUMS[:2], UNLIKE], "got 3, 3$": SUMS[:2], "got none$": []}
+REFUSED = {stack_text: refused_laws(), single_text: refused_media(), gaussians_text: REFUSED_SUMS}
 
 
 @pytest.mark.parametrize(

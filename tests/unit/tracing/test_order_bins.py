@@ -76,7 +76,6 @@ def test_light_that_turns_slowly_has_more_orders():
 
 
 def test_weights_are_powers_where_orders_are_exact_and_have_derivatives():
-    """And are what they must be at the ends of alpha."""
     expected = bins.roulette_weights[:256] * ALPHAS[:, None] ** np.arange(1, 257)
     np.testing.assert_allclose(bins.weights(ALPHAS)[:, :256], expected, rtol=1e-13, atol=1e-300)
     assert np.all(bins.weights(np.array(0.0)) == 0)

@@ -27,11 +27,6 @@ def words(draw, seed=0, batch=0, photons=PHOTONS, events=EVENTS):
     return np.stack(draw(jnp.asarray(rng.batch_key(seed, batch)), photon, event), axis=-1)
 
 
-def deviation(bits):
-    """z of the number of ones along the first axis, for fair bits."""
-    return (bits.mean(axis=0) - 0.5) * 2 * np.sqrt(len(bits))
-
-
 def correlation(a, b):
     """z of the correlation of two sets of uniform words."""
     a, b = (w.ravel() / 2.0**32 - 0.5 for w in (a, b))
@@ -48,7 +43,7 @@ def avalanche(draw, keys, sidak):
     for a, b in flips:
         changed = np.stack(draw(keys, photon ^ np.uint32(a), event ^ np.uint32(b))) ^ base
         bits = np.unpackbits(np.ascontiguousarray(changed.T).view(np.uint8), axis=1)
-        worst = max(worst, float(np.abs(deviation(bits)).max()))
+        worst = max(worst, float(np.abs(bits.mean(axis=0) - 0.5).max() * 2 * np.sqrt(len(bits))))  # z for fair bits
     return worst / sidak(len(flips) * 32 * len(base))
 
 

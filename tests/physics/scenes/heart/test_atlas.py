@@ -1,7 +1,4 @@
-"""Light in texture space, and the sum over a whole surface, against what is known: a sphere, a plane, one point alone.
-
-And where an atlas fails if it is made carelessly.
-"""
+"""Light in texture space, and the sum over a whole surface, against what is known: a sphere, a plane, one point."""
 
 from contextlib import contextmanager
 from dataclasses import replace
@@ -122,7 +119,6 @@ STAGE = (32, 32), 64
 
 @contextmanager
 def laid_out(stage: Stage, mesh: Mesh, size: tuple[int, int], margin: int):
-    """A mesh in the scene that is drawn, and over an atlas."""
     part = Part(mesh, WHITE)
     stage.draw(Scene((part,)))
     with Atlas(stage.context, size, margin) as atlas:
@@ -298,7 +294,6 @@ COLLAPSED = np.where(SHEET.uv == SHEET.uv.max(), SHEET.uv[-2, 0], SHEET.uv)
     ],
 )
 def test_a_mesh_that_cannot_be_laid_out(stage, uv, message):
-    """Refused in one line, before links are made."""
     part = Part(replace(SHEET, uv=uv), WHITE)
     stage.draw(Scene((part,)))
     with Atlas(stage.context, (100, 100), 10) as atlas:

@@ -1,7 +1,4 @@
-"""Both parts of a kernel and their balance: light is counted once, and each end is one method alone.
-
-Random scenes: what is kept of them is what the passes draw, and a balance is found again.
-"""
+"""Both parts of a kernel and their balance: light is counted once; random scenes, and a balance found again."""
 
 import numpy as np
 import pytest
@@ -27,6 +24,8 @@ KERNEL = Kernel(np.array([0.1, 0.8, 5.0]), WEIGHTS)
 COLOUR = np.array([0.8, 0.6, 0.3], np.float32)
 SAMPLES, UNITS = Sampling(64), (1.0, 1.0, 1.0)
 STAGE = (64, 64), 512
+NARROWER = Kernel(np.array([0.04, 0.5, 4.0]), WEIGHTS)
+WHITE = np.ones((1, 1, 3), np.float32)
 
 
 def drawn(stage, mesh, camera, light=(1.0, 1.0, 1.0), ambient=(0.0, 0.0, 0.0)):
@@ -98,10 +97,6 @@ def test_a_kernel_of_sums_that_share_their_variances():
     np.testing.assert_allclose(kernel.variances, [0.4, 3.0])
     np.testing.assert_allclose(kernel.weights, [[0.2, 0.7], [0.8, 0.3]])
     np.testing.assert_allclose(kernel.energy, 1.0)
-
-
-NARROWER = Kernel(np.array([0.04, 0.5, 4.0]), WEIGHTS)
-WHITE = np.ones((1, 1, 3), np.float32)
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@ REFUSED = [
     ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
     ("layers.2.g", 0.9, r"\[layers 2\] g must be 0, and mu_s reduced"),
 ]
+KEPT = 300  # pixels
 
 
 @pytest.mark.parametrize(("place", "value", "message"), REFUSED)
@@ -69,7 +70,6 @@ def test_the_split_is_nearest_to_the_truth(context, coarse):
 
 
 def test_a_picture_beside_its_truth(context, coarse):
-    """By the texture alone, of a ball, with one Gaussian."""
     told = content("surface", {"kind": "ball", "size": 15.0}) | {"camera": {"resolution": [32, 24]}}
     told |= {"technique": {"kind": "texture", "gaussians": 1, "samples": 4}}
     found = scene.draw(context, scene.read("ball.toml", told))
@@ -79,15 +79,11 @@ def test_a_picture_beside_its_truth(context, coarse):
 
 
 def test_a_view_of_nothing_that_is_judged_is_one_line(context):
-    """A sheet's corner, next to its edges."""
     told = {**content("surface", {"kind": "bumps", "size": 20.0}), **SMALL}
     told["camera"] = {"resolution": [8, 6], "target": [28.0, 28.0, 0.0], "height": 2.0}
     of = scene.read("sheet.toml", told)
     drawn = scene.reference_render(context, of, scene.light_of(of, of.technique.gaussians))
     refused("the view must show some of the sheet that", drawn.__enter__)
-
-
-KEPT = 300  # pixels
 
 
 @pytest.fixture
@@ -115,7 +111,6 @@ def test_ways_and_frames(context, request_small):
 
 @pytest.mark.slow
 def test_a_finer_atlas_is_nearer(context, request_small, monkeypatch):
-    """The screen by itself has none."""
     monkeypatch.setattr(heart, "JUDGED", KEPT)
     found = heart.over_texel_and_view(context, request_small, (0.4, 1.6), (0.0,))
     assert found["texture"][0, 0] < 0.7 * found["texture"][1, 0]

@@ -19,6 +19,9 @@ TISSUE = Medium((Layer(1.4, 0.3, 4.0, 0.7, 0.2), Layer(1.4, 0.1, 2.0, 0.4)))
 PLATE = Medium((Layer(1.5, 0.2, 1.0, 0.3, 0.6), Layer(1.33, 0.1, 3.0, -0.3, 0.4)), n_above=1.0, n_below=1.6)
 PANE = Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0), Layer(1.4, 0.1, 2.0, 0.5)))
 COSINES = np.array([[1.0, 0.5], [0.7, 0.9], [0.3, 0.2], [0.05, 1.0]])
+EPIDERMIS, DERMIS = Layer(1.4, 0.21, 4.8, 0.0, 0.25), Layer(1.4, 0.0085, 0.45, 0.0)
+SKIN = Medium((EPIDERMIS, DERMIS))
+STACK = Medium((Layer(1.3, 0.3, 4.0, 0.0, 0.2), Layer(1.3, 0.1, 2.0, 0.0)))
 
 
 def nodes(count: int, low: float, high: float):
@@ -98,7 +101,6 @@ def photons(medium: Medium, cos_in: float, count: int, seed: int):
 
 
 def _cross(random, index, place, course, i):
-    """Snell's law, or back by Fresnel's chance."""
     here, side = place[i] + 1, np.where(course[i, 2] > 0, 1, -1)
     n1, n2 = index[here], index[here + side]
     mu1, sine2 = np.abs(course[i, 2]), n1 / n2 * np.hypot(course[i, 0], course[i, 1])
@@ -111,7 +113,6 @@ def _cross(random, index, place, course, i):
 
 
 def _turned(random, course, g):
-    """By an angle of Henyey and Greenstein's."""
     cosine, around = HenyeyGreenstein(g).sample(random.random(g.size)), 2 * np.pi * random.random(g.size)
     aside = np.cross(course, [0.3, 0.5, 0.8])
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
@@ -176,10 +177,6 @@ def test_the_paper_s_sum_put_right_goes_to_the_closed_one():
     assert printed[1] == pytest.approx(2 * printed[0], rel=0.1)  # no step: brightness grows with the samples
 
 
-EPIDERMIS, DERMIS = Layer(1.4, 0.21, 4.8, 0.0, 0.25), Layer(1.4, 0.0085, 0.45, 0.0)
-SKIN = Medium((EPIDERMIS, DERMIS))
-
-
 @pytest.mark.parametrize("thickness", [0.7, 1.1, 2.5, 6.0, 14.0, 30.0])
 def test_plates_between_and_beyond_those_fitted(thickness):
     """Within half a percent; a plate without its skins lets through another light."""
@@ -201,9 +198,6 @@ def test_ends_of_plates():
     assert plate.transmitted(0.1) == plate.transmitted(2 * EPIDERMIS.thickness) <= 1
     dark = Layer(1.4, 2.5, 0.48, 0.0)
     assert plate.error < 2e-3 < 0.1 < plate_of(Medium((EPIDERMIS, dark))).error
-
-
-STACK = Medium((Layer(1.3, 0.3, 4.0, 0.0, 0.2), Layer(1.3, 0.1, 2.0, 0.0)))
 
 
 def mean_cosine(corrections: Corrections, g: float = 0.9) -> tuple[float, float]:

@@ -131,7 +131,6 @@ def test_no_energy_comes_or_goes(n):
 
 
 def uneven_ball():
-    """Thin at one side, thick at the other."""
     values = np.linspace(0.0, 1.0, 64, dtype=np.float32)[None, :, None]
     return replace(ball(), reflectance=np.broadcast_to(values, (8, 64, 3)).copy())
 

@@ -20,6 +20,10 @@ TILE, DEPTH, N = 10.0, 5.0, 1.34
 STEP = 2.0 * np.pi / TILE
 SIDE = 256  # pixels: the size that errors and fragments are stated for
 BEFORE, BEYOND = 0.32, 1.18  # F, of which the first fold is at 1
+CHEAPEST = (BEFORE, 256, 7e4, 0.008), (BEYOND, 192, 3e5, 0.025)  # F, vertices, most fragments and rms
+PERIOD = 2.0
+EDGES = np.linspace(0.0, PERIOD, 65)
+SUNS = [(1.5, 0.0), (5.0, 0.4)]  # depth, tilt
 
 
 @cache
@@ -33,9 +37,6 @@ def sea(f, seed=1):
 def truth(f, seed=1, tilt=0.0, pixels=SIDE):
     """By 2048^2 photons, within 0.0007 rms of 4096^2."""
     return caustic_photons(sea(f, seed), DEPTH, tilt, N, pixels, 2048)
-
-
-CHEAPEST = (BEFORE, 256, 7e4, 0.008), (BEYOND, 192, 3e5, 0.025)  # F, vertices, most fragments and rms
 
 
 def assert_right(found, fragments, most, rms):
@@ -80,7 +81,6 @@ def test_photons_in_boxes_against_photons_at_points():
 
 
 def test_photons_keep_the_light():
-    """What enters comes to the floor."""
     waves = sea(BEYOND)
     x = (np.arange(512) + 0.5) * TILE / 512
     entered = refracted(0.0, waves.lattice(x, x)[1:], N)[2].mean()
@@ -227,11 +227,6 @@ def test_refusals(context):
     facing = r"^tilt must be one at which no wave faces away .*, got 1.5 radians$"
     refused(facing, caustic_photons, waves, DEPTH, 1.5, N, 16, 64)
     refused(r"^light must be finite numbers \(rows, columns\), got shape \(3,\)$", adaptive_filter, np.ones(3))
-
-
-PERIOD = 2.0
-EDGES = np.linspace(0.0, PERIOD, 65)
-SUNS = [(1.5, 0.0), (5.0, 0.4)]  # depth, tilt
 
 
 def ridge_height(x):

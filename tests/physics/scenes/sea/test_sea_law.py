@@ -13,17 +13,9 @@ from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
 from profilefit.scenes import sea
 from profilefit.scenes.sea import law
 from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices, flux_below
-from profilefit.scenes.sea.law import (
-    beam_share,
-    failing_depth,
-    onward,
-    segment_between,
-    segment_integral,
-    water_gaussians,
-    water_mtf,
-)
+from profilefit.scenes.sea.law import beam_share, segment_between, segment_integral, water_gaussians, water_mtf
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.shader.emit import read_text, translated
+from profilefit.shader.emit import read_text
 from tests.fixtures import slow
 from tests.unit.scenes.scenes import refusals, refused
 
@@ -75,7 +67,7 @@ def test_the_constants_are_those_of_a_fit(monkeypatch):
     runs = {lobes: trace_beam(of_lobes(lobes), DEPTHS, radii, 3_000_000, 21) for lobes in (ONE, TWO, THREE)}
     rows = []
     for lobes, found in runs.items():
-        share, deviation = np.array([weight * np.array(onward(g)) for weight, g in lobes]).sum(axis=0)
+        share, deviation = np.array([weight * np.array(law.onward(g)) for weight, g in lobes]).sum(axis=0)
         for omega in OMEGAS:
             missing = omega * DEPTHS * share - DEPTHS - np.log(found.plane.at(omega).value)
             rows += [(omega, deviation, ct, one) for ct, one in zip(DEPTHS, missing, strict=True)]
@@ -169,7 +161,7 @@ def test_what_goes_onward(g):
     density = 2 * np.pi * HenyeyGreenstein(g).pdf(1 - below) * w * 12.0 * below
     density = np.append(density, 2 * np.pi * HenyeyGreenstein(g).pdf(1.0) * below[0])
     below = np.append(below, 0.5 * below[0])
-    np.testing.assert_allclose(onward(g), (density.sum(), density @ below), rtol=2e-6)
+    np.testing.assert_allclose(law.onward(g), (density.sum(), density @ below), rtol=2e-6)
 
 
 def test_gaussians_follow_the_blur():
@@ -195,12 +187,12 @@ def test_gaussians_follow_the_blur():
 def test_where_unscattered_light_fails():
     """By a tenth at b t = 0.1, wherever a shaft is not far narrower than the light has spread."""
     omega, radius = np.array([0.25, 0.55, 0.8])[:, None], np.array([0.1, 0.3, 1.0])
-    found = failing_depth(omega, radius, THREE)
+    found = law.failing_depth(omega, radius, THREE)
     assert np.all(np.abs(found - 0.1) < 0.03)
     again = beam_share(omega, found / omega, radius, THREE) * np.exp(found / omega)
     np.testing.assert_allclose(again, 1.1, rtol=1e-9)
-    assert failing_depth(0.8, 0.003, THREE) > 0.3
-    assert failing_depth(0.0, 1.0, THREE) == failing_depth(0.8, 0.0, THREE) == np.inf
+    assert law.failing_depth(0.8, 0.003, THREE) > 0.3
+    assert law.failing_depth(0.0, 1.0, THREE) == law.failing_depth(0.8, 0.0, THREE) == np.inf
 
 
 test_what_no_water_has = refusals(
@@ -221,7 +213,7 @@ test_what_no_water_has = refusals(
 def test_what_no_blur_has():
     refused("single numbers", water_gaussians, 0.5, [1.0, 2.0], ONE, 3)
     refused("count must be", water_gaussians, 0.5, 1.0, ONE, 9)
-    refused("by must be", failing_depth, 0.5, 1.0, ONE, by=0.0)
+    refused("by must be", law.failing_depth, 0.5, 1.0, ONE, by=0.0)
     refused("k_over_c must be", water_mtf, 0.5, 1.0, -1.0, ONE)
     refused("begin must be", segment_between, -1.0, 1.0, 1.0)
 
@@ -254,7 +246,6 @@ def arguments():
 
 
 def exactly(c, s0, t0, m, t1):
-    """In long doubles, of the very numbers."""
     c, s0, t0, m, t1 = (np.asarray(one, np.longdouble) for one in (c, s0, t0, m, t1))
     x = c * (1 + m) * t1
     return np.exp(-c * (s0 + t0)) * t1 * np.where(x > 0, -np.expm1(-x) / np.where(x > 0, x, 1), 1)
@@ -274,14 +265,6 @@ def test_in_float32(arguments):
         plain = np.exp(-c * (s0 + t0)) * (1 - np.exp(-c * (1 + m) * t1)) / (c * (1 + m))
     assert np.isnan(plain[0])
     assert worst(plain[1:], exactly(*arguments)[1:]) > 0.1
-
-
-def test_the_text_in_numpy_float32(arguments):
-    made = {}
-    exec(compile(translated(TEXT, "python"), "segment.py", "exec"), made)
-    found = made["segment_integral"](*arguments)
-    assert found.dtype == np.float32
-    assert worst(found, exactly(*arguments)) < 7e-7
 
 
 def test_the_text_on_the_gpu(context, arguments):

@@ -143,7 +143,6 @@ def test_a_level_floor_from_near_it(context, few_depths, above):
 
 
 def test_the_truth_where_nothing_is_scattered():
-    """The same by paths, in twelve directions."""
     world, eye = absorbing(0.5), np.array([1.0, 2.0, -1.5])
     up = np.array([-0.95, -0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.72, 0.8, 0.9, 0.98])
     azimuth = np.linspace(0.0, 6.0, up.size)
@@ -223,7 +222,6 @@ def test_the_light_of_sky_and_floor_is_all_turned(kind, lobes):
 
 
 def test_light_that_the_water_takes_away_glows_less():
-    """Of the sky deeper down, and of the floor farther up."""
     world = World((0.2,) * 3, (0.1,) * 3, ((1.0, 0.8),), N, CALM, LEVEL, NONE, 0.0, NONE, NONE)
     depths, light, nothing = np.linspace(0.0, DEPTH, 3), np.ones(3), np.zeros(3)
     for kind in KINDS:

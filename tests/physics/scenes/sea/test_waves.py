@@ -8,17 +8,7 @@ import pytest
 
 from mcml_sim.media.fresnel import fresnel
 from profilefit.scenes.sea import waves
-from profilefit.scenes.sea.waves import (
-    Waves,
-    dense_hit,
-    first_hit,
-    newton_hit,
-    random_floor,
-    random_sea,
-    refracted,
-    to_plane,
-    wrong_shares,
-)
+from profilefit.scenes.sea.waves import Waves, dense_hit, first_hit, newton_hit, random_floor, random_sea, refracted
 from profilefit.scenes.stage.renderer import float_texture
 from profilefit.scenes.stage.world import unit
 from profilefit.shader.context import program
@@ -28,6 +18,8 @@ from tests.unit.scenes.scenes import refusals, refused
 TILE = 10.0
 STEP = 2.0 * np.pi / TILE
 SEA = random_sea(0.15, TILE, seed=3)
+DEPTH = 5.0
+DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def test_heights_and_slopes_of_a_sea():
@@ -107,11 +99,7 @@ def test_what_no_waves_are():
     refused(r"^wind must be two speeds \[m/s\], not both 0", random_sea, 0.1, TILE, wind=(0.0, 0.0))
     refused(f"^depth {length} -1.0", random_floor, 0.1, TILE, -1.0)
     wanted = "ways must be numbers of steps or of newton, newton_1m, shah, got 'bisect'"
-    refused(wanted, wrong_shares, ["bisect"], [1.0])
-
-
-DEPTH = 5.0
-DOWN = np.array([0.0, 0.0, -1.0])
+    refused(wanted, waves.wrong_shares, ["bisect"], [1.0])
 
 
 def lit_floor(steep, count=2000, seed=0):
@@ -193,7 +181,7 @@ def test_the_first_of_three_crossings():
 def test_where_iterations_fail():
     """S = 0.66, 2.5, 5: shares off by more than 1 % of the depth. Iterations alone fail where S > 1, steps do not."""
     ways = ["newton_1m", "newton", "shah", 1, 8, 16]
-    shares = wrong_shares(ways, [0.66, 2.5, 5.0], rays=1500)
+    shares = waves.wrong_shares(ways, [0.66, 2.5, 5.0], rays=1500)
     published, newton, shah, one, eight, sixteen = shares
     assert np.all(shares[1:, 0] == 0.0)
     assert published[1] > 0.3 and shah[1] > 0.2 and newton[1] > 0.05  # noqa: PT018
@@ -207,7 +195,7 @@ def test_newton_is_exact_while_the_ray_hits_once():
     for steep, three in ((0.33, 1e-12), (0.66, 1e-8), (0.999, 1e-5)):
         floor, origin, ray = lit_floor(steep)
         rays = origin, ray, floor.lowest, floor.highest
-        true, start = dense_hit(floor.height, *rays), to_plane(origin, ray, floor.mean)
+        true, start = dense_hit(floor.height, *rays), waves.to_plane(origin, ray, floor.mean)
         off, fourth = (
             np.abs(newton_hit(floor.height, floor.slope, origin, ray, start, count) - true) / DEPTH for count in (3, 4)
         )
