@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.by_albedo import BLOCK
@@ -20,15 +21,38 @@ DIGITS = {
     "diffuse": "021698 046265 074451 107335 146544 194716 256557 341867 478024 596669 794564 929713 977187",
 }
 PRINTED = {light: [float(f"0.{digits}") for digits in row.split()] for light, row in DIGITS.items()}
-# Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and
-# Weir's (Mon. Not. R. Astron. Soc. 119, 1959).
-H_NORMAL_CONSERVATIVE = 2.907810529
+
+
+def h_by_quadrature(mu, alpha):
+    """H(mu) of the infinite medium's half by adaptive quadrature of ln H, x = tan(t)."""
+
+    def integrand(t):
+        x = np.tan(t)
+        return np.log1p(-alpha * np.arctan(x) / x) / (np.cos(t) ** 2 + (mu * np.sin(t)) ** 2)
+
+    return np.exp(-mu / np.pi * quad(integrand, 0, np.pi / 2, epsabs=1e-12, epsrel=1e-12, limit=200)[0])
+
+
+# Printed values
 
 
 @BOTH
 def test_reflectance_is_the_printed_one(setting):
     printed = PRINTED[setting.illumination]
     np.testing.assert_allclose(exact.reflectance(ALPHAS, setting), printed, rtol=0, atol=0.5001e-6)  # rounded digits
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.5, 0.9, 0.99])
+def test_reflectance_is_chandrasekhars(alpha):
+    """1 - H(1) sqrt(1 - alpha), and 1 - 2 sqrt(1 - alpha) int H(mu) mu dmu, by adaptive quadrature."""
+    s = np.sqrt(1 - alpha)
+    # quad's own 1e-10, over the smallest A = .008 that the difference from 1 cancels to
+    assert exact.reflectance(alpha) == pytest.approx(1 - h_by_quadrature(1.0, alpha) * s, rel=1e-7, abs=1e-9)
+    moment = quad(lambda mu: h_by_quadrature(mu, alpha) * mu, 0, 1, epsabs=1e-9, epsrel=1e-9)[0]
+    assert exact.reflectance(alpha, DIFFUSE) == pytest.approx(1 - 2 * s * moment, rel=1e-6, abs=1e-8)
+
+
+# Slow twins
 
 
 @BOTH
@@ -70,6 +94,9 @@ def test_little_scattering_is_single_scattering():
     np.testing.assert_allclose(exact.profile(r, alpha) / alpha, once, rtol=1e-5)
     shares = ring_shares([0.0, 0.2, 1.0, 4.0], SEARCHLIGHT)
     np.testing.assert_allclose(exact.cdf([0.2, 1.0, 4.0], 0.0), np.cumsum(shares)[:-1] / shares.sum(), rtol=1e-7)
+
+
+# Conservation and identities
 
 
 @BOTH
@@ -122,6 +149,14 @@ def test_how_many_radii_are_asked_for_changes_no_bit(count):
     np.testing.assert_array_equal(exact.reflectance(r[:count] / 10), exact.reflectance(r / 10)[:count])
 
 
+# Ends
+
+
+# Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and
+# Weir's (Mon. Not. R. Astron. Soc. 119, 1959).
+H_NORMAL_CONSERVATIVE = 2.907810529
+
+
 @BOTH
 def test_ends_of_every_argument_between_which_the_cdf_rises(setting):
     assert exact.reflectance(0.0, setting) == 0.0
@@ -139,6 +174,16 @@ def test_ends_of_every_argument_between_which_the_cdf_rises(setting):
         assert shares[0] < 1e-7
         # At alpha = 1 light creeps out as S = H(1) / (sqrt(3) r), or its diffuse like; else nothing is left.
         assert 1 - shares[-1] < (2e-4 if alpha == 1 else 1e-12)
+
+
+@BOTH
+@pytest.mark.parametrize("alpha", [0.2, 0.9, 1.0])
+def test_at_the_source_half_of_alpha_is_left(alpha, setting):
+    r = np.array([1e-9, 1e-6, 1e-5])
+    found = 2 * np.pi * r * exact.profile(r, alpha, setting=setting)
+    np.testing.assert_allclose(found, alpha / 2, rtol=1e-3)  # the next term is of order r ln r
+    inside = exact.cdf(r, alpha, setting=setting) * exact.reflectance(alpha, setting)
+    np.testing.assert_allclose(inside, r * found, rtol=1e-3)
 
 
 @BOTH

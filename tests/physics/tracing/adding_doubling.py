@@ -135,6 +135,7 @@ def _scatter(g, bundles, sign):
 
 
 def _add(top, bottom):
+    """One layer upon another."""
     (r_top, r_under, t_down, t_up), (s_top, s_under, s_down, s_up) = top, bottom
     unit = np.eye(len(r_top))
     down = np.linalg.solve(unit - r_under @ s_top, t_down)

@@ -7,11 +7,24 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mcml_sim import Grid, InputError, Layer, Medium, Setting, StoreError, exact, half_space, simulate, simulate_orders
-from mcml_sim.results.mco import write_mco
-from mcml_sim.results.tally import read_results, write_results
+from mcml_sim import (
+    Grid,
+    InputError,
+    Layer,
+    Medium,
+    Setting,
+    StoreError,
+    exact,
+    half_space,
+    read_results,
+    simulate,
+    simulate_orders,
+    write_mco,
+    write_results,
+)
+from mcml_sim.exact.single_scattering import entered
 from profilefit.measured import fit
-from tests.fixtures import refused, slow
+from tests.fixtures import slow
 from tests.physics.tracing import adding_doubling
 
 EDGES = np.append(0.0, np.geomspace(0.02, 8.0, 24))
@@ -39,6 +52,14 @@ def likelihood(tally, known):
     wanted = np.diff(within)
     wanted[0] += within[0]
     return chi2.sf(np.sum(((rings.value - wanted) / rings.standard_error) ** 2), wanted.size)
+
+
+@pytest.mark.slow
+def test_giovanelli_at_n_1_5():
+    tally = shone(half_space(0.9, n=1.5))
+    assert agrees(tally.diffuse_reflectance, 0.2161120812)
+    assert tally.specular_reflectance.value == pytest.approx(1 - entered(Setting("diffuse", n=1.5)), rel=1e-12)
+    assert not agrees(simulate(half_space(0.9, n=1.5), GRID, 2**18, progress=False).diffuse_reflectance, 0.2161120812)
 
 
 @pytest.mark.slow
@@ -103,7 +124,8 @@ def test_files_and_stores_keep_the_light(tmp_path):
     write_results(beam, tmp_path / "beam.npz")
     assert read_results(tmp_path / "beam.npz").illumination == "searchlight"
     assert "illumination" not in json.loads(str(np.load(tmp_path / "beam.npz")["header"]))
-    refused(r"an \.mco is of a searchlight, got a tally of diffuse light", write_mco, tally, tmp_path / "diffuse.mco")
+    with pytest.raises(InputError, match=r"an \.mco is of a searchlight, got a tally of diffuse light"):
+        write_mco(tally, tmp_path / "diffuse.mco")
     assert not (tmp_path / "diffuse.mco").exists()
 
     kept, again = (
@@ -121,7 +143,8 @@ def test_other_light_is_refused_by_name(tmp_path):
     arrays = dict(np.load(tmp_path / "a.npz"))
     arrays["header"] = np.array(str(arrays["header"]).replace('"diffuse"', '"sun"'))
     np.savez(tmp_path / "b.npz", **arrays)
-    refused(r"b\.npz: .*illumination must be one of searchlight, diffuse, got 'sun'", read_results, tmp_path / "b.npz")
+    with pytest.raises(InputError, match=r"b\.npz: .*illumination must be one of searchlight, diffuse, got 'sun'"):
+        read_results(tmp_path / "b.npz")
 
 
 @pytest.mark.slow

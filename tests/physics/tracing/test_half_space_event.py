@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Setting, simulate_orders
+from mcml_sim import Grid, Setting, half_space, simulate, simulate_orders
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import half_space_event, orders_batch, rng
@@ -21,6 +21,7 @@ PHOTONS, LAST_ORDER = 150_000, 32
 
 
 def entering(setting, photons, source):
+    """Directions of light that got in."""
     if setting.illumination == "searchlight":
         return np.tile([0.0, 0.0, 1.0], (photons, 1))
     outside = np.sqrt(source.uniform(size=4 * photons))
@@ -64,6 +65,7 @@ def table(rho, order, last_order=LAST_ORDER):
 
 
 def traced(setting, photons):
+    """Exit radius and order of the kernel, whatever the setting."""
     ends = orders_batch.trace(
         jnp.asarray(rng.batch_key(7, 0)), jnp.int32(photons), jnp.asarray(STOPS), half_space_event.half_space(setting)
     )
@@ -88,6 +90,30 @@ def test_kernel_agrees_with_its_slow_twin_in_every_ring_and_order_and_with_no_ot
     z = deviations(table(*traced(setting, PHOTONS)), table(*slow_twin(other, PHOTONS, LAST_ORDER, seed=3)))
     assert z.size > 25
     assert (np.abs(z).max() < sidak(z.size)) == (setting == other)
+
+
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_it_agrees_with_the_isotropic_kernel_where_that_applies(illumination, sidak):
+    key = jnp.asarray(rng.batch_key(8, 0))
+    ends = orders_batch.trace(key, jnp.int32(PHOTONS), jnp.asarray(STOPS), illumination=illumination)
+    isotropic = table(np.asarray(ends.rho)[:PHOTONS], np.asarray(ends.order)[:PHOTONS])
+    z = deviations(table(*traced(Setting(illumination), PHOTONS)), isotropic)
+    assert np.abs(z).max() < sidak(z.size)
+
+
+@pytest.mark.parametrize("setting", [Setting(n=1.4, g=0.5), Setting(n=1.3)], ids=str)
+def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
+    grid = Grid.from_edges(r=EDGES)
+    orders = simulate_orders(grid, 2**19, seed=1, setting=setting)
+    for alpha in (0.4, 0.8, 0.95):
+        tally = simulate(half_space(alpha, n=setting.n, g=setting.g), grid, 2**17, seed=9)
+        pairs = ((orders.profile(alpha), tally.reflectance_r), (orders.reflectance(alpha), tally.diffuse_reflectance))
+        for general, own in pairs:
+            error = np.hypot(general.standard_error, own.standard_error)
+            sampled = np.atleast_1d(own.is_sampled() & general.is_sampled())
+            z = np.atleast_1d((general.value - own.value) / error)[sampled]
+            assert z.size
+            assert np.abs(z).max() < sidak(8)
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
