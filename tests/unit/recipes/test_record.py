@@ -15,6 +15,7 @@ from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record, schema
 from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
 from profilefit.recipes.folder import fits_folder
+from tests.fixtures import refused
 from tests.unit.recipes.stack.test_record import GONE, spoil
 
 NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
@@ -137,12 +138,10 @@ def test_what_a_record_lacks_is_named(spoilt, key, value):
     path, got = spoilt("liang-whole", "/".join(place), value), "nothing" if value is GONE else "true"
     words = rf"mine\.json: is damaged: .*{place[-1]} must be .*, got {got}; regenerate it"
     if key in ALWAYS or (value is True and f"{key}?" in ALWAYS):
-        with pytest.raises(RecordError, match=words):
-            record.read(path)
+        refused(words, record.read, path, error=RecordError)
     else:
         assert record.read(path)["law"] == "liang", "enough to make a law from"
-    with pytest.raises(RecordError, match=words):
-        record.read(path, whole=True)
+    refused(words, record.read, path, whole=True, error=RecordError)
 
 
 DAMAGED = [
@@ -235,11 +234,9 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
 
 def test_damaged_arrays_are_named(tmp_path):
     path = record.write(tmp_path, "mine", CONTENT, {})
-    with pytest.raises(RecordError, match=r"mine\.npz: .*are missing; regenerate it"):
-        record.read_arrays(path)
+    refused(r"mine\.npz: .*are missing; regenerate it", record.read_arrays, path, error=RecordError)
     path.with_suffix(".npz").write_bytes(b"no arrays")
-    with pytest.raises(RecordError, match=r"mine\.npz: .*is damaged \(.*\); regenerate it"):
-        record.read_arrays(path)
+    refused(r"mine\.npz: .*is damaged \(.*\); regenerate it", record.read_arrays, path, error=RecordError)
 
 
 def test_no_flipped_byte_gets_past_as_another_error(tmp_path):
@@ -305,7 +302,6 @@ def test_a_measurement_tells_of_its_records_and_is_stale_once_one_changes_comes_
     assert digest(tmp_path / "a") != digest(tmp_path / "b")
     # Measurements do not lie among records.
     for out in (records, tmp_path / "records" / ".." / "records", Path("fits")):
-        with pytest.raises(InputError, match="out must be another folder than that of the records, got"):
-            require_apart(out, records)
+        refused("out must be another folder than that of the records, got", require_apart, out, records)
     require_apart(tmp_path / "new", records)
     assert (tmp_path / "new").is_dir()
