@@ -346,8 +346,7 @@ def test_a_mistake_is_one_line_that_names_its_place(content, said):
     with pytest.raises(InputError, match=f"^{re.escape(f'house.toml: {said}')}$") as caught:
         House.of("house.toml", content)
     assert type(caught.value) is (SettingError if "dark" in said else InputError)
-    with pytest.raises(RecipeError):
-        House.of("house.toml", content, RecipeError)
+    refused("^house", House.of, "house.toml", content, RecipeError, error=RecipeError)
 
 
 def test_what_is_right_is_read():

@@ -53,8 +53,7 @@ def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch)
     path = record.write(tmp_path / "old", "mine", CONTENT, ARRAYS)
     before = {one.name: one.read_bytes() for one in path.parent.iterdir()}
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(OutputError, match=r"cannot write into .*file: "):
-        record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
+    refused(r"cannot write into .*file: ", record.write, tmp_path / "file", "mine", CONTENT, ARRAYS, error=OutputError)
     monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
         record.write(path.parent, "mine", {"law": "other"}, {})

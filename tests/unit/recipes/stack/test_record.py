@@ -341,8 +341,7 @@ def test_a_record_says_what_it_is_worth_and_is_found_by_path_and_by_name(written
         assert find(name, folder) is None
     assert find("heart", tmp_path) is None
     (tmp_path / "damaged.json").write_text("{")
-    with pytest.raises(RecordError, match=r"damaged\.json: is not a record"):
-        find(str(tmp_path / "damaged.json"), folder)
+    refused(r"damaged\.json: is not a record", find, str(tmp_path / "damaged.json"), folder, error=RecordError)
 
 
 def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
