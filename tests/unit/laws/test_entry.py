@@ -237,12 +237,6 @@ def test_numbers_give_a_float_arrays_float64_and_jax_jax():
         assert out.dtype == jnp.float32
 
 
-def jitted(method, *arguments):
-    """The method of a law compiled for its arguments as they are: the twin of what goes by blocks."""
-    with jax.enable_x64(True):
-        return np.asarray(jax.jit(method)(*map(jnp.asarray, arguments)))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [0, 1, 63, 64, 65, 1024, 1025, 2 * BLOCKS[-1] + 1])
 def test_every_length_is_that_of_one_call(burley, size):
@@ -251,7 +245,9 @@ def test_every_length_is_that_of_one_call(burley, size):
     for albedos in (alpha, 0.9):
         found = burley.profile(r, albedos)
         assert found.shape == (size,)
-        np.testing.assert_allclose(found, jitted(burley.profile, r, albedos), rtol=1e-14)
+        with jax.enable_x64(True):  # compiled for its arguments as they are: the twin of what goes by blocks
+            twin = np.asarray(jax.jit(burley.profile)(jnp.asarray(r), jnp.asarray(albedos)))
+        np.testing.assert_allclose(found, twin, rtol=1e-14)
 
 
 def test_a_grid_keeps_its_shape(burley):
