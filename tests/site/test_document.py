@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.errors import OutputError, RecordError
 from profilefit.recipes import catalogue, evidence
 from profilefit.report.explorer import fragment
 from profilefit.report.page import document
 from profilefit.report.page.document import PARTS, write_page
 from profilefit.report.page.sections import EvidenceFolder, promises, record_part
 from profilefit.report.records import Source
+from tests.fixtures import refused
 from tests.unit.report.test_figures import folder_with
 
 SHIPPED = catalogue.fits_folder()
@@ -138,21 +139,17 @@ def test_damage_is_one_line_and_leaves_the_old_page(page, records, tmp_path):
     path = tmp_path / "report.html"
     path.write_text("old", encoding="utf-8")
     expected = "expected what `profilefit {} --out` writes, got "
-    with pytest.raises(InputError, match=rf"check\.json: {expected.format('check')}no key 'made'"):
-        write_page(path, records, tmp_path)
+    refused(rf"check\.json: {expected.format('check')}no key 'made'", write_page, path, records, tmp_path)
     for name in MEASURED:
         (tmp_path / f"{name}.json").write_text('{"made": {}, "laws": {}}', encoding="utf-8")
-        with pytest.raises(InputError, match=f"{expected.format(name)}KeyError"):
-            write_page(path, records, tmp_path)
+        refused(f"{expected.format(name)}KeyError", write_page, path, records, tmp_path)
         (tmp_path / f"{name}.json").unlink()
     shutil.copytree(records, tmp_path / "records")
     (tmp_path / "records/albedo-liang.json").write_text('{"format": 1}', encoding="utf-8")
-    with pytest.raises(RecordError, match="damaged"):
-        write_page(path, tmp_path / "records", tmp_path)
+    refused("damaged", write_page, path, tmp_path / "records", tmp_path, error=RecordError)
     assert path.read_text(encoding="utf-8") == "old"
     (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(OutputError, match="cannot write into"):
-        write_page(tmp_path / "file" / "report.html", records, tmp_path)
+    refused("cannot write into", write_page, tmp_path / "file" / "report.html", records, tmp_path, error=OutputError)
 
 
 @pytest.mark.slow

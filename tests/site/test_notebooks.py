@@ -82,12 +82,6 @@ def numbers(pattern: str, text: str) -> list[float]:
     return [float(found) for found in re.findall(pattern, text)]
 
 
-def definitions(source: str) -> list[list[str]]:
-    """The lines of each function that a cell defines."""
-    blocks = re.findall(r"^def .*\n(?:(?:[ \t].*)?\n?)*", source, re.MULTILINE)
-    return [block.rstrip().splitlines() for block in blocks]
-
-
 def test_there_are_eleven_and_a_table_of_them():
     assert [path.stem[:2] for path in NOTEBOOKS] == [f"{number:02d}" for number in range(1, 12)]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
@@ -108,7 +102,9 @@ def test_notebooks_are_stripped_with_text_between_cells_links_that_lead_and_no_l
     kinds = [cell.cell_type for cell in cells]
     assert kinds[0] == kinds[-1] == "markdown"
     assert "code code" not in " ".join(kinds)
-    assert [block for cell in cells for block in definitions(cell.source) if len(block) > LONGEST] == []
+    functions = re.compile(r"^def .*\n(?:(?:[ \t].*)?\n?)*", re.MULTILINE)
+    blocks = [block.rstrip().splitlines() for cell in cells for block in functions.findall(cell.source)]
+    assert [block for block in blocks if len(block) > LONGEST] == []
     assert "**" in cells[0].source, "the question comes first"
     assert "## What was learnt" in cells[-1].source
     words = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")

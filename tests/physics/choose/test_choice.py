@@ -20,7 +20,7 @@ from profilefit.studies.choose.choice import Predicted, cases, chosen, laws
 from profilefit.studies.choose.cost import COVERED, PUBLISHED, Milliseconds, Ratios, milliseconds
 from profilefit.studies.choose.error import Error
 from profilefit.studies.choose.layers import OneLayer, of_each_colour, one_layer
-from tests.fixtures import slow
+from tests.fixtures import refused, slow
 
 CASE = Case((0.5, 0.5, 0.5), (1.0, 1.0, 1.0), 0.1)
 
@@ -131,8 +131,7 @@ def test_what_was_measured_is_kept(hazard):
     assert Ratios(**json.loads(ratios_json(made))) == made
     assert made.of(NOTHING) == 0.5
     assert made.of(Option("gaussians", 10, 3)) == pytest.approx(0.5 + 3 * 0.2)
-    with pytest.raises(InputError, match=r"gpu must be one of switch, .* got 'voodoo'"):
-        milliseconds(SEVENTEEN, cost.shipped(), "voodoo")
+    refused(r"gpu must be one of switch, .* got 'voodoo'", milliseconds, SEVENTEEN, cost.shipped(), "voodoo")
     with pytest.raises(InputError, match=r"option must be one whose cost was measured \(separable\), got 'hazard'"):
         made.of(Option("sampled", 16, law=hazard))
 
@@ -205,5 +204,4 @@ def test_a_thin_veil_is_not():
     ids=["black", "glass"],
 )
 def test_black_and_glass_have_no_single_layer(layer, photons, message):
-    with pytest.raises(InputError, match=f"layers must {message}"):
-        one_layer(Medium((layer,)), 0.02, WITHIN, photons)
+    refused(f"layers must {message}", one_layer, Medium((layer,)), 0.02, WITHIN, photons)

@@ -9,13 +9,13 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
 from mcml_sim import Setting
-from profilefit.errors import InputError
 from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points, step_response
 from profilefit.studies.choose import error as module
 from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
 from profilefit.studies.choose.choice import laws
 from profilefit.studies.choose.error import ReferenceLight, beyond, error, estimates, filtered, response
+from tests.fixtures import refused
 from tests.physics.choose.conftest import DIFFUSE, MFP
 
 WITHIN = Within()
@@ -60,8 +60,7 @@ def test_light_under_a_surface_is_exact(case):
     dark = 1.0 - step_response(x, light.alpha(0.6), setting=setting)
     np.testing.assert_allclose(light.beyond(0.6)(x), dark, atol=2e-5)
     assert ReferenceLight(setting).alpha(1.0) == 1.0  # no surface that refracts is white
-    with pytest.raises(InputError, match=r"index must be a refractive index in \[1, 1.6\], got 1.61"):
-        ReferenceLight(Setting(n=1.61))
+    refused(r"index must be a refractive index in \[1, 1.6\], got 1.61", ReferenceLight, Setting(n=1.61))
 
 
 def test_places():
@@ -70,10 +69,8 @@ def test_places():
     np.testing.assert_allclose(flat.places(2, WITHIN), [0.05, 0.15])  # two pixels at the least
     bent = replace(flat, radius=2.0)
     assert bent.places(0, WITHIN).max() <= 2.0 * np.sin(STEEPEST)
-    with pytest.raises(InputError, match=r"within.mfp must be a number of mean free paths in \(0, 100\], got 0"):
-        Within(mfp=0)
-    with pytest.raises(InputError, match=r"within.pixels must be a whole number in 1 ... 100, got 1000"):
-        Within(pixels=1000)
+    refused(r"within.mfp must be a number of mean free paths in \(0, 100\], got 0", Within, mfp=0)
+    refused(r"within.pixels must be a whole number in 1 ... 100, got 1000", Within, pixels=1000)
 
 
 X = np.array([0.125, 0.625, 1.625])

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.skin import scene as skin
 from profilefit.studies.choose.requirements import read
+from tests.fixtures import refused
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 SMALL = """\
@@ -106,9 +106,7 @@ def test_an_older_file_is_told_what_to_write(tmp_path):
         '[material]\nlight = "diffuse"\nindex = 1.4\nname = "skin1"\n',
         encoding="utf-8",
     )
-    with pytest.raises(InputError) as caught:
-        read(path)
-    assert str(caught.value) == (
+    assert refused("older format", read, path) == (
         f'{path}: keys are of an older format: write scene = "skin" and [choose] pixel for [view] pixel, '
         "lengths in mm for [view] world, [technique] illumination for [material] light, n for [material] index, "
         "material for [material] name, [technique] tolerance for [tolerance] error, [choose] ms for [budget] ms"
@@ -164,7 +162,4 @@ WRONG = [
 )
 def test_mistakes_are_one_line(written, old, new, message):
     path = written(old, new)
-    with pytest.raises(InputError, match=message) as caught:
-        read(path)
-    assert str(caught.value).startswith(str(path))
-    assert "\n" not in str(caught.value)
+    assert refused(message, read, path).startswith(str(path))

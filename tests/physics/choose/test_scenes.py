@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mcml_sim.files.text_file import read_toml
-from profilefit.errors import InputError
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.fur import scene as fur
 from profilefit.scenes.fur.truth import random_patch
@@ -21,6 +20,7 @@ from profilefit.scenes.stage.surface import sees
 from profilefit.scenes.stage.world import Camera, Part, Scene
 from profilefit.studies.choose import scenes
 from profilefit.studies.choose.scenes import RandomFur, atlas_need, fur_need, sea_need, steepest_ray
+from tests.fixtures import refused
 
 HEART, SEA = (read_toml(shipped("examples") / f"{name}.toml") for name in ("heart", "sea"))
 FUR = {"scene": "fur", "fur": {"density": 0.64, "radius": 0.5, "length": 10.0}, "technique": {}}
@@ -203,6 +203,5 @@ def test_the_cheapest_is_by_the_cost_of_a_layer(monkeypatch):
     ],
 )
 def test_what_rays_do_not_tell(changes, accepted, got):
-    with pytest.raises(InputError) as found:
-        fur_need(request(fur, FUR, **changes))
-    assert str(found.value) == f"fur.toml: {accepted} where layers are chosen by rays, got {got}"
+    message = f"fur.toml: {accepted} where layers are chosen by rays, got {got}"
+    assert refused("^fur", fur_need, request(fur, FUR, **changes)) == message

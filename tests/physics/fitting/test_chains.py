@@ -13,7 +13,7 @@ from mcml_sim.runs.input_runs import Compiling
 from profilefit.errors import InputError
 from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import fit
-from tests.fixtures import Line, whitened
+from tests.fixtures import Line, refused, whitened
 from tests.physics.fitting.test_estimate import line_profiles
 
 pytestmark = pytest.mark.slow
@@ -134,15 +134,12 @@ def test_draws_go_to_arviz_and_back(line_fit):
 
 
 def test_misuse_is_named(line_fit, tallies, liang):
-    with pytest.raises(InputError, match="'misfit', got 'discrepancy', which is called 'misfit' now"):
-        posterior(line_fit, "discrepancy")
-    with pytest.raises(InputError, match="kind must be 'statistical' or 'misfit', got 'both'"):
-        posterior(line_fit, "both")
+    refused("'misfit', got 'discrepancy', which is called 'misfit' now", posterior, line_fit, "discrepancy")
+    refused("kind must be 'statistical' or 'misfit', got 'both'", posterior, line_fit, "both")
     with pytest.raises(InputError, match=r"no photon noise: only kind='misfit' applies, got 'statistical'"):
         posterior(replace(line_fit, statistical=None))
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
-    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
-        posterior(one)
+    refused("a posterior needs a fit that converged, got: degenerate", posterior, one)
 
 
 def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.refits import drawn_noise
-from mcml_sim import Grid, InputError, Setting, SettingError, exact, simulate_orders
+from mcml_sim import Grid, Setting, SettingError, exact, simulate_orders
 from profilefit.fitting.profiles import COVARIANCE_RANK, FEWEST_EFFECTIVE_SAMPLES, Covariance, Profiles
+from tests.fixtures import refused
 
 ALPHAS = [0.3, 0.6, 0.9, 0.97]
 
@@ -44,8 +45,7 @@ def test_exact_rings_are_differences_of_the_cdf(truth):
     found = Profiles.from_exact([0.5], [0.0, 1.0], Setting("diffuse"))
     assert found.setting == Setting("diffuse")
     assert found.reflectance[0] == pytest.approx(exact.reflectance(0.5, Setting("diffuse")))
-    with pytest.raises(SettingError, match="n >= 1 where g = 0"):
-        Profiles.from_exact([0.5], [0.0, 1.0], Setting(n=0.9))
+    refused("n >= 1 where g = 0", Profiles.from_exact, [0.5], [0.0, 1.0], Setting(n=0.9), error=SettingError)
 
 
 def test_energy_light_beyond_trust_and_covariance_of_photons(photons, white_run):
@@ -78,8 +78,7 @@ def test_merged_rings_hold_the_same_energy_and_covariance(white_run, photons):
     # Fewer rings than the run has: what lies beyond the last one moves into `beyond`.
     inner = Profiles.from_orders(white_run.merged(edges[:3]), ALPHAS)
     np.testing.assert_allclose(inner.reflectance, photons.reflectance, rtol=1e-12)
-    with pytest.raises(InputError, match="r_edges must be edges of the run's own grid"):
-        white_run.merged([0.0, 0.0123, 1.0])
+    refused("r_edges must be edges of the run's own grid", white_run.merged, [0.0, 0.0123, 1.0])
     # Two routes to the error of a sum of rings: tally the sum, or add the parts with their negative covariance.
     groups = [(0, 3), (3, 4), (4, 12), (12, 25)]
     parts = np.zeros((len(ALPHAS) * 4, len(ALPHAS), 25))
@@ -174,15 +173,13 @@ def test_sandwich_is_the_scatter_of_synthetic_tallies(tallies, sidak):
 @pytest.mark.parametrize("alpha", [0.0, -0.1, 1.1, [0.5, np.nan], [[0.5]]])
 def test_albedos_must_be_a_list_above_zero(alpha, white_run):
     for make in (lambda: Profiles.from_orders(white_run, alpha), lambda: Profiles.from_exact(alpha, [0.0, 1.0])):
-        with pytest.raises(InputError, match=r"alpha must be a list of albedos in \(0, 1\], got"):
-            make()
+        refused(r"alpha must be a list of albedos in \(0, 1\], got", make)
 
 
 def test_forward_orders_are_refused_and_white_media_and_numbers_allowed(white_run):
     # Rings of forward orders are in mean free paths, which are other shares of l* for each albedo.
     run = simulate_orders(Grid(1.0, 3), 100, seed=1, setting=Setting(g=0.5))
-    with pytest.raises(InputError, match=r"orders must be of light that scatters isotropically, got g = 0\.5"):
-        Profiles.from_orders(run, [0.5])
+    refused(r"orders must be of light that scatters isotropically, got g = 0\.5", Profiles.from_orders, run, [0.5])
     run = simulate_orders(Grid(1.0, 3), 1000, seed=1)
     assert Profiles.from_orders(run, [0.5, 1.0]).reflectance[1] > 0.9
     assert Profiles.from_orders(white_run, 0.5).energy.shape == (1, 25)

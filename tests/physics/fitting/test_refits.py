@@ -11,6 +11,7 @@ from profilefit.fitting.chains import posterior
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.laws.rational import Rational
+from tests.fixtures import refused
 
 REPLICATES = 2000
 
@@ -152,14 +153,10 @@ def test_the_scatter_of_batches_is_the_closed_form_and_batches_must_be_alike(bat
     found = module.energies(batches, one)
     assert found.shape == (BATCHES, ALPHA.size, 2)
     np.testing.assert_allclose(found[3].sum(axis=1), batches[3].reflectance(ALPHA).value, rtol=1e-12)
-    with pytest.raises(InputError, match="batches must be at least 10, got 3"):
-        bootstrap(batches[:3], one)
-    with pytest.raises(InputError, match="batches must be of different seeds, got one twice"):
-        bootstrap([*batches, batches[0]], one)
+    refused("batches must be at least 10, got 3", bootstrap, batches[:3], one)
+    refused("batches must be of different seeds, got one twice", bootstrap, [*batches, batches[0]], one)
     small = simulate_orders(batches[0].grid, 1000, seed=1, progress=False)
-    with pytest.raises(InputError, match="batches must be of equally many photons, got different ones"):
-        bootstrap([*batches, small], one)
+    refused("batches must be of equally many photons, got different ones", bootstrap, [*batches, small], one)
     diffuse = [simulate_orders(batches[0].grid, 1000, s, Setting("diffuse"), progress=False) for s in range(10)]
-    with pytest.raises(InputError, match=r"batches must belong to searchlight.*got another setting"):
-        bootstrap(diffuse, one)
+    refused(r"batches must belong to searchlight.*got another setting", bootstrap, diffuse, one)
     assert isinstance(one.law, Rational)

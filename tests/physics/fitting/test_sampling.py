@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 
 import profilefit
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.fitting import sampling
 from profilefit.fitting.sampling import BATCH, ExactTarget, LawTarget, edge_light, lit_beyond_edge, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.two_parts import TwoPartSampler
+from tests.fixtures import refused
 
 ALPHA = 0.9
 STEP = 2.0**-24  # what the last step of xi leaves out
@@ -214,5 +214,4 @@ def test_targets_are_of_their_setting(burley):
     ],
 )
 def test_bad_numbers_are_named(burley, alpha, edge, said):
-    with pytest.raises(InputError, match=said):
-        sampler_quality(burley.sampler, alpha, edge=edge)
+    refused(said, sampler_quality, burley.sampler, alpha, edge=edge)

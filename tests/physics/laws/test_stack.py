@@ -14,12 +14,11 @@ import pytest
 import profilefit
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact import single_scattering
-from profilefit.errors import InputError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.fit import Tracing, ring_edges, stack_law, traced, traced_half_space
-from tests.fixtures import slow
+from tests.fixtures import refused, slow
 
 R = np.geomspace(1e-3, 30.0, 40)
 CONSTANTS = {"w": 0.2, "u": -0.1, "g1": 0.9, "g2": 1.4, "b1": 0.1, "b2": 0.2, "h0": 0.7, "h1": 1.1, "k0": 0.2}
@@ -157,13 +156,12 @@ LAST = L(0.1, 1.0, 0.0)
     ],
 )
 def test_refused(medium, message):
-    with pytest.raises(InputError, match=message):
-        stack_law(medium)
+    refused(message, stack_law, medium)
 
 
 def test_refused_arguments():
     law, top = stack(), stack().top
-    for refused, arguments, message in (
+    for call, arguments, message in (
         (law.profile, (0.1, -1.0), "thickness must be >= 0"),
         (law.total, (None,), "thickness must be a number"),
         *(
@@ -172,8 +170,7 @@ def test_refused_arguments():
         ),
         (stack_law, (half_space(0.9), "sunlight"), "illumination"),
     ):
-        with pytest.raises(InputError, match=message):
-            refused(*arguments)
+        refused(message, call, *arguments)
     assert law.profile(0.1, None) == law.profile(0.1)
 
 

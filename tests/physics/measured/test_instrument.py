@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.measured.instrument import PENCIL, Gaussian, Instrument, Profiled, TopHat, beam_of
 from profilefit.measured.model import Model, exact_light, u_of
-from tests.fixtures import slow
+from tests.fixtures import refused, slow
 
 SETTINGS = Setting(), Setting(n=1.4), Setting("diffuse", n=1.4)
 ALPHA, W = 0.8, 0.5
@@ -165,11 +164,9 @@ def test_beams_from_words(tmp_path):
         ("r, b\n", r"with light, got 0"),
     ):
         path.write_text(text)
-        with pytest.raises(InputError, match=message):
-            beam_of("beam", str(path), "mm")
+        refused(message, beam_of, "beam", str(path), "mm")
     path.write_bytes(b"0, 1\n" * 2**18)
-    with pytest.raises(InputError, match=r"expected a beam of at most 1048576 bytes, got a longer file"):
-        beam_of("beam", str(path), "mm")
+    refused(r"expected a beam of at most 1048576 bytes, got a longer file", beam_of, "beam", str(path), "mm")
 
 
 @pytest.mark.parametrize("instrument", [PENCIL, Instrument(Gaussian(W))], ids=["pencil", "Gaussian"])

@@ -36,15 +36,11 @@ def held(rows, count, spread, sets, widened=True, seed=0):
     return inside
 
 
-def band(sets, coordinates=2):
-    """Counts that intervals of exactly 95 % exceed on either side with a chance of 1e-3, all coordinates at once."""
-    tail = (1 - (1 - 1e-3) ** (1 / coordinates)) / 2
-    return stats.binom.ppf([tail, 1 - tail], sets, 0.95)
-
-
 @pytest.mark.parametrize("spread", [0.0, 1.0])
 def test_intervals_from_three_replicates_cover(spread):
-    low, high = band(300)
+    # Counts that intervals of exactly 95 % exceed on either side with a chance of 1e-3, both coordinates at once.
+    tail = (1 - (1 - 1e-3) ** (1 / 2)) / 2
+    low, high = stats.binom.ppf([tail, 1 - tail], 300, 0.95)
     counts = held(24, 3, spread, 300)
     assert np.all((low <= counts) & (counts <= high))
     if spread == 1.0:  # negative control: the same rows without Meier's factor and Student's quantile

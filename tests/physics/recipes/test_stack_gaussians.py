@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium
-from profilefit.errors import InputError
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.gaussians import SumLight, fitted, joint, refitted, ring_shares, shared_sum
+from tests.fixtures import refused
 
 HEART, BLUE = (
     Medium((Layer(1.4, mu_a, mu_s, 0.0, 0.3), Layer(1.4, below, scattered, 0.0)))
@@ -54,8 +54,7 @@ def test_a_sum_is_found_again():
     np.testing.assert_allclose(weights, WEIGHTS[0], rtol=1e-4)
     assert fitted([light], 2).cost > 1e4 * best.cost  # two are not three
     for count in (0, 9, True, 2.5):
-        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
-            gaussians.shared_gaussians((HEART,), "diffuse", count)
+        refused(f"1 ... 8, got {count!r}", gaussians.shared_gaussians, (HEART,), "diffuse", count)
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Step edges whose answer is known, also on planes that are seen aslant."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -10,18 +10,14 @@ from mcml_sim import Setting, exact
 
 DIFFUSE = Setting("diffuse")
 SHARES = (np.arange(1000) + 0.5) / 1000  # the answer is right to 1e-4
+_radii = cache(partial(exact.quantile, SHARES))
 
 
 def answer(x, alpha, setting=DIFFUSE):
     """Light at signed distances x [mfp] from an edge, over A: radii of even shares cross it by arccos(|x|/r) / pi."""
-    radius = _radii(alpha, setting)
+    radius = _radii(alpha, setting=setting)
     crossed = np.mean(np.arccos(np.minimum(np.abs(x)[..., None] / radius, 1.0)), axis=-1) / np.pi
     return np.where(x > 0, 1.0 - crossed, crossed)
-
-
-@cache
-def _radii(alpha, setting):
-    return exact.quantile(SHARES, alpha, setting=setting)
 
 
 def aslant(size, pixel, reflectance, degrees, depth=None):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import find
 from profilefit.shader.check import bounds
 from profilefit.studies.stability import atlas, exact_cells, fit_cases, gradients, law_cells, map_cells, misuse, stacks
 from profilefit.studies.stability.cells import ADVICE, CDF, FLOAT64, Cells, Verdict, absolute, axis, regions_of
+from tests.fixtures import refused
 
 FITS = catalogue.fits_folder()
 
@@ -150,8 +150,7 @@ def test_jobs_by_name():
     assert not if_named & set(everything)
     for one in ("sea", "fur"):
         assert named(one, quick=True) == [one]
-    with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
-        atlas.jobs(["hazzard"], FITS, False)
+    refused(r"name must be a law, map or record .*, got 'hazzard'", atlas.jobs, ["hazzard"], FITS, False)
 
 
 @pytest.mark.slow

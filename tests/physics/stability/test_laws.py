@@ -10,7 +10,6 @@ import pytest
 
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.convert import alpha_of, reflectance_of
-from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.quantile import depth, radius
 from profilefit.laws.stack import StackTerms
@@ -21,6 +20,7 @@ from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.studies.stability import cells, law_cells, map_cells, stacks
 from profilefit.studies.stability.cells import QUANTITIES, ArgumentGrid, RoundedText, Verdict, regions_of
 from profilefit.studies.stability.law_cells import MEASURED, Reference, computed, limits_of
+from tests.fixtures import refused
 
 FITS = catalogue.fits_folder()
 PROFILE, CDF, SAMPLE, PDF = QUANTITIES
@@ -211,10 +211,8 @@ def test_a_colour_next_to_white_has_an_albedo():
 
 @pytest.mark.parametrize("mfp", [1e-101, 1e101, 0.0])
 def test_lengths_without_a_square_are_refused(mfp):
-    with pytest.raises(InputError, match=r"mfp must be > 0, from 1e-100 to 1e\+100"):
-        catalogue.load("hazard").profile(1.0, 0.5, mfp)
-    with pytest.raises(InputError, match=r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100"):
-        exact.profile(1.0, 0.5, mfp)
+    refused(r"mfp must be > 0, from 1e-100 to 1e\+100", catalogue.load("hazard").profile, 1.0, 0.5, mfp)
+    refused(r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100", exact.profile, 1.0, 0.5, mfp)
 
 
 def test_light_that_grazes_a_matched_surface_keeps_its_digits():

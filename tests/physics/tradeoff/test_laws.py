@@ -10,13 +10,13 @@ import pytest
 import profilefit
 from benchmarks.laws import described
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.burley import BurleySampler
 from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
 from profilefit.studies.tradeoff import laws, samplers
 from profilefit.studies.tradeoff.laws import YARDSTICK, LawSpec, count, with_samplers
 from profilefit.studies.tradeoff.stopwatch import Rates
+from tests.fixtures import refused
 
 BURLEY = profilefit.load("burley", "published")
 SMALL = laws.LawSizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
@@ -52,8 +52,7 @@ def test_what_cannot_be_had_is_left_out_by_name():
     assert [one.name for one in found] == [YARDSTICK, f"{YARDSTICK}, Xie's sampler"]
     (line,) = left_out
     assert line.startswith("absent: constants must be one of")
-    with pytest.raises(InputError, match="laws must have normalized diffusion among them"):
-        laws.contenders(specs=specs[1:])
+    refused("laws must have normalized diffusion among them", laws.contenders, specs=specs[1:])
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from profilefit.errors import InputError
 from profilefit.recipes import record
 from profilefit.report.page.sections import EvidenceFolder, promises
 from profilefit.report.tables.claims_table import EXACT, FILE, markdown_claims, read_claims
+from tests.fixtures import refused
 
 EVIDENCE = claims.FITS / "evidence"
 BROKEN = ("broken", "≤ 0.1 %", claims.RECORDS.promises[0][2], "error of R_d by hazard")
@@ -104,7 +105,5 @@ def test_damage_is_named(tmp_path, spoiled):
     (key,) = spoiled
     with pytest.raises(InputError, match=rf"claims.json: expected what `make claims` writes, got ValueError: {key}"):
         read_claims(written(tmp_path, {**ROW, **spoiled}))
-    with pytest.raises(InputError, match="got KeyError: 'name'"):
-        read_claims(written(tmp_path, {}))
-    with pytest.raises(InputError, match="got TypeError"):
-        read_claims(written(tmp_path, 1))
+    refused("got KeyError: 'name'", read_claims, written(tmp_path, {}))
+    refused("got TypeError", read_claims, written(tmp_path, 1))

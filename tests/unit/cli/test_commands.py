@@ -11,6 +11,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -280,12 +281,9 @@ def test_shipped_records_are_written_over_only_where_they_are_named(refused, mon
     """Where ./fits is what is shipped, as in a clone; the last error comes from behind that check."""
     monkeypatch.chdir(FITS.parent)
     refused("regenerate albedo-liang", "--out must be given where ./fits holds the shipped records")
-    monkeypatch.setattr("mcml_sim.files.whole_file.require_folder", _reached)
+    reached = Mock(side_effect=InputError("the folder is next"))
+    monkeypatch.setattr("mcml_sim.files.whole_file.require_folder", reached)
     refused("regenerate albedo-liang --out fits", "the folder is next")
-
-
-def _reached(*_, **__):
-    raise InputError("the folder is next")
 
 
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*3[0-7]m")

@@ -42,15 +42,11 @@ CHEAP = (
 )
 
 
-def subcommands() -> dict[tuple[str, str], typer.core.TyperCommand]:
-    return {
-        (program, name): one
-        for program, app in PROGRAMS.items()
-        for name, one in typer.main.get_command(app).commands.items()
-    }
-
-
-SUBCOMMANDS = subcommands()
+SUBCOMMANDS = {
+    (program, name): one
+    for program, app in PROGRAMS.items()
+    for name, one in typer.main.get_command(app).commands.items()
+}
 
 
 def examples(epilog: str) -> list[str]:

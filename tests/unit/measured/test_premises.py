@@ -20,6 +20,7 @@ from profilefit.measured.problem import FitSpec
 from profilefit.measured.reading import FACTS
 from profilefit.measured.result import known_medium
 from profilefit.recipes.catalogue import fits_folder
+from tests.fixtures import refused
 
 DATA = Path(__file__).parents[3] / "examples"
 ROWS = "r [mm],value,sigma\n0.5,0.1,0.01\n1,0.05,0.01\n2,0.01,0.001\n"
@@ -113,8 +114,7 @@ def test_a_beam_that_a_file_states_lies_beside_it(stated, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path / "elsewhere")
     data = stated("# beam = beam.csv\n")
     assert premises(data).instrument.beam.r[-1] == 1.0
-    with pytest.raises(InputError, match=r"^beam\.csv: expected a file that can be read"):
-        premises(data, options={"beam": "beam.csv"})
+    refused(r"^beam\.csv: expected a file that can be read", premises, data, options={"beam": "beam.csv"})
 
 
 def test_a_range_is_its_middle_and_its_ends(stated):
@@ -164,8 +164,7 @@ def test_a_simulation_states_its_medium():
     ],
 )
 def test_what_is_wrong_is_named(stated, comments, options, message):
-    with pytest.raises(InputError, match=message):
-        premises(stated(comments), options=options)
+    refused(message, premises, stated(comments), options=options)
 
 
 PHANTOM = DATA / "phantom.csv"  # alpha .95, l 1.1 mm
@@ -223,5 +222,4 @@ def test_a_simulation_brings_its_own_surface():
     ],
 )
 def test_what_cannot_be_asked_is_named(near, given, message):
-    with pytest.raises(InputError, match=message):
-        fit(near, **given)
+    refused(message, fit, near, **given)

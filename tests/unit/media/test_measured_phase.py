@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from mcml_sim import InputError, Layer, Medium, Setting, SettingError, exact
+from mcml_sim import Layer, Medium, Setting, SettingError, exact
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, Tabulated, as_table, from_table
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.phases import read_phase
@@ -171,6 +171,4 @@ def rows(**changed):
     ],
 )
 def test_bad_input_in_one_line(make, message):
-    with pytest.raises(InputError, match=message) as error:
-        make()
-    assert "\n" not in str(error.value)
+    refused(message, make)

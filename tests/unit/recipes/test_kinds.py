@@ -11,7 +11,7 @@ import pytest
 
 from mcml_sim import Layer, Medium
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import RecordError
 from profilefit.recipes import kinds
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import KINDS, Kind, KindModule, gaussians, phase, records_of, stack
@@ -20,6 +20,7 @@ from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.fit import Tracing
 from profilefit.shader.law_file import export_subject
+from tests.fixtures import refused
 from tests.unit.cli.conftest import command, program
 from tests.unit.recipes.stack.test_record import RUN, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
@@ -88,8 +89,7 @@ def test_a_name_is_that_of_the_first_kind_that_has_it(name, key):
     assert first.key == key
     if key in ("stack", "phase"):
         words = {"stack": "a stack", "phase": "a phase function"}[key]
-        with pytest.raises(InputError, match=rf"^n must be left out where NAME is {words}, got '{name}'"):
-            first.find(name, n=1.4)
+        refused(rf"^n must be left out where NAME is {words}, got '{name}'", first.find, name, n=1.4)
 
 
 def test_records_of_paths_and_names_are_of_their_own_kinds(tmp_path):
@@ -101,10 +101,8 @@ def test_records_of_paths_and_names_are_of_their_own_kinds(tmp_path):
     found = records_of(["skin", "hazard", "petzold"])
     keys = [("stack", "skin"), ("gaussians", "skin"), ("law", "hazard"), ("phase", "petzold")]
     assert [(kind.key, name) for kind, name, _ in found] == keys
-    with pytest.raises(RecordError, match=r"there is no record 'petzhold' in .*; stacks are heart, "):
-        records_of(["petzhold"])
-    with pytest.raises(RecordError, match="has no records"):
-        records_of(["skin"], tmp_path)
+    refused(r"there is no record 'petzhold' in .*; stacks are heart, ", records_of, ["petzhold"], error=RecordError)
+    refused("has no records", records_of, ["skin"], tmp_path, error=RecordError)
     # Every name that ships is requested of its kinds.
     found = requests_of()
     keys = {key: [request for kind, request in found if kind.key == key] for key in BY_KEY}
@@ -156,8 +154,7 @@ def test_traced_light_is_that_of_its_run(monkeypatch):
     Tracing.of(replace(GIVEN, photons=None), "skin-0", EXACT).rings(1, "diffuse", edges, 2**20, 0)
     Tracing().rings(1, "diffuse", edges, 2**20, 0)
     assert [given[3:] for given in calls[-2:]] == [(20 * 2**20, 7, stores[0]), (2**20, 1, None)]
-    with pytest.raises(InputError, match=r"photons must be a whole number >= 131072 where .* forward, got 1000"):
-        Tracing.of(GIVEN, "skin-0", TRACED)
+    refused(r"photons must be a whole number >= 131072 where .* forward, got 1000", Tracing.of, GIVEN, "skin-0", TRACED)
 
 
 @pytest.mark.slow

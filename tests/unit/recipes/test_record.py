@@ -15,6 +15,7 @@ from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record, schema
 from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
 from profilefit.recipes.folder import fits_folder
+from tests.fixtures import refused
 from tests.unit.recipes.stack.test_record import GONE, spoil
 
 NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
@@ -52,8 +53,7 @@ def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch)
     path = record.write(tmp_path / "old", "mine", CONTENT, ARRAYS)
     before = {one.name: one.read_bytes() for one in path.parent.iterdir()}
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(OutputError, match=r"cannot write into .*file: "):
-        record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
+    refused(r"cannot write into .*file: ", record.write, tmp_path / "file", "mine", CONTENT, ARRAYS, error=OutputError)
     monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
         record.write(path.parent, "mine", {"law": "other"}, {})
@@ -137,12 +137,10 @@ def test_what_a_record_lacks_is_named(spoilt, key, value):
     path, got = spoilt("liang-whole", "/".join(place), value), "nothing" if value is GONE else "true"
     words = rf"mine\.json: is damaged: .*{place[-1]} must be .*, got {got}; regenerate it"
     if key in ALWAYS or (value is True and f"{key}?" in ALWAYS):
-        with pytest.raises(RecordError, match=words):
-            record.read(path)
+        refused(words, record.read, path, error=RecordError)
     else:
         assert record.read(path)["law"] == "liang", "enough to make a law from"
-    with pytest.raises(RecordError, match=words):
-        record.read(path, whole=True)
+    refused(words, record.read, path, whole=True, error=RecordError)
 
 
 DAMAGED = [
@@ -204,9 +202,7 @@ def test_text_that_is_no_printable_line_is_refused(spoilt, place, strange):
     else:
         path = spoilt("hazard", place, lambda text: f"{text}{strange}import os")
     words = "damaged: .*one line of printable text|not a record: .*surrogates"
-    with pytest.raises(RecordError, match=rf"mine\.json: is ({words})") as caught:
-        record.read(path)
-    assert str(caught.value).isprintable()
+    refused(rf"mine\.json: is ({words})", record.read, path, error=RecordError)
 
 
 UNSAFE = [
@@ -228,18 +224,15 @@ def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
     rest = json.dumps({"format": record.FORMAT, **NAMED, **({} if "constants" in change else {"constants": {}})})[1:]
     path = tmp_path / "mine.json"
     path.write_text("{" + rest[:-1] + ", " + change + "}")
-    with pytest.raises(RecordError, match=rf"mine\.json: .*{words}") as caught:
-        record.read(path)
-    assert len(str(caught.value)) < 300 + len(str(tmp_path))
+    said = refused(rf"mine\.json: .*{words}", record.read, path, error=RecordError)
+    assert len(said) < 300 + len(str(tmp_path))
 
 
 def test_damaged_arrays_are_named(tmp_path):
     path = record.write(tmp_path, "mine", CONTENT, {})
-    with pytest.raises(RecordError, match=r"mine\.npz: .*are missing; regenerate it"):
-        record.read_arrays(path)
+    refused(r"mine\.npz: .*are missing; regenerate it", record.read_arrays, path, error=RecordError)
     path.with_suffix(".npz").write_bytes(b"no arrays")
-    with pytest.raises(RecordError, match=r"mine\.npz: .*is damaged \(.*\); regenerate it"):
-        record.read_arrays(path)
+    refused(r"mine\.npz: .*is damaged \(.*\); regenerate it", record.read_arrays, path, error=RecordError)
 
 
 def test_no_flipped_byte_gets_past_as_another_error(tmp_path):
@@ -305,7 +298,6 @@ def test_a_measurement_tells_of_its_records_and_is_stale_once_one_changes_comes_
     assert digest(tmp_path / "a") != digest(tmp_path / "b")
     # Measurements do not lie among records.
     for out in (records, tmp_path / "records" / ".." / "records", Path("fits")):
-        with pytest.raises(InputError, match="out must be another folder than that of the records, got"):
-            require_apart(out, records)
+        refused("out must be another folder than that of the records, got", require_apart, out, records)
     require_apart(tmp_path / "new", records)
     assert (tmp_path / "new").is_dir()

@@ -17,6 +17,7 @@ from profilefit.report.drawing import VARIABLES, address, checked, classed, inli
 from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
 from profilefit.report.page.markup import command, details, markup, section
 from profilefit.report.tables.cells import column_table
+from tests.fixtures import refused
 
 
 @pytest.fixture(scope="module")
@@ -101,8 +102,7 @@ def test_every_line_is_where_it_was(original, page):
 
 
 def test_a_figure_without_a_frame_is_refused():
-    with pytest.raises(ValueError, match="figure 'x' has no viewBox"):
-        inline("<svg><g/></svg>", "x", "t")
+    refused("figure 'x' has no viewBox", inline, "<svg><g/></svg>", "x", "t", error=ValueError)
 
 
 @pytest.mark.parametrize(
@@ -161,8 +161,7 @@ def test_pictures_keep_every_pixel():
     head, data = address(file).split(",")
     assert head == "data:image/webp;base64"
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(base64.b64decode(data)))), pixels)
-    with pytest.raises(OSError, match="cannot identify image file"):
-        address(b"GIF89a")
+    refused("cannot identify image file", address, b"GIF89a", error=OSError)
 
 
 def test_a_photograph_may_lose_what_nobody_sees():

@@ -15,6 +15,7 @@ from profilefit.recipes import catalogue
 from profilefit.report.figures.canvas import only
 from profilefit.report.figures.record_figures import PAPER, draw_all, energy_within, plans, residual_figure
 from profilefit.report.records import DRAWS, Source, coefficients
+from tests.fixtures import refused
 
 pytestmark = pytest.mark.slow
 
@@ -165,8 +166,7 @@ def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
         draw_all(folder, tmp_path / "out")
     shutil.copy(SHIPPED / "burley-whole.json", folder)
     (folder / "burley-whole.npz").unlink()
-    with pytest.raises(RecordError, match="samples and curves of this record are missing"):
-        draw_all(folder, tmp_path / "out")
+    refused("samples and curves of this record are missing", draw_all, folder, tmp_path / "out", error=RecordError)
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
@@ -198,8 +198,7 @@ def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
     assert here.usable("burley-whole") is None
     assert here.fitted("burley-whole").band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
     assert here.fitted("liang-whole") is None
-    with pytest.raises(RecordError, match="has no record 'liang-whole'"):
-        here.needed("liang-whole")
+    refused("has no record 'liang-whole'", here.needed, "liang-whole", error=RecordError)
 
 
 def test_a_record_without_covariance_is_drawn_without_what_rests_on_it(tmp_path):

@@ -192,8 +192,7 @@ def test_an_error_in_a_batch_stops_the_others_and_rises():
         time.sleep(0.05)
         return one(batch, photons)
 
-    with pytest.raises(ValueError, match="batch 3"):
-        run_batches(trace, 1, 1000, workers=2)
+    refused("batch 3", run_batches, trace, 1, 1000, workers=2, error=ValueError)
     assert len(asked) < 20
 
 

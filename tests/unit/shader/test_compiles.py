@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from profilefit.errors import InputError, ShaderError
+from profilefit.errors import ShaderError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.diffusion import BeamDiffusion
 from profilefit.recipes import catalogue
@@ -16,7 +16,7 @@ from profilefit.scenes.sea.source import blur_text, segment_text
 from profilefit.shader import emit
 from profilefit.shader.context import program
 from profilefit.shader.phase_text import phase_text
-from tests.fixtures import slow
+from tests.fixtures import refused, slow
 from tests.unit.shader import test_stack_text as stacks
 from tests.unit.shader.test_other_texts import BLURS, SEA, C
 
@@ -117,5 +117,4 @@ def test_hlsl(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["hazard", *OTHERS])
 def test_an_unknown_language_is_named(name):
-    with pytest.raises(InputError, match="lang must be one of glsl, hlsl, python, got 'wgsl'"):
-        text(name, "wgsl")
+    refused("lang must be one of glsl, hlsl, python, got 'wgsl'", text, name, "wgsl")

@@ -8,7 +8,6 @@ import pytest
 
 from benchmarks.fur_feet import shared_shadow
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, from_table
-from profilefit.errors import InputError
 from profilefit.recipes.kinds.phase import named
 from profilefit.scenes.fur import law, truth
 from profilefit.scenes.fur.law import source as fur_source
@@ -21,6 +20,7 @@ from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.phase_text import phase_text
 from profilefit.shader.phase_text import source as phase_source
 from profilefit.studies.stability.cells import RoundedText
+from tests.fixtures import refused
 
 DRAW = """#version 330
 {text}
@@ -361,5 +361,4 @@ REFUSED = {
 
 @pytest.mark.parametrize("message", REFUSED)
 def test_refused(message):
-    with pytest.raises(InputError, match=message):
-        REFUSED[message]()
+    refused(message, REFUSED[message])

@@ -22,7 +22,7 @@ from profilefit.recipes.kinds import stack as stacks
 from profilefit.recipes.kinds.stack import find, load, matching, read, request
 from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
-from tests.fixtures import recorded, slow
+from tests.fixtures import recorded, refused, slow
 
 RUN = RecipeRun("quick", 1, Path(), None, None)
 STACK = """\
@@ -174,12 +174,9 @@ def spoil(path, place, value=GONE):
     path.write_text(json.dumps(content))
 
 
-def refused(reader, path, message):
-    with pytest.raises(RecordError, match=message) as caught:
-        reader(path)
-    text = str(caught.value)
+def refused_record(reader, path, message):
+    text = refused(message, reader, path, error=RecordError)
     assert path.stem in text
-    assert text.isprintable()
     assert len(text) < 400
     assert not text.startswith(f"{path}: is damaged") or text.endswith("; regenerate it")
 
@@ -238,7 +235,7 @@ NOT_SHOWN = [
 def test_a_damaged_record_is_one_line(written, reader, place, value, message):
     assert reader(written)
     spoil(written, place, value)
-    refused(reader, written, message)
+    refused_record(reader, written, message)
 
 
 def test_what_is_a_stack_and_what_its_file_says(file, tmp_path):
@@ -287,10 +284,7 @@ REFUSED = [
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED)
 def test_a_mistake_in_a_file_is_one_line(file, old, new, message):
     path = file(old, new)
-    with pytest.raises(InputError, match=message) as caught:
-        stacks.requested(path, read_toml(Path(path)))
-    assert str(caught.value).startswith(f"{path}: ")
-    assert str(caught.value).isprintable()
+    assert refused(message, stacks.requested, path, read_toml(Path(path))).startswith(f"{path}: ")
 
 
 @pytest.mark.parametrize(
@@ -347,8 +341,7 @@ def test_a_record_says_what_it_is_worth_and_is_found_by_path_and_by_name(written
         assert find(name, folder) is None
     assert find("heart", tmp_path) is None
     (tmp_path / "damaged.json").write_text("{")
-    with pytest.raises(RecordError, match=r"damaged\.json: is not a record"):
-        find(str(tmp_path / "damaged.json"), folder)
+    refused(r"damaged\.json: is not a record", find, str(tmp_path / "damaged.json"), folder, error=RecordError)
 
 
 def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):

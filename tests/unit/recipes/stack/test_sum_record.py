@@ -16,7 +16,7 @@ from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
 from tests.fixtures import recorded
-from tests.unit.recipes.stack.test_record import GONE, RUN, SHIPPED, STACK, refused, spoil
+from tests.unit.recipes.stack.test_record import GONE, RUN, SHIPPED, STACK, refused_record, spoil
 
 EDGES = np.geomspace(0.01, 10.0, 6)
 
@@ -98,7 +98,7 @@ DAMAGE = [
 def test_a_damaged_record_is_one_line(written, place, value, message):
     assert load(written)
     spoil(written, place, value)
-    refused(load, written, message)
+    refused_record(load, written, message)
 
 
 SHORT = {"red_energy": np.ones(4), "blue_ends": np.array([0.5]), "green_weight": np.ones((5, 1))}
