@@ -53,6 +53,18 @@ def test_an_empty_term_changes_no_bit(photons):
     np.testing.assert_array_equal(orders[0].counts.exits, orders[1].counts.exits)
 
 
+@pytest.mark.slow
+def test_equal_terms_are_one():
+    def reflected(phase, seed):
+        layer = Layer(1.2, 0.1, 1.0, 0.0, phase=phase)
+        return simulate(Medium((layer,)), GRID, 200_000, seed).diffuse_reflectance
+
+    one, other = reflected(ONE, 1), reflected(Mixture((0.3, 0.7), (ONE, ONE)), 2)
+    assert abs(one.value - other.value) < 3 * np.hypot(one.standard_error, other.standard_error)
+    blunt = reflected(Mixture((0.3, 0.7), (HenyeyGreenstein(0.5), ONE)), 2)
+    assert abs(one.value - blunt.value) > 5 * np.hypot(one.standard_error, blunt.standard_error)
+
+
 @pytest.mark.parametrize(
     ("phase", "illumination"),
     [(SEA, "searchlight"), (SEA, "diffuse"), *slow((TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight"))],

@@ -72,7 +72,8 @@ def test_three_layers_of_mcml(photons):
     assert is_met(tally.absorbed, 1 - answer.specular - answer.reflected.sum() - transmittance)
     # The biased generator of MCML would be seen.
     biased = abs(tally.transmittance.value - 0.096355)
-    assert photons == FEW or biased > 3.5 * tally.transmittance.standard_error
+    if photons == MANY:
+        assert biased > 3.5 * tally.transmittance.standard_error
 
 
 def test_adding_doubling_confirms_what_was_published_by_photons():

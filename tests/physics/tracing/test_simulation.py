@@ -7,7 +7,7 @@ from mcml_sim import Grid, Layer, Medium, Precision, StoreError, exact, half_spa
 from mcml_sim.runs import simulation
 from mcml_sim.tracing import layered_batch, matched_batch
 from mcml_sim.tracing.deposits import Deposits
-from tests.fixtures import refused
+from tests.fixtures import refused, slow
 
 pytestmark = pytest.mark.slow
 
@@ -89,11 +89,13 @@ def test_length_units_do_not_matter():
         assert np.abs(z[seen]).max() < 4.6, name
 
 
-def test_workers_and_interruptions_change_no_bit(tmp_path, monkeypatch):
+@pytest.mark.parametrize("illumination", ["searchlight", *slow("diffuse")])
+def test_workers_and_interruptions_change_no_bit(tmp_path, monkeypatch, illumination):
     monkeypatch.setitem(simulation.BATCH_PHOTONS, layered_batch, 4000)
-    alone = simulate(SLAB, GRID, 22_000, seed=3, workers=1)
-    simulate(SLAB, GRID, 9000, seed=3, store=tmp_path / "photons", workers=1)
-    resumed = simulate(SLAB, GRID, 22_000, seed=3, store=tmp_path / "photons", workers=2)
+    store = {"seed": 3, "store": tmp_path / "photons", "illumination": illumination}
+    alone = simulate(SLAB, GRID, 22_000, seed=3, workers=1, illumination=illumination)
+    simulate(SLAB, GRID, 9000, workers=1, **store)
+    resumed = simulate(SLAB, GRID, 22_000, workers=2, **store)
     for name, values in alone.deposits.arrays().items():
         np.testing.assert_array_equal(values, resumed.deposits.arrays()[name], err_msg=name)
 
@@ -144,7 +146,10 @@ def test_stopping_early_leaves_the_errors_honest(monkeypatch):
     ("change", "message"),
     [
         ({"medium": "glass"}, "medium must be a mcml_sim.Medium, got 'glass'"),
-        ({"photons": 0}, "photons must be a whole number >= 1"),  # and all else that `simulate_orders` refuses, too
+        ({"grid": 3}, "grid must be a mcml_sim.Grid, got 3"),
+        ({"photons": 0}, "photons must be a whole number >= 1"),
+        ({"seed": -1}, "seed must be a whole number >= 0, got -1"),
+        ({"workers": 0}, "workers must be"),
         ({"store": 5}, "store must be the path of a folder, got 5"),
         ({"precision": 0.0}, r"precision must be a relative standard error in \(0, 1\), got 0.0"),
         ({"precision": "high"}, "precision must be"),

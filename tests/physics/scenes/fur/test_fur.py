@@ -1,6 +1,6 @@
 """Fur: random cones in closed form, rays against them, shells and slabs, and what OpenGL draws of all."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -124,8 +124,15 @@ def rms(found, true):
     return float(np.sqrt(np.mean((found - true) ** 2)))
 
 
+UPRIGHT, ASLANT = (0.0, 0.0), (0.3, -0.5)
+
+
 @pytest.mark.parametrize(
-    ("degrees", "lean"), [(3.0, (0.0, 0.0)), (80.0, (0.3, -0.5)), *slow((0.0, (0.3, -0.5)), (50.0, (0.0, 0.0)))]
+    ("degrees", "lean"),
+    [
+        *((3.0, UPRIGHT), (80.0, ASLANT)),
+        *slow(*product((0.0, 50.0), (UPRIGHT, ASLANT)), (80.0, UPRIGHT), (3.0, ASLANT)),
+    ],
 )
 def test_against_steps_along_each_ray(degrees, lean):
     """Four hundred heights, at each of them all images of all strands: the first inside is within a step of the hit."""
@@ -275,6 +282,7 @@ def test_the_strand_that_is_met_is_where_it_is_met(degrees):
 def test_what_no_patch_has():
     many = "density must be a number > 0 of 1048576 strands at most"
     refused("density must be a number > 0", random_patch, 0.0, 0.1, 1.0, 1.0)
+    refused("density must be a number > 0", random_patch, np.nan, 0.1, 1.0, 1.0)
     refused(many, random_patch, 1e9, 0.1, 1.0, 1.0)
     refused("layers must be a whole", by_slabs, random_patch(9.0, 0.1, 1.0, 1.0), 0.5, np.zeros((1, 2)), 0)
     refused(r"packing must be a number in \[0, 0.6\], got 0.65", spaced_patch, 9.0, 0.1, 1.0, 1.0, 0.65)

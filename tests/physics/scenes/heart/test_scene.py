@@ -26,6 +26,7 @@ REFUSED = [
     ("technique.kind", "fog", r"\[technique\] kind must be one of split, texture, screen, none, got 'fog'"),
     ("technique.gaussians", 9, r"\[technique\] gaussians must be a whole number in 1 ... 8, got 9"),
     ("technique.texel", 0.01, r"\[technique\] texel must be a length \[mm\] of which 2048 at most make a side of"),
+    ("technique.texel", float("nan"), r"\[technique\] texel must be a number > 0"),
     ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
     ("layers.2.g", 0.9, r"\[layers 2\] g must be 0, and mu_s reduced"),
 ]

@@ -41,6 +41,7 @@ REFUSED = [
     ("camera", 3, r"camera must be a table \[camera\], got 3"),
     ("unit", "cm", "unit must be one of mm, got 'cm'"),
     ("uneven", 1.0, r"uneven must be a share in \[0, 1\), got 1.0"),
+    ("uneven", float("nan"), r"uneven must be a share in \[0, 1\), got nan"),
     ("pose", "sleep", "pose must be one of rest, turn, nod, got 'sleep'"),
     ("technique.kind", "fog", "kind must be one of stack, dipole, half space, none, got 'fog'"),
     ("technique.samples", 0, r"\[technique\] samples must be a whole number in 1 ... 256"),

@@ -341,6 +341,7 @@ test_what_no_floor_has = refusals(
     ({"depth": 0.05}, "^depth must be below the deepest trough, 0\\.07\\d* m, got 0.05$"),
     ({"tilt": 30.0}, "^tilt must be in \\[0, pi / 2\\), in radians, got 30.0$"),
     ({"tilt": -0.1}, "^tilt must be in \\[0, pi / 2\\), in radians, got -0.1$"),
+    ({"tilt": np.nan}, "^tilt must be in \\[0, pi / 2\\), in radians, got nan$"),
     ({"n": 0.0}, "^n must be a refractive index > 0, got 0.0$"),
     ({"n": "water"}, "^n must be a refractive index > 0, got 'water'$"),
     ({"x": [0.0, np.nan]}, "^x must be finite numbers \\[m\\], got nan$"),

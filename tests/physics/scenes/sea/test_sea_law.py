@@ -15,7 +15,7 @@ from profilefit.scenes.sea import law
 from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices, flux_below
 from profilefit.scenes.sea.law import beam_share, segment_between, segment_integral, water_gaussians, water_mtf
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.shader.emit import read_text
+from profilefit.shader.emit import read_text, translated
 from tests.fixtures import slow
 from tests.unit.scenes.scenes import refusals, refused
 
@@ -198,6 +198,7 @@ def test_where_unscattered_light_fails():
 test_what_no_water_has = refusals(
     partial(beam_share, omega=0.5, ct=1.0, cw=0.1, lobes=ONE),
     ({"omega": 1.1}, "omega must be an albedo"),
+    ({"omega": np.nan}, "omega must be an albedo"),
     ({"ct": -1.0}, "ct must be"),
     ({"ct": np.inf}, "ct must be"),
     ({"cw": -0.1}, "cw must be"),
@@ -206,6 +207,7 @@ test_what_no_water_has = refusals(
     ({"lobes": ((0.9, 0.9), (0.2, 0.5))}, "weights of lobes must"),
     ({"lobes": ((-0.1, 0.9),)}, "weights of lobes must"),
     ({"lobes": ((1.0, 1.0),)}, "g of lobes must"),
+    ({"lobes": ((1.0, np.nan),)}, "g of lobes must"),
     ({"ct": [1.0, 2.0], "cw": [1.0, 2.0, 3.0]}, "must broadcast"),
 )
 
@@ -259,6 +261,11 @@ def test_in_float32(arguments):
     found = segment_integral(*arguments)
     assert found.dtype == np.float32
     assert worst(found, exactly(*arguments)) < 1e-7
+    made = {}
+    exec(compile(translated(TEXT, "python"), "segment.py", "exec"), made)
+    by_text = made["segment_integral"](*arguments)
+    assert by_text.dtype == np.float32
+    assert worst(by_text, exactly(*arguments)) < 7e-7
     # Negative control: as it stands.
     c, s0, t0, m, t1 = arguments
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -306,12 +313,14 @@ def test_limits_of_a_segment():
 test_what_no_segment_has = refusals(
     partial(segment_integral, c=1.0, s0=1.0, t0=1.0, m=0.5, t1=1.0),
     ({"c": -1.0}, "c must be"),
+    ({"c": np.nan}, "c must be"),
     ({"s0": -0.1}, "s0 must be"),
     ({"t0": np.inf}, "t0 must be"),
     ({"t1": -1.0}, "t1 must be"),
     ({"t1": np.inf, "m": -1.0}, "t1 must be finite"),
     ({"t1": np.inf, "c": 0.0}, "t1 must be finite"),
     ({"m": 1.0001}, "m must be"),
+    ({"m": np.nan}, "m must be"),
     ({"m": "x"}, "m must be"),
 )
 
