@@ -396,7 +396,8 @@ def nameless(path: Path) -> list[str]:
     [*((elliptical, place) for place in (*PACKAGES, "benchmarks")), *((nameless, place) for place in PACKAGES)],
 )
 def test_a_docstring_can_be_read_alone_and_public_names_say_what_they_are(wrong, place):
-    assert [line for path in sorted((ROOT / place).rglob("*.py")) for line in wrong(path)] == []
+    assert (paths := sorted((ROOT / place).rglob("*.py")))
+    assert [line for path in paths for line in wrong(path)] == []
 
 
 @pytest.mark.parametrize(

@@ -218,6 +218,8 @@ def test_photographs_of_another_camera_are_not_replaced(command, refused, tmp_pa
         (("sides = [400, 300]", "sides = [400, 30]"), "[camera] sides must be at least 50 pixels each, got [400, 30]"),
         (("pitch", "bits = 8\npitch"), "[camera] black must be less than 255, white of 8 bits, got 256"),
         (("pitch", "uneven = 0.5\npitch"), "[camera] uneven must be a number > 0 and <= 0.1, got 0.5"),
+        (("pitch", "corner = 10\npitch"), "[camera] corner must be a number > 0 and <= 0.9, got 10"),
+        (("pitch", "late = 1\npitch"), "[camera] late must be a number > 0 and <= 0.2, got 1"),
         (("white = true", "white = 1"), "[cards] white must be true or false, got 1"),
         (("[camera]", "[optics]\nfalling = 0.8\n[camera]"), "[optics] falling must be a number > 1, or its light"),
         (("1.0]\nmu_a = [0.05,", "0.001]\nmu_a = [0.05, 0.05, 0.001] #"), "[medium] mu_s + mu_a must be >= 0.01"),

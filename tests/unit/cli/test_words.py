@@ -200,6 +200,8 @@ def test_arguments_are_named_by_their_options():
     said = {
         "out must be another folder, got out": "--out must be another folder, got out",
         "held alpha must be in (0, 1)": "--fix alpha must be in (0, 1)",
+        "one unit, here and in `unit`": "one unit, here and in --unit",
+        "constants of a record are its own": "constants of a record are its own",
         "x.csv: no row is left between `r_min` and `r_max`": "x.csv: no row is left between --r-min and --r-max",
     }
     assert {text: in_options(text) for text in said} == said

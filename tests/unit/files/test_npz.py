@@ -61,6 +61,7 @@ def test_only_what_is_wanted_is_looked_at():
 WRONG = {
     "shape": (zipped(("one.npy", npy(shape="(1, 3)"))), r"'one' must have the shape \(3,\), got \(1, 3\)"),
     "objects": (zipped(("one.npy", npy("|O"))), "'one' is no array of numbers or text"),
+    "truth values": (packed(one=np.array([True, False, True])), "'one' is no array of numbers or text"),
     "complex": (packed(one=np.zeros(3, complex)), "'one' is no array of numbers or text"),
     "long double": (packed(one=np.zeros(3, np.longdouble)), "'one' must be real numbers, got float128"),
     "text": (packed(one=np.array(["a", "b", "c"])), "'one' must be real numbers, got <U1"),

@@ -38,6 +38,7 @@ def write(path: Path) -> None:
 
 
 def refused(path: Path, reason: str, call=write) -> None:
+    """It is refused in one line, which names the file."""
     with pytest.raises(OutputError, match=rf"^cannot write {re.escape(str(path))}: {reason}$"):
         call(path)
 
@@ -65,11 +66,16 @@ from mcml_sim.files.whole_file import *
 BE_NOBODY = f"os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})"
 
 
-def in_a_process(code: str, *words: object, out: object = subprocess.PIPE) -> str:
+def in_a_process(code: str, *words: object, before: tuple[str, ...] = (), out: object = subprocess.PIPE) -> str:
     """What a child prints, which has imported the writer; what goes wrong there is one line."""
     program = f"{BEGIN}try:\n{indent(code, '    ')}\nexcept OutputError as error:\n    print(error)\n"
-    command = [sys.executable, "-c", program, *map(str, words)]
-    child = subprocess.run(command, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60)
+    child = subprocess.run(
+        [*before, sys.executable, "-c", program, *map(str, words)],
+        stdout=out,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=60,
+    )
     assert child.returncode == 0, child.stderr
     return child.stdout
 
@@ -345,12 +351,30 @@ import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 write_together({Path(sys.argv[1], name): os.urandom(size) for name, size in (("a.npz", 100), ("b.json", 8192))})
 """
+SMALL = """
+import subprocess
+folder = sys.argv[1]
+subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], check=True)
+write_together({Path(folder, name): name.encode() for name in ("a.npz", "b.json")})
+try:
+    write_together({Path(folder, name): os.urandom(size) for name, size in (("a.npz", 100), ("b.json", 2**17))})
+finally:
+    print(sorted(os.listdir(folder)), Path(folder, "a.npz").read_text(), Path(folder, "b.json").read_text())
+"""
 
 
 def test_files_that_get_too_large_leave_nothing(tmp_path):
     write_together(pair(tmp_path, "old"))
     assert in_a_process(LIMITED, tmp_path) == f"cannot write {tmp_path / 'b.json'}: File too large\n"
     assert contents(tmp_path) == {"a.npz": "old", "b.json": "old"}
+
+
+def test_a_full_disk_leaves_the_old_pair(tmp_path):
+    trial = ["unshare", "-Urm", "mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", "/tmp"]
+    if shutil.which("unshare") is None or subprocess.run(trial, capture_output=True).returncode != 0:
+        pytest.skip("this machine lets no user mount a file system; the test before meets nearly the same error")
+    told = in_a_process(SMALL, tmp_path, before=("unshare", "-Urm"))
+    assert told == (f"['a.npz', 'b.json'] a.npz b.json\ncannot write {tmp_path / 'b.json'}: No space left on device\n")
 
 
 @pytest.mark.parametrize("spoiled", ["a.npz", "b.json"])
@@ -406,6 +430,7 @@ while True:
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
 def test_a_writer_killed_at_any_moment_leaves_no_mixed_pair(tmp_path, end):
+    """Ctrl-C leaves nothing else either."""
     words = [sys.executable, "-c", BEGIN + WRITES_FOR_EVER, str(tmp_path)]
     for turn in range(3):
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
@@ -421,6 +446,7 @@ def test_a_writer_killed_at_any_moment_leaves_no_mixed_pair(tmp_path, end):
 
 
 def test_readers_see_the_old_file_or_the_new_one(tmp_path):
+    """Never a part of it, and never none."""
     path = tmp_path / "file"
     write_whole(path, b"0" * 100_000)
     done = threading.Event()

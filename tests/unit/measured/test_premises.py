@@ -164,7 +164,7 @@ def test_a_simulation_states_its_medium():
     ],
 )
 def test_what_is_wrong_is_named(stated, comments, options, message):
-    refused(message, premises, stated(comments), options=options)
+    refused(message, lambda: premises(stated(comments), options=options))
 
 
 PHANTOM = DATA / "phantom.csv"  # alpha .95, l 1.1 mm

@@ -186,7 +186,11 @@ BAD = {
         GOOD.replace("0.2", cell): f":3: column value: expected a finite number, got '{cell}'"
         for cell in ("1e400", "zero", "nan", "", "inf", "1_0")
     },
-    GOOD.replace("0.2,0.01", "0.2,0"): r":3: column sigma: expected a standard error > 0, got 0",
+    **{
+        GOOD.replace("0.2,0.01", f"0.2,{error}"): f":3: column sigma: expected a standard error > 0, got {error}"
+        for error in ("0", "-0.01")
+    },
+    "r,value1,value2,value3\n1,-1,0,1\n2,-1,0,1\n3,-1,0,1\n4,-1,0,1\n": r": expected a value above 0, got none",
     GOOD.replace("\n2,", "\n0.5,"): r":3: column r: expected r to rise above 1, got 0.5",
     GOOD.replace("\n2,", "\n1,"): r":3: column r: expected r to rise above 1, got 1",
     GOOD.replace("\n1,", "\n0,"): r":2: column r: expected a radius > 0, since the profile is infinite at 0, got 0",

@@ -109,6 +109,7 @@ def test_numbers_of_bins_must_be_whole(number):
         ([0, 1, 1], "must rise, got 1 after 1"),
         ([0, 2, 1], "must rise, got 1 after 2"),
         ([0, np.inf], "must be finite edges, got inf among them"),
+        ([0, np.nan], "must be finite edges, got nan among them"),
         ([0], "must be a list of 2 to 65537 edges, got an array of shape"),
         ([[0, 1]], "must be a list of 2 to 65537 edges, got an array of shape"),
         (np.arange(65538), "must be a list of 2 to 65537 edges, got an array of shape"),

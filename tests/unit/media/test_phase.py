@@ -129,6 +129,15 @@ def test_backwards_is_forwards_seen_from_behind(g):
     assert [backwards.moment(order) for order in range(3)] == [1, -g, g * g]
 
 
+def test_without_g_it_is_isotropic():
+    isotropic, limit = Isotropic(), HenyeyGreenstein(0.0)
+    for one, other in zip(isotropic.deflection(ENDS), limit.deflection(ENDS), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(isotropic.pdf(ENDS), limit.pdf(ENDS))
+    np.testing.assert_allclose(isotropic.invert(ENDS), limit.invert(ENDS), atol=1e-15)
+    assert [isotropic.moment(order) for order in range(4)] == [limit.moment(order) for order in range(4)]
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_towards_the_limits_light_goes_straight_on_or_straight_back(sign):
     """1 - |g| = 1e-6: the cosine differs from +-1 by its square over that of a typical v, nowhere by its digits."""

@@ -132,6 +132,7 @@ def test_last_layer_may_be_endless_and_any_clear_glass(tmp_path):
         (7, "1001", "the number of layers, a whole number from 1 to 1000", "'1001'"),
         (7, "3", "5 values, n, mu_a, mu_s, g and thickness of layer 3 of 3", "1: '1.2'"),
         (3, "my file.mco A", r"A or B after the name \(a name holds no spaces\)", "'file.mco'"),
+        (3, "a band.mco", r"A or B after the name .*", "'band.mco'"),
         (3, "out.mco x", r"A or B after the name .*", "'x'"),
         (3, "out.mco A 7", "the name of an output file, and A or B alone", "3 values"),
         (4, "1000 5", "the number of photons alone", "2 values"),

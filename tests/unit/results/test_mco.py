@@ -121,6 +121,20 @@ def by_lines(path: Path) -> dict:
     return found
 
 
+def by_keywords(path: Path) -> dict:
+    """The same found as CONV does: data lines are those that are neither blank nor begin with #, keywords begin one."""
+    lines = [line for line in path.read_text().split("\n") if line.strip() and not line.lstrip().startswith("#")]
+    at = lines.index(next(line for line in lines if line.startswith("InParm")))
+    nz, nr, na = map(int, lines[at + 4].split()[:3])
+    sizes = {"A_l": int(lines[at + 5].split()[0]), "A_z": nz, "Rd_r": nr, "Rd_a": na, "Tt_r": nr, "Tt_a": na}
+    sizes |= {"A_rz": nr * nz, "Rd_ra": nr * na, "Tt_ra": nr * na}
+    found = {}
+    for key, size in sizes.items():
+        at = next(place for place in range(at, len(lines)) if lines[place].startswith(key)) + 1
+        found[key] = np.array(" ".join(lines[at:]).split()[:size], float)
+    return found
+
+
 def v1(tally: Tally) -> dict:
     """V1's sums and scales (Sum2DRd, Sum2DA, ScaleRdTt, ScaleA of mcmlio.c), bin by bin, from the same weights."""
     grid, sums = tally.grid, tally.deposits
@@ -156,6 +170,8 @@ def test_v1_readers_find_v1_numbers(tally, tmp_path):
     found, expected = by_lines(path), v1(tally)
     for name, numbers in expected.items():
         np.testing.assert_allclose(found[name], numbers, rtol=ROUNDING.get(name, ROUNDING["table"]), err_msg=name)
+    for name, numbers in by_keywords(path).items():
+        np.testing.assert_array_equal(numbers, np.ravel(found[name]), err_msg=name)
     totals = (tally.specular_reflectance, tally.diffuse_reflectance, tally.absorbed, tally.transmittance)
     np.testing.assert_allclose(found["RAT"], [float(one) for one in totals], rtol=1e-5)
     assert found["photons"] == 1000

@@ -1,7 +1,9 @@
-"""Runs that are killed, and go on: the bits of a run that nothing happened to."""
+"""Runs that are killed, or meet a full disk, and go on: the bits of a run that nothing happened to."""
 
 import contextlib
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +12,7 @@ import time
 import numpy as np
 import pytest
 
+KILLS = 4
 BATCHES = {"orders": 6, "layers": 12}
 # It prints the digest of all numbers found.
 CHILD = f"""
@@ -67,17 +70,21 @@ def kept(store, name="*"):
     return len(list(store.glob(f"{name}/batch-*.npz")))
 
 
+def wait_for(batches, store, child):
+    deadline = time.monotonic() + 60
+    while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.002)
+
+
 @pytest.mark.slow
 def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     whole = finish(start())
     store = tmp_path / "store"
     random = np.random.default_rng(2)
     hit = set()
-    for more in random.integers(1, 4, size=4):
+    for more in random.integers(1, 4, size=KILLS):
         child = start(str(store))
-        batches, deadline = kept(store) + more, time.monotonic() + 60
-        while kept(store) < batches and child.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.002)
+        wait_for(kept(store) + more, store, child)
         time.sleep(random.uniform(0, 0.03))  # in the middle of a batch, or of writing one
         child.kill()
         child.communicate()
@@ -85,3 +92,83 @@ def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
         hit |= {next(name for name, batches in BATCHES.items() if kept(store, name) < batches)}
     assert hit == set(BATCHES), "else only one of the two was killed"
     assert finish(start(str(store))) == whole
+
+
+# Batches of rising size, so that both a small disk and a small limit for a file are met in the middle.
+FULL = """
+import resource, signal, subprocess, sys
+from dataclasses import dataclass
+from pathlib import Path
+import numpy as np
+from mcml_sim import StoreError
+from mcml_sim.runs.batches import run_batches
+from mcml_sim.runs.store import Store
+
+@dataclass
+class Bytes:
+    started: int
+    random: np.ndarray
+    def __add__(self, other):
+        return Bytes(self.started + other.started, self.random + other.random[:1])
+    def arrays(self):
+        return {"started": np.array(self.started), "random": self.random}
+    @classmethod
+    def read(cls, arrays):
+        return cls(int(arrays["started"]), arrays["random"])
+
+traced = []
+def trace(batch, photons):
+    traced.append(batch)
+    return Bytes(photons, np.random.default_rng(batch).normal(size=1 + 300 * batch))
+
+folder, how = sys.argv[1:]
+disk = ["mount", "-t", "tmpfs", "-o"]
+if how == "small disk":
+    subprocess.run([*disk, "size=80k", "tmpfs", folder], check=True)
+else:
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (16384, resource.RLIM_INFINITY))
+store = Store(Path(folder), {}, Bytes.read)
+try:
+    run_batches(trace, 1, 20, workers=1, store=store)
+except StoreError as error:
+    print(error)
+kept = sorted(path.name for path in Path(folder).iterdir())
+print(traced, len(kept))
+if how == "small disk":
+    subprocess.run([*disk, "remount,size=8m", "tmpfs", folder], check=True)
+else:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+traced.clear()
+again = run_batches(trace, 1, 20, workers=1, store=store)
+first = again.random.tobytes() == run_batches(trace, 1, 20).random.tobytes()
+print(traced[:20 - len(kept) + 1], first)
+"""
+
+
+def may_mount():
+    """True where a user may have a file system of his own, in a name space that ends with the process."""
+    trial = ["unshare", "-Urm", "mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", "/tmp"]
+    return shutil.which("unshare") is not None and subprocess.run(trial, capture_output=True).returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("how", "reason"), [("small disk", "No space left on device"), ("small files", "File too large")]
+)
+def test_a_full_disk_is_named_and_the_run_goes_on_when_there_is_room(tmp_path, how, reason):
+    inside = []
+    if how == "small disk":
+        if not may_mount():
+            pytest.skip("this machine lets no user mount a file system; 'small files' meets the same error")
+        inside = ["unshare", "-Urm"]
+    words = [*inside, sys.executable, "-c", FULL, str(tmp_path), how]
+    child = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert child.returncode == 0, child.stderr
+    error, before, after = child.stdout.splitlines()
+    named = rf"cannot write {tmp_path}/batch-0+[0-9]+.npz: {reason}; what the store holds is whole, .*"
+    assert re.fullmatch(named, error)
+    failed = int(before.split("]")[0].split(",")[-1])
+    assert 3 < failed < 19
+    assert before == f"{list(range(failed + 1))} {failed + 1}", "the manifest and the batches before, nothing half-done"
+    assert after == f"{list(range(failed, 20))} True"
