@@ -56,6 +56,7 @@ def simulate(
     """
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
+    require_resolved(grid)
     require_illumination(illumination)
     number, key = _checked_run(grid, photons, seed)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
@@ -127,9 +128,17 @@ def simulate_orders(
 ) -> Orders:
     """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
-    `grid` has rings, their edges in mean free paths [mfp]. `setting` is the light and the surface; Setting() and its
-    diffuse twin are the fastest. The other arguments, errors and Ctrl-C are as for `simulate`; a batch in the `store`
-    has 2^20 photons.
+    Args:
+        grid: rings, edges in mean free paths [mfp].
+        photons: how many to start, 1 to 1e13.
+        seed: whole number >= 0; equal seeds start with equal photons.
+        setting: the light and the surface; Setting() and its diffuse twin are the fastest.
+        store: folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes.
+        workers: threads, by default one a core; the result does not depend on it.
+        progress: show a bar on stderr; by default only if that is a terminal.
+        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
+
+    Errors and Ctrl-C are as for `simulate`.
     """
     number, key = _checked_run(grid, photons, seed, setting)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)

@@ -70,9 +70,7 @@ def follow(enter: Enter, turn: Turn[Results], results: Results, photons: Array, 
     pool, _, results = lax.while_loop(lambda state: state[1] < photons, step, first)
     for smaller in (*(lanes // shrink for shrink in DRAIN_POOLS), 0):
         pool, results = _drain(turn, pool, results, smaller)
-        idle = _idle(enter, 1)
-        (flying,) = jnp.nonzero(~pool.ended, size=smaller, fill_value=len(pool.place))
-        pool = jax.tree.map(lambda leaf, none, to=flying: jnp.append(leaf, none)[to], pool, idle)
+        pool = _shrunk(pool, _idle(enter, 1), smaller)
     return results
 
 
@@ -95,6 +93,12 @@ def _idle(enter: Enter, lanes: int) -> Lanes:
     empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     place, photon = jnp.full(lanes, -1j, jnp.complex64), jnp.full(lanes, BATCH_PHOTONS, jnp.uint32)
     return empty._replace(place=place, photon=photon)
+
+
+def _shrunk(pool: Lanes, idle: Lanes, lanes: int) -> Lanes:
+    """Return the photons in flight, moved to fewer lanes."""
+    (places,) = jnp.nonzero(~pool.ended, size=lanes, fill_value=len(pool.place))
+    return jax.tree.map(lambda leaf, none: jnp.append(leaf, none)[places], pool, idle)
 
 
 def places(lanes: Lanes, photons: int) -> Array:

@@ -146,13 +146,8 @@ def fit(
     given = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
     where = premises(measured, law, given, {name: f"--{name}" for name in given})
     held = _held(fix or [], measured.unit)
-    known: Known | None = None
-    if total is not None:
-        accepted, hint = "a reflectance in (0, 1) with its error, such as 0.52+-0.01", percent(total)
-        if hint or (known := _known("--total", total)).error == 0 or known.value >= 1:
-            raise refused("--total", accepted, total, hint)
-    times = None if scale == FREE else _known("--scale", scale)
-    factor = times.value if times is not None and not times.error else times
+    known = None if total is None else _total(total)
+    factor = _scale(scale)
     oblique_centre = None if oblique is None else _oblique(oblique, measured.unit)
     if layers is not None:
         options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
@@ -282,6 +277,24 @@ def _held(fix: list[str], unit: str) -> dict[str, float]:
             raise refused(option, "a number in (0, 1)", value, hint)
         held[name] = length(option, value, unit) if name == "l" else _number(option, value)
     return held
+
+
+def _scale(text: str) -> float | Known | None:
+    """Return the value of `--scale`: None if free, a number, or one with its error."""
+    if text == FREE:
+        return None
+    known = _known("--scale", text)
+    return known if known.error else known.value
+
+
+def _total(text: str) -> Known:
+    accepted = "a reflectance in (0, 1) with its error, such as 0.52+-0.01"
+    if hint := percent(text):
+        raise refused("--total", accepted, text, hint)
+    known = _known("--total", text)
+    if known.error == 0 or known.value >= 1:
+        raise refused("--total", accepted, text)
+    return known
 
 
 def _oblique(text: str, unit: str) -> Oblique:

@@ -169,17 +169,18 @@ class Forand(PhaseForm):
         return 1 - jnp.sum(4 * x**3 * w * self.phase(constants).invert(1 - jnp.asarray(u)))
 
 
+def _terms(count: int) -> HenyeyTerms:
+    places = range(1, count + 1)
+    weights = tuple(f"w{i}" for i in places) if count > 1 else ()
+    words = ("one term", "two terms", "three terms", "four terms")[count - 1]
+    names = (*(f"g{i}" for i in places), *weights)
+    return HenyeyTerms(f"{count}-term{'s' * (count > 1)}", f"Henyey-Greenstein, {words}", names)
+
+
 FORMS: Mapping[str, PhaseForm] = {
     form.name: form
     for form in (
-        *(
-            HenyeyTerms(
-                f"{count}-{words.split()[1]}",
-                f"Henyey-Greenstein, {words}",
-                tuple(f"{letter}{i}" for letter in ("g" if count == 1 else "gw") for i in range(1, count + 1)),
-            )
-            for count, words in enumerate(("one term", "two terms", "three terms", "four terms"), start=1)
-        ),
+        *(_terms(count) for count in range(1, MOST_TERMS + 1)),
         HaltrinForm("haltrin", "Haltrin's two terms of one parameter", ("g",)),
         Forand("fournier-forand", "Fournier and Forand", ("n", "mu")),
     )

@@ -250,7 +250,7 @@ class RefractingHazard(TwoPartHazard):
     """`TwoPartHazard` under a refracting interface, where g = 0.
 
     With rho the share of cosine-weighted light from inside that the surface reflects back (`RefractingSurface`), the
-    shapes of light scattered again are those of
+    shapes of light scattered again are those of `TwoPartHazard` with
 
     m0 = m00 + m01 rho + m02 rho^2     m1 = m10                    m2 = m21 rho + m22 rho^2
     a0 = a00 + a01 rho                 a1 = a10 + a11 rho          a2 = a20 + a21 rho        a3 = a31 rho + a32 rho^2

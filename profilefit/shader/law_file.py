@@ -227,7 +227,7 @@ def _provenance(source: _Source) -> list[str]:
         lines.append(f"and every mean cosine g above {span[0]:g} up to {span[1]:g}")
     measured = content["quality"]["regenerated"] | content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
-    if worst := [f"{one.words} at most {np.max(measured[one.name]):.2g}" for one in known]:
+    if worst := [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]:
         lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
     if content.get("data_digest"):
         lines.append(f"sha256 of the data {content['data_digest']}")

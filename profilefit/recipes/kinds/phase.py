@@ -163,10 +163,10 @@ def _percent(share: float) -> str:
 def described(data: PhaseData) -> dict[str, Any]:
     """Return the table `data` of a record."""
     return {
-        **{key: getattr(data, key) for key in ("integral", "unit", "spans", "mean_cosine", "backscattered")},
         "source": Path(data.source).name,
         "rows": data.angles.size,
         "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
+        **{key: getattr(data, key) for key in ("integral", "unit", "spans", "mean_cosine", "backscattered")},
         "second": float(data.table.moment(2)),
         "regression": regression(data.backscattered),
     }
@@ -185,9 +185,15 @@ def content(data: PhaseData, fits: Sequence[PhaseFit], run: RecipeRun = USUAL) -
                 **{key: None if own is None else own[place] for key, own in each.errors.items()},
             }
         phases[each.form.name][how] = {
-            **{key: getattr(each, key) for key in ("result", "rms", "mean_cosine", "backscattered")},
-            **{key: getattr(each.best, key) for key in ("steps", "condition_number")},
-            **{"held": list(each.held), "bands": list(each.bands), "second": float(each.phase.moment(2))},
+            "held": list(each.held),
+            "result": each.result,
+            "steps": each.best.steps,
+            "condition_number": each.best.condition_number,
+            "rms": each.rms,
+            "bands": list(each.bands),
+            "mean_cosine": each.mean_cosine,
+            "backscattered": each.backscattered,
+            "second": float(each.phase.moment(2)),
         }
     return {
         "title": TITLE,

@@ -37,6 +37,7 @@ from PIL.ImageFile import ImageFile
 from PIL.PngImagePlugin import PngImageFile
 from PIL.TiffImagePlugin import BITSPERSAMPLE, PHOTOMETRIC_INTERPRETATION, SAMPLEFORMAT, TiffImageFile
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
@@ -52,7 +53,7 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.checks import is_number
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE, Material
-from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, at, words
+from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
 
 Floats = NDArray[np.float32]
 Three = tuple[float, float, float]
@@ -217,16 +218,19 @@ def _media(layers: tuple[LayerTable, ...]) -> tuple[Medium, Medium, Medium]:
     return red, green, blue
 
 
+def _stacked(layers: tuple[LayerTable, ...]) -> tuple[LayerTable, ...]:
+    _media(layers)
+    return layers
+
+
 class Layered(Declared):
     """File with tables [[layers]], from the surface down, and the unit of its lengths."""
 
     unit: Text = UNIT
-    layers: Annotated[tuple[LayerTable, ...], LISTED, BeforeValidator(_few)]
+    layers: Annotated[tuple[LayerTable, ...], LISTED, BeforeValidator(_few), AfterValidator(_stacked)]
 
     @model_validator(mode="after")
-    def _stacked(self) -> Self:
-        with at("layers"):
-            _media(self.layers)
+    def _in_millimetres(self) -> Self:
         for number, layer in enumerate(self.layers):
             if layer.material is not None and self.unit != UNIT:
                 accepted = f'left out unless unit = "{UNIT}", that of its coefficients'

@@ -10,6 +10,7 @@ counted once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,12 +38,19 @@ class Kernel:
 CROSSOVER = 0.6
 
 
-def split(kernel: Kernel, crossover: float) -> tuple[Kernel, Kernel]:
-    """Return Gaussians with sigma below a crossover [length], near, and the others, far; either may be empty."""
+class NearFar(NamedTuple):
+    """Parts of a kernel; their weights are those of the whole one."""
+
+    near: Kernel
+    far: Kernel
+
+
+def split(kernel: Kernel, crossover: float) -> NearFar:
+    """Return Gaussians with sigma below a crossover [length], and the others; either may be empty."""
     require(crossover >= 0, "crossover", "a length >= 0", crossover)
     is_near = np.sqrt(kernel.variances) < crossover
     near, far = (Kernel(kernel.variances[one], kernel.weights[one]) for one in (is_near, ~is_near))
-    return near, far
+    return NearFar(near, far)
 
 
 def crossover_of(texel: float, pixel: float, constant: float = CROSSOVER) -> float:

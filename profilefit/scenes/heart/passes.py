@@ -75,7 +75,7 @@ class Balanced(Technique):
         near, far = (gather_of(part, mfp) if part.variances.size else None for part in parts)
         seen = SCREEN if far is None else threshold  # no light is 0 times the screen's
         energies = np.array([np.broadcast_to(part.energy, 3) for part in parts])
-        return cls(near, far if threshold < ATLAS else None, energies, atlas, part, parts[1], seen)
+        return cls(near, far if threshold < ATLAS else None, energies, atlas, part, parts.far, seen)
 
     def before(self, stage: Unwraps) -> None:
         if self.kernel.variances.size and self.threshold > SCREEN:

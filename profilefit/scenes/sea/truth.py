@@ -95,8 +95,10 @@ class Rays:
                 raise InputError(f"x must span fewer than {MOST_SAMPLES} samples of spacing, got {count}")
             nodes = np.linspace(low - reach, high + reach, count)
             landing, stretch, _ = self.at(nodes)
-            enters = np.all(np.isfinite(stretch))
-            require(enters, "n", "one at which light enters everywhere, none is all reflected", self.n)
+            if not np.all(np.isfinite(stretch)):
+                raise InputError(
+                    f"n must be one at which light enters everywhere, none is all reflected, got {self.n:g}"
+                )
             shadow = float(np.ptp(self._height(nodes)) * np.tan(self.tilt))  # of the highest crest
             farthest = float(np.max(np.abs(landing - nodes))) + abs(shadow) + 8.0 * self._step
             if farthest <= reach:

@@ -149,7 +149,7 @@ class _Pass:
         self._triangle = full_screen(context, self._program)
         self._given = context.texture((WIDTH, ROWS), 4, dtype="f4")
         self._board = Board(context, (WIDTH, ROWS), results)
-        for held in (self._triangle, self._program, self._given, self._board):
+        for held in (self._board, self._given, self._program, self._triangle):  # the last of these is released first
             weakref.finalize(self, held.release).atexit = False  # then the context is gone, and all with it
 
     def __call__(self, *arguments: ArrayLike) -> list[Floats]:
