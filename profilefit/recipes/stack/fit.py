@@ -28,7 +28,7 @@ from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, least_squares
-from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.laws.rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes import catalogue

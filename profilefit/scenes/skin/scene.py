@@ -16,7 +16,7 @@ from mcml_sim.media.checks import require
 from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import SettingError
-from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.laws.rational import REFRACTING
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.recipes.declared import (
