@@ -5,16 +5,15 @@ from importlib import import_module
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
     from mcml_sim.media.phase.fournier_forand import FournierForand
-    from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein, Isotropic
     from mcml_sim.media.phase.kinds import as_table, from_table, settle
     from mcml_sim.media.phase.mixture import Mixture
-    from mcml_sim.media.phase.phase import Phase
+    from mcml_sim.media.phase.phase import HenyeyGreenstein, Isotropic, Phase
     from mcml_sim.media.phase.tabulated import Tabulated
 
 HOMES = {
     "FournierForand": "fournier_forand",
-    "HenyeyGreenstein": "henyey_greenstein",
-    "Isotropic": "henyey_greenstein",
+    "HenyeyGreenstein": "phase",
+    "Isotropic": "phase",
     "Mixture": "mixture",
     "Phase": "phase",
     "Tabulated": "tabulated",
