@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
 from profilefit.errors import InputError

@@ -9,8 +9,7 @@ import numpy as np
 
 from mcml_sim.errors import InputError
 from mcml_sim.media import phase as phases
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, require, require_index, shown
+from mcml_sim.media.arrays import Floats, is_number, require, require_index, shown
 
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
 

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact import single_scattering
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, checked_whole
+from mcml_sim.media.arrays import Floats, checked_range, checked_whole, scalar_or_array
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results import estimate

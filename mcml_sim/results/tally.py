@@ -25,8 +25,7 @@ from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
+from mcml_sim.media.arrays import MAX_PHOTONS, Floats, checked_whole, is_number, require, scalar_or_array, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
 from mcml_sim.media.phase import as_table, from_table

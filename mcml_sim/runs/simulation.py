@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
+from mcml_sim.media.arrays import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import SEARCHLIGHT, Setting, require_illumination

@@ -32,8 +32,7 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from mcml_sim.exact.compiled import filter_jit
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require_own_process
+from mcml_sim.media.arrays import Floats, require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
 from profilefit.fitting.solver import Solution

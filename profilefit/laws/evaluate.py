@@ -16,8 +16,7 @@ import numpy as np
 from mcml_sim.errors import InputError
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
+from mcml_sim.media.arrays import Floats, checked_numbers, require_one_shape, require_own_process
 
 # Numbers at a time: a length compiles nothing new, and at most three quarters of a block are filling.
 BLOCKS = (64, 256, 1024, 4096, 16384)

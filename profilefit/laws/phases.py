@@ -17,8 +17,7 @@ import numpy as np
 from jax import Array
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.arrays import Floats, is_number, shown
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Mixture, Phase
 
 LEAST_G = 0.30664  # at which the second term of Haltrin's form has h = 0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import shown
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
 from profilefit.laws import takes_g

@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import shown
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
 from mcml_sim.results.mci import quoted

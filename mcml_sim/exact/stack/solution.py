@@ -35,8 +35,7 @@ from mcml_sim.exact.stack import fluence, known
 from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, slowest, stack
 from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, require
+from mcml_sim.media.arrays import Floats, checked_range, require, scalar_or_array
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting, require_illumination
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import require, shown
+from mcml_sim.media.arrays import require, shown
 from mcml_sim.media.phase.fournier_forand import FournierForand
 from mcml_sim.media.phase.mixture import Mixture
 from mcml_sim.media.phase.phase import HenyeyGreenstein, Isotropic, Phase

@@ -12,8 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.arrays import is_number, namespace, require
 
 
 class Phase(ABC):

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import checked_whole
 from profilefit.recipes.declared import LISTED, Declared, words
 from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion

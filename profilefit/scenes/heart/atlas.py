@@ -23,8 +23,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements

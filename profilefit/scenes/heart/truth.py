@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require
+from mcml_sim.media.arrays import Floats, checked_numbers, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import finite
 

@@ -20,8 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.special import hankel1
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_range, checked_whole, is_number, require_one_shape, shown
+from mcml_sim.media.arrays import (
+    Floats,
+    checked_numbers,
+    checked_range,
+    checked_whole,
+    is_number,
+    require_one_shape,
+    shown,
+)
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.phases import haltrin as haltrin

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import Floats, checked_whole
 from mcml_sim.media.fresnel import fresnel
 from profilefit.scenes.sea.caustics import Caustics, Splat
 from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, is_number, require
+from mcml_sim.media.arrays import Floats, checked_whole, is_number, require
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
 from profilefit.scenes.stage.buffers import finite

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require, require_index
+from mcml_sim.media.arrays import Floats, checked_numbers, checked_whole, is_number, require, require_index
 from mcml_sim.media.fresnel import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS

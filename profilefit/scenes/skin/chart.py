@@ -7,7 +7,7 @@ from typing import TypeVar
 import moderngl
 import numpy as np
 
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.stage import Stage

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_range
+from mcml_sim.media.arrays import Floats, checked_range
 from profilefit.errors import InputError
 
 Singles = NDArray[np.float32]

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 
 Bytes = NDArray[np.uint8]
 

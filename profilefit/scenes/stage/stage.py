@@ -17,8 +17,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, require
+from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
 from profilefit.scenes.stage.pattern import Sampling

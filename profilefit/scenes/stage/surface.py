@@ -29,8 +29,7 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, Curves, CurveTable, cubic, exact_table

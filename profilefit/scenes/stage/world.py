@@ -12,8 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 
 Rgb = tuple[float, float, float]
