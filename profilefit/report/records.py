@@ -16,7 +16,7 @@ from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
-from profilefit.fitting.measures import MEASURES
+from profilefit.fitting.quality import MEASURES
 from profilefit.laws.base import Constants
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.recipe import Albedos
