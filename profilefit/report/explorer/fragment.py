@@ -30,8 +30,7 @@ from mcml_sim import Setting, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, MATERIALS
-from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import LoadedLaw, profile_laws
+from profilefit.recipes.catalogue import LoadedLaw, find, load, profile_laws
 from profilefit.recipes.record import Folder, Records
 from profilefit.report.drawing import inline
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
@@ -180,7 +179,7 @@ def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
     label = next((one.label for one in same if one.setting.n != named.setting.n), None)
     if label is None:
         return None
-    texts = [export(catalogue.find(label, records, n=n), records, "glsl-es", PREFIX) for n in INDICES]
+    texts = [export(find(label, records, n=n), records, "glsl-es", PREFIX) for n in INDICES]
     pieces = [re.split(WORDS, text) for text in texts]
     places = [at for at, words in enumerate(zip(*pieces, strict=True)) if len(set(words)) > 1]
     return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])
@@ -249,7 +248,7 @@ VARIABLES = {
 @styled
 def still() -> str:
     """Return the picture as SVG, by the shipped record: what it shows is the same in every report."""
-    law = catalogue.load(LAW, setting=SETTING)
+    law = load(LAW, setting=SETTING)
     figure = canvas(3.2)
     profile, cdf, edge = figure.subplots(1, 3)
     alpha, mfp = (np.array(one)[:, None] for one in (BY_NAME[MATERIAL].alpha, BY_NAME[MATERIAL].mfp))

@@ -38,7 +38,6 @@ from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import surface_judge
 from profilefit.scenes.stage.picture import RenderResult
-from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene
@@ -109,7 +108,7 @@ class MaterialTable(Declared):
         return Painted((a.reflectance, b.reflectance, c.reflectance), (a.mfp, b.mfp, c.mfp))
 
 
-class SkinTechnique(TechniqueTable):
+class SkinTechnique(request.TechniqueTable):
     """Table [technique]: samples of a law, the separable filter, or none."""
 
     kind: Annotated[str, OneOf(*KINDS)] = SAMPLED
@@ -126,7 +125,7 @@ class SkinTechnique(TechniqueTable):
         return self
 
 
-class SceneRequest(ViewRequest):
+class SceneRequest(request.ViewRequest):
     """Scene of skin that a file requests; `layers` and `choose` are read by `profilefit choose`."""
 
     scene: Annotated[str, OneOf("skin")] = "skin"
@@ -138,8 +137,8 @@ class SceneRequest(ViewRequest):
         SKIN
     )
     technique: SkinTechnique = SkinTechnique()
-    layers: OfChoose = None
-    choose: OfChoose = None
+    layers: request.OfChoose = None
+    choose: request.OfChoose = None
 
     @property
     def material(self) -> str | Painted:
