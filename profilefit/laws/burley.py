@@ -14,8 +14,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text
-from profilefit.laws.evaluate import evaluated
+from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text, evaluated
 from profilefit.laws.rational import Normalisation
 
 XIE = 2.5715

@@ -19,8 +19,7 @@ from mcml_sim.exact import single_scattering
 from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import SettingError
-from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text
-from profilefit.laws.evaluate import evaluated
+from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text, evaluated
 from profilefit.laws.rational import Normalisation
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)

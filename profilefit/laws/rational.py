@@ -15,8 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from profilefit.laws.base import CLOSED, AlbedoLaw, Entry, Range, Text
-from profilefit.laws.evaluate import evaluated
+from profilefit.laws.base import CLOSED, AlbedoLaw, Entry, Range, Text, evaluated
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
