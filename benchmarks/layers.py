@@ -24,7 +24,7 @@ from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import shared_gaussians

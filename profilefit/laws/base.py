@@ -299,6 +299,24 @@ class AlbedoLaw(Constants):
         return EVERYWHERE
 
 
+class Normalisation(AlbedoLaw):
+    """A map that profile laws are scaled to their reflectance with."""
+
+    @property
+    @abc.abstractmethod
+    def entered(self) -> float:
+        """The share of the light that enters [-], which a white half space gives back."""
+
+    @property
+    def reflectances(self) -> Range:
+        """Range of reflectances: up to what the surface lets out of a white semi-infinite medium."""
+        return Range(0.0, self.entered)
+
+    @abc.abstractmethod
+    def albedo_over_reflectance(self, alpha) -> Array:
+        """Return alpha / A [-], finite at alpha = 0 too."""
+
+
 class ProfileLaw(Constants):
     """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy.
 

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from profilefit.laws.base import CLOSED, AlbedoLaw, Entry, Range, Text, evaluated
+from profilefit.laws.base import CLOSED, Entry, Normalisation, Range, Text, evaluated
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
@@ -24,24 +24,6 @@ STEPS = 6  # of Newton's method in the inverse, which starts right to a hundredt
 COUNTS = {"c": 5, "d": 6, "f": 2}  # constants of each at g = 0, coefficients of powers of q
 TEXT = Text("refracting_rational", (), prefix="rational")
 ENTRY = Entry("rational", "rational map", is_map=True, records=("albedo-rational",), own=True, text=TEXT)
-
-
-class Normalisation(AlbedoLaw):
-    """A map that profile laws are scaled to their reflectance with."""
-
-    @property
-    @abc.abstractmethod
-    def entered(self) -> float:
-        """The share of the light that enters [-], which a white half space gives back."""
-
-    @property
-    def reflectances(self) -> Range:
-        """Range of reflectances: up to what the surface lets out of a white semi-infinite medium."""
-        return Range(0.0, self.entered)
-
-    @abc.abstractmethod
-    def albedo_over_reflectance(self, alpha) -> Array:
-        """Return alpha / A [-], finite at alpha = 0 too."""
 
 
 class Rational(Normalisation):

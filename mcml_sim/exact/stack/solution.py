@@ -34,9 +34,8 @@ from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import fluence, known
 from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, slowest, stack
-from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats, checked_range, require, scalar_or_array
-from mcml_sim.media.medium import Layer, Medium
+from mcml_sim.media.medium import Layer, Medium, specular_reflectance
 from mcml_sim.media.setting import Setting, require_illumination
 
 MAX_LAYERS = 20
@@ -199,7 +198,7 @@ def _shares(medium: Medium, illumination: str, rule: Nodes) -> tuple[float, floa
 def _specular(medium: Medium, illumination: str) -> float:
     """Return the specular light as `mcml_sim.simulate` counts it: of a single pane of clear glass, all of it."""
     if illumination == "searchlight":
-        return fresnel.specular_reflectance(medium)
+        return specular_reflectance(medium)
     return 1 - entered(Setting(illumination, n=medium.layers[0].n / medium.n_above))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
 from profilefit.recipes.declared import Declared, OneOf, Refused, Tolerance

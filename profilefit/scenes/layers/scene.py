@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue

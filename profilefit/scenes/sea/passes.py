@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.media.arrays import Floats, checked_whole
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.scenes.sea.caustics import Caustics, Splat
 from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways
 from profilefit.scenes.sea.haze import table as fade_table

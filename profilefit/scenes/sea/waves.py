@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats, checked_numbers, checked_whole, is_number, require, require_index
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS
 from profilefit.scenes.stage.buffers import finite

@@ -13,7 +13,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from mcml_sim import Setting
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.arrays import require
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import SettingError
 from profilefit.laws.rational import REFRACTING
