@@ -34,8 +34,7 @@ from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
-from profilefit.scenes.stage.judge import EXPOSURE
-from profilefit.scenes.stage.picture import to_srgb
+from profilefit.scenes.stage.judge import EXPOSURE, to_srgb
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part

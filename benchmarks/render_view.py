@@ -19,9 +19,8 @@ from profilefit.scenes.stage import surface
 from profilefit.scenes.stage.buffers import Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import EXPOSURE, Judge
-from profilefit.scenes.stage.picture import UNKNOWN, TruthError
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import exitance_of, own_error
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
 from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]

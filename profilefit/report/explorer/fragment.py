@@ -35,7 +35,7 @@ from profilefit.recipes.record import Folder, Records
 from profilefit.report.drawing import inline
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
 from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
-from profilefit.scenes.stage.picture import srgb_codes
+from profilefit.scenes.stage.judge import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.shader.emit import text_beside
 from profilefit.shader.law_file import export

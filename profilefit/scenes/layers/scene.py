@@ -26,8 +26,7 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
-from profilefit.scenes.stage.judge import Judge, surface_judge
-from profilefit.scenes.stage.picture import RenderResult
+from profilefit.scenes.stage.judge import Judge, RenderResult, surface_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb

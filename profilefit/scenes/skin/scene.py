@@ -36,8 +36,7 @@ from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, t
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.judge import surface_judge
-from profilefit.scenes.stage.picture import RenderResult
+from profilefit.scenes.stage.judge import RenderResult, surface_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene

@@ -10,9 +10,8 @@ from pydantic import AfterValidator, Field, model_validator
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
 from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.judge import TURNS, Judge, points
+from profilefit.scenes.stage.judge import TURNS, Judge, RenderResult, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
-from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import Camera, Light, Rgb, Scene, unit

@@ -28,7 +28,7 @@ from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.scene import SeaRender, reference_render
 from profilefit.scenes.sea.truth import caustic_photons, misfit
 from profilefit.scenes.sea.waves import Waves, random_sea
-from profilefit.scenes.stage.picture import ChartPoint
+from profilefit.scenes.stage.judge import ChartPoint
 from profilefit.shader.context import opened, renderer
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track, silent
