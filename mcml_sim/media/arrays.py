@@ -89,6 +89,17 @@ def checked_range(name: str, value: object, accepted: str, low: float, high: flo
     return numbers
 
 
+def checked_finite(name: str, value: object, accepted: str = "finite") -> Floats:
+    """Return numbers as `checked_numbers` does; InputError on the first that is not finite."""
+    return checked_range(name, value, accepted, -sys.float_info.max, sys.float_info.max)
+
+
+def require_all(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], accepted: str) -> None:
+    """Raise InputError where values are not good, with the first of those."""
+    if not np.all(good):
+        raise InputError(f"{name} must be {accepted}, got {values[~good].flat[0]:g}")
+
+
 def require_one_shape(**arrays: Any) -> None:
     """Raise InputError unless the arguments broadcast to one shape."""
     try:

@@ -28,13 +28,12 @@ from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
-from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import Judge, RenderResult
 from profilefit.scenes.stage.request import MOST_PIXELS, TechniqueTable, Viewpoint, ViewRequest, draw_lit, rendered
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import TruthError, evenly, world
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
-from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
+from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it

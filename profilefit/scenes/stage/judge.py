@@ -12,13 +12,12 @@ from scipy.ndimage import uniform_filter
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats, require
-from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
 from profilefit.scenes.stage.technique import NamedTechnique
-from profilefit.scenes.stage.world import Scene
+from profilefit.scenes.stage.world import INSIDE, Scene
 
 Bytes = NDArray[np.uint8]
 TURNS = 5

@@ -31,9 +31,8 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, Curves, CurveTable, cubic, exact_table
-from profilefit.scenes.stage.world import Camera
+from profilefit.scenes.stage.world import INSIDE, Buffers, Camera
 
 FORWARD = np.array([0.0, 0.0, -1.0])
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
