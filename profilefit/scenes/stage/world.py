@@ -153,8 +153,7 @@ class Buffers:
     roughness: Singles | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.pixel < np.inf:
-            raise InputError(f"pixel must be a length > 0 [mm], got {self.pixel!r}")
+        require(0 < self.pixel < np.inf, "pixel", "a length > 0 [mm]", self.pixel)
         rows, columns = np.shape(self.mask)[:2]
         given = {name: array for name in VECTORS + NUMBERS if (array := getattr(self, name)) is not None}
         for name, array in given.items():
