@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.checks import checked_whole, is_number, shown
+from mcml_sim.media.arrays import checked_whole, is_number, shown
 from profilefit.errors import InputError
 from profilefit.scenes.fur.truth import Patch, strand_count
 

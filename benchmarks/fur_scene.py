@@ -16,7 +16,7 @@ from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WAYS
-from profilefit.scenes.stage.picture import srgb_codes, to_srgb
+from profilefit.scenes.stage.judge import srgb_codes, to_srgb
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
 from profilefit.studies.tradeoff import scenes as tradeoff

@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from benchmarks import harmonics
 from mcml_sim.exact.special_functions import panels
-from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.medium import fresnel
 
 Complexes = NDArray[np.complex128]
 FADES = 0.5  # of the degree: where moments begin to fade
@@ -90,7 +90,7 @@ def directions(n: float, degree: int) -> Directions:
     t, weight = np.polynomial.legendre.leggauss(OUTSIDE)
     outside, count = 0.5 * (t + 1.0), AROUND + degree
     mu, sine = np.sqrt(1.0 - (1.0 - outside**2) / n**2), np.sqrt(1.0 - outside**2) / n
-    passed = (1.0 - fresnel.fresnel(n, 1.0, mu)[0]) * outside / n**2 * 0.5 * weight  # mu T dmu
+    passed = (1.0 - fresnel(n, 1.0, mu)[0]) * outside / n**2 * 0.5 * weight  # mu T dmu
     phi = np.tile(np.pi * (np.arange(count) + 0.5) / count, OUTSIDE)
     mu, sine, passed = (np.repeat(part, count) for part in (mu, sine, passed * 2.0 * np.pi / count))
     waves = harmonics.harmonics(degree, mu, phi).reshape(mu.size, -1)

@@ -32,10 +32,9 @@ from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.heart import chart, scene
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
-from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.judge import ChartPoint
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.picture import ChartPoint
-from profilefit.scenes.stage.world import unit
+from profilefit.scenes.stage.world import INSIDE, unit
 from profilefit.shader import opened, renderer
 from profilefit.studies.choose.scenes import AtlasNeed
 

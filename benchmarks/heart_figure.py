@@ -11,8 +11,7 @@ from matplotlib import image
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.heart import chart, scene
-from profilefit.scenes.stage.judge import EXPOSURE
-from profilefit.scenes.stage.picture import ChartPoint, to_srgb
+from profilefit.scenes.stage.judge import EXPOSURE, ChartPoint, to_srgb
 from profilefit.shader import opened
 
 COLOURS = {"split": BLUE, "texture": VERMILION, "screen": GREEN, "none": GREY}

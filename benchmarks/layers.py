@@ -24,7 +24,7 @@ from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import shared_gaussians
@@ -34,8 +34,7 @@ from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
-from profilefit.scenes.stage.judge import EXPOSURE
-from profilefit.scenes.stage.picture import to_srgb
+from profilefit.scenes.stage.judge import EXPOSURE, to_srgb
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part

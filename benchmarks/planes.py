@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import Buffers
+from profilefit.scenes.stage.world import Buffers
 
 
 def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:

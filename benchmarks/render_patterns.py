@@ -13,11 +13,11 @@ import numpy as np
 import profilefit
 from benchmarks.table import show
 from profilefit.scenes.skin.scene import FACE, head_scene
-from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Gather
+from profilefit.scenes.stage.world import INSIDE
 from profilefit.shader.context import open_context
 
 SCENE = head_scene(camera=replace(FACE, target=(14.0, 24.0, 50.0), height=60.0))  # as `render_view` has it

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from mcml_sim import Setting
 from profilefit.scenes.skin.scene import FACE, Head, head_scene
 from profilefit.scenes.stage import surface
-from profilefit.scenes.stage.buffers import Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import EXPOSURE, Judge
-from profilefit.scenes.stage.picture import UNKNOWN, TruthError
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import exitance_of, own_error
-from profilefit.scenes.stage.world import Rgb
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
+from profilefit.scenes.stage.world import Buffers, Rgb
 
 Floats = NDArray[np.float64]
 # Brow, nose, its shadow, freckles and the band before it: 60 mm of the head, so that of 192 rows one shows 0.29 mm, and

@@ -11,7 +11,7 @@ from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE
 from profilefit.scenes.sea.scene import SeaRender
-from profilefit.scenes.stage.picture import to_srgb
+from profilefit.scenes.stage.judge import to_srgb
 from profilefit.studies.tradeoff.points import Panel
 
 COLOURS = {BROADENED: BLUE, SCALED: GREEN, SINGLE: VERMILION}

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import correlate1d
 
-from mcml_sim.media.checks import checked_numbers
+from mcml_sim.media.arrays import checked_numbers
 from profilefit.errors import InputError
 
 Floats = NDArray[np.float64]

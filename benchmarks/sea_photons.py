@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, shown
+from mcml_sim.media.arrays import checked_numbers, checked_whole, is_number, shown
 from mcml_sim.media.phase import Phase
 from mcml_sim.results.estimate import Estimate
 from profilefit.errors import InputError

@@ -14,7 +14,7 @@ import numpy as np
 from sphinx.application import Sphinx
 
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Text
 from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, all_profiles

@@ -112,7 +112,7 @@ def run(
     from rich.console import Console
 
     from mcml_sim.cli.screen import print_json
-    from mcml_sim.media.checks import MAX_PHOTONS, checked_workers
+    from mcml_sim.media.arrays import MAX_PHOTONS, checked_workers
     from mcml_sim.results.mci import read_mci
     from mcml_sim.results.tally import Precision
     from mcml_sim.runs import input_runs
@@ -149,7 +149,7 @@ def run(
 
 def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
     """Return a whole number as people write them, 1e6 included."""
-    from mcml_sim.media.checks import checked_whole
+    from mcml_sim.media.arrays import checked_whole
 
     number: object = text
     for read in (int, float):

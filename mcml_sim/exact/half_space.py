@@ -16,8 +16,7 @@ from mcml_sim.exact import by_albedo, forwards
 from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, radius_within, surface, total
 from mcml_sim.exact.special_functions import squared_decay_rate
 from mcml_sim.exact.transform import STANDARD, Transform
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, require_one_shape, require_own_process
+from mcml_sim.media.arrays import Floats, checked_range, require_one_shape, require_own_process, scalar_or_array
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, SEARCHLIGHT, Setting, is_traced
 
 Numbers = ArrayLike | jax.Array

@@ -29,9 +29,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
+from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import Phase
 from mcml_sim.media.setting import SEARCHLIGHT, Setting
 
@@ -149,7 +149,7 @@ def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float
 
 def _passes(mu: Floats, n: float) -> Floats:
     """Return the share of light that the surface lets out [-], at a cosine `mu` to the normal inside."""
-    return 1 - fresnel.fresnel(n, 1.0, mu)[0]
+    return 1 - fresnel(n, 1.0, mu)[0]
 
 
 def _unit_nodes() -> tuple[Floats, Floats, Floats]:

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.arrays import Floats, is_number, require
 
 MAX_BINS = 65_536  # along one axis
 # Float32 places are 1.2e-7 of themselves apart; this much of its photons (1 %) a bin may gain or lose by that.

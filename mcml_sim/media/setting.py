@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import jax
+
 from mcml_sim.media import phase as phases
-from mcml_sim.media.checks import is_number, require, require_index
+from mcml_sim.media.arrays import is_number, require, require_index
 
 ILLUMINATIONS = ("searchlight", "diffuse")
 FORWARD_N, FORWARD_G = (1.33, 1.45), 0.95
@@ -90,8 +91,7 @@ def require_illumination(name: object) -> None:
 
 def is_traced(n: object) -> bool:
     """Return whether jax may differentiate by an index."""
-    jax = sys.modules.get("jax")  # half a second to import, for those who only name a setting
-    return jax is not None and isinstance(n, jax.Array) and n.shape == ()
+    return isinstance(n, jax.Array) and n.shape == ()
 
 
 SEARCHLIGHT = Setting()

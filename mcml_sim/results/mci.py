@@ -58,7 +58,7 @@ from typing import NamedTuple, TypeVar
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.checks import MAX_PHOTONS
+from mcml_sim.media.arrays import MAX_PHOTONS
 from mcml_sim.media.grid import MAX_BINS, MAX_CELLS, Grid
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
 

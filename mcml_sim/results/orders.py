@@ -10,14 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact import single_scattering
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, checked_whole
+from mcml_sim.media.arrays import Floats, checked_range, checked_whole, scalar_or_array
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results import estimate
 from mcml_sim.results.estimate import Estimate
-from mcml_sim.tracing import order_bins
-from mcml_sim.tracing.order_bins import Counts, Ledger, OrderBins
+from mcml_sim.tracing.order_bins import Counts, Ledger, OrderBins, bins_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +120,7 @@ class Orders:
 
     @property
     def _bins(self) -> OrderBins:
-        return order_bins.bins_of(self.setting)
+        return bins_of(self.setting)
 
     @cached_property
     def _shares(self) -> Floats:

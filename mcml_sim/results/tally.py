@@ -24,11 +24,9 @@ from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
-from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, require, shown
+from mcml_sim.media.arrays import MAX_PHOTONS, Floats, checked_whole, is_number, require, scalar_or_array, shown
 from mcml_sim.media.grid import Grid, require_resolved
-from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
+from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium, specular_reflectance
 from mcml_sim.media.phase import as_table, from_table
 from mcml_sim.media.setting import Setting, require_illumination
 from mcml_sim.results.estimate import Estimate
@@ -244,7 +242,7 @@ class Tally:
         """Share of the light that enters [-]."""
         if self.illumination == "diffuse":
             return entered(Setting(self.illumination, n=self.medium.layers[0].n / self.medium.n_above))
-        return 1 - fresnel.specular_reflectance(self.medium)
+        return 1 - specular_reflectance(self.medium)
 
     def _by_radius(self, what: str) -> Estimate:
         return self._leaving(what, (1,)).mapped(lambda part: part[:-1]).scaled(1 / self.grid.r_areas)

@@ -15,7 +15,7 @@ from typing import Generic, cast
 from rich.progress import Progress, TaskID
 
 from mcml_sim.errors import ClusterError, InputError, Notice
-from mcml_sim.media.checks import checked_workers
+from mcml_sim.media.arrays import checked_workers
 from mcml_sim.runs.progress import bar
 from mcml_sim.runs.store import RESUMES, R, Store, cpu_class, maker
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
+from mcml_sim.media.arrays import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import SEARCHLIGHT, Setting, require_illumination
@@ -16,8 +16,6 @@ from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store, manifest, require_ours
 from mcml_sim.tracing import deposits, layered_batch, matched_batch, order_bins, orders_batch, pool
-from mcml_sim.tracing.deposits import Deposits
-from mcml_sim.tracing.order_bins import Counts
 
 BATCH_PHOTONS = {matched_batch: pool.BATCH_PHOTONS, layered_batch: layered_batch.BATCH_PHOTONS}
 
@@ -65,13 +63,13 @@ def simulate(
     if goal is not None:
         require_quantity(goal.quantity, grid)
 
-    def is_enough(sums: Deposits) -> bool:
+    def is_enough(sums: deposits.Deposits) -> bool:
         tally = Tally(medium, grid, sums.started, key, sums, illumination)
         return goal is not None and goal.is_reached(tally.quantity(goal.quantity))
 
     # The kernel of a matched half space traces beams only, and takes no light.
     light = {} if illumination == "searchlight" else {"illumination": illumination}
-    read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
+    read = partial(deposits.Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
     sums = run_batches(
         partial(kernel.trace_batch, medium, grid, key, **light),
         BATCH_PHOTONS[kernel],
@@ -197,7 +195,7 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting = SEARCHL
     return checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS), checked_whole("seed", seed, lowest=0)
 
 
-def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
+def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[order_bins.Counts]:
     bins = order_bins.bins_of(setting)
     made_by: dict[str, object] = {
         "kind": "orders",
@@ -212,4 +210,4 @@ def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Count
         "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
     }
     shape = grid.rings + 1, bins.last_orders.size
-    return Store(folder, made_by, partial(Counts.from_arrays, shape=shape))
+    return Store(folder, made_by, partial(order_bins.Counts.from_arrays, shape=shape))

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from mcml_sim.media import fresnel
+from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import Isotropic, Phase
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import pool, rng
@@ -173,7 +173,7 @@ def _scattered(
     outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.phase)
     path = rng.exponential(path_word)
     z = place.imag + path * down
-    reflectance, _ = fresnel.fresnel(where.n, jnp.float32(1), jnp.abs(down))
+    reflectance, _ = fresnel(where.n, jnp.float32(1), jnp.abs(down))
     above = z < 0
     leaves = above & (rng.uniform(surface_word) >= reflectance)
     path = jnp.where(leaves, -place.imag / down, path)
@@ -229,6 +229,6 @@ def entry_cosines(setting: Setting) -> NDArray[np.float32]:
     critical = np.sqrt(max(1 - 1 / setting.n**2, 0.0))
     mu = critical + (1 - critical) * np.linspace(0, 1, 2**17 + 1) ** 2
     middle = (mu[1:] + mu[:-1]) / 2
-    light = (1 - fresnel.fresnel(setting.n, 1.0, middle)[0]) * np.diff(mu**2)
+    light = (1 - fresnel(setting.n, 1.0, middle)[0]) * np.diff(mu**2)
     cdf = np.concatenate([[0.0], np.cumsum(light)])
     return np.interp(np.linspace(0, 1, STEPS + 1) ** 3 * cdf[-1], cdf, mu).astype(np.float32)

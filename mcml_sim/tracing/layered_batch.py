@@ -76,7 +76,7 @@ def trace_batch(
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 512 (`pool.lanes`).
 
     Photons enter with weight 1, below all specular reflection. Where they are a beam a first layer of clear glass is
-    behind them then: `fresnel.specular_reflectance` has counted what it sends back.
+    behind them then: `specular_reflectance` has counted what it sends back.
     """
     light = Setting(illumination, n=medium.layers[0].n / medium.n_above)
     diffuse = illumination == "diffuse"

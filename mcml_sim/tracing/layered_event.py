@@ -21,8 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim.media import fresnel
-from mcml_sim.media.medium import Medium
+from mcml_sim.media.medium import Medium, fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.tracing import pool, rng
 from mcml_sim.tracing.half_space_event import entering_cosine
@@ -268,7 +267,7 @@ def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits
     uz = lanes.down.imag * _renormalising(lanes, len(n) - 2)
     n1 = pick(n[1:-1], lanes.layer)
     n2 = jnp.where(uz > 0, pick(n[2:], lanes.layer), pick(n[:-2], lanes.layer))
-    reflectance, cosine = fresnel.fresnel(n1, n2, jnp.minimum(jnp.abs(uz), 1))
+    reflectance, cosine = fresnel(n1, n2, jnp.minimum(jnp.abs(uz), 1))
     passes = waits & (rng.uniform(toss) >= reflectance)
     uz_after = jnp.where(passes, jnp.copysign(cosine, uz), jnp.where(waits, -uz, uz))
     weight = jnp.abs(lanes.weight)

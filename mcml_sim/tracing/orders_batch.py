@@ -14,8 +14,6 @@ from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import SEARCHLIGHT, Setting
 from mcml_sim.tracing import half_space_event, order_bins, pool, rng
 from mcml_sim.tracing.deposits import rounded_up
-from mcml_sim.tracing.half_space_event import OrderLanes
-from mcml_sim.tracing.order_bins import Counts
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
 EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
@@ -30,7 +28,7 @@ class Ends(NamedTuple):
 
 def trace_batch(
     grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None, setting: Setting = SEARCHLIGHT
-) -> Counts:
+) -> order_bins.Counts:
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64 (`pool.lanes`).
 
     Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
@@ -49,7 +47,7 @@ def trace_batch(
     edges, count = jnp.asarray(rounded_up(grid.r_edges)), bins.last_orders.size + 2
     cells = np.asarray(histogram(ends, edges, jnp.asarray(columns), count)).astype(np.int64)
     rouletted, cut = (int(cells[:, column].sum()) for column in (-2, -1))
-    counts = Counts(cells[:, :-2], rouletted, cut, started=photons)
+    counts = order_bins.Counts(cells[:, :-2], rouletted, cut, started=photons)
     counts.require_closed()
     return counts
 
@@ -72,10 +70,10 @@ def trace(
     """
     lanes = lanes or pool.lanes()
 
-    def enter(photon: Array) -> OrderLanes:
+    def enter(photon: Array) -> half_space_event.OrderLanes:
         return half_space_event.enter(key, photon, stops, where, illumination)
 
-    def turn(flying: OrderLanes, ends: Array) -> tuple[OrderLanes, Array]:
+    def turn(flying: half_space_event.OrderLanes, ends: Array) -> tuple[half_space_event.OrderLanes, Array]:
         flying = half_space_event.fly(key, flying, events, where)
         return flying, recorded(ends, flying)
 
@@ -93,7 +91,7 @@ def as_ends(ends: Array) -> Ends:
     return Ends(ends.real, ends.imag.astype(jnp.int32))
 
 
-def recorded(ends: Array, lanes: OrderLanes) -> Array:
+def recorded(ends: Array, lanes: half_space_event.OrderLanes) -> Array:
     """Write the lanes that ended to their photons' places, rho + i order."""
     place = pool.places(lanes, BATCH_PHOTONS)
     order = jnp.where(lanes.stopped, -lanes.order, lanes.order)

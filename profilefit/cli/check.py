@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 
 BROKEN = 1  # exit status
 
@@ -40,9 +39,9 @@ def check(
         FloatFormat, typer.Option(help="float16 measures also what half precision costs, where it is offered.")
     ] = FloatFormat.SINGLE,
     out: Annotated[Path | None, typer.Option(help="Folder for check.json, what --json prints.")] = None,
-    fits: Fits = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
+    fits: options.Fits = None,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Judge shader source on this machine's GPU (a minute).
 
@@ -59,7 +58,7 @@ def check(
     from profilefit.report.tables import check_tables as tables
     from profilefit.shader.check.chosen import checked, chosen, scope
 
-    folder, in_half = records_folder(fits, quiet), precision is FloatFormat.HALF
+    folder, in_half = options.records_folder(fits, quiet), precision is FloatFormat.HALF
     those = chosen(names or [], constants, folder)
     if out is not None:
         require_apart(out, folder, "check.json")

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import Fits, records_folder
 
 
 def export(
@@ -44,7 +43,7 @@ def export(
         typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File to write; without it the source is printed.")] = None,
-    fits: Fits = None,
+    fits: options.Fits = None,
 ) -> None:
     """Write a law as one file for a shader or a program.
 
@@ -63,7 +62,7 @@ def export(
     from profilefit.scenes import SOURCES
     from profilefit.shader.law_file import export_subject
 
-    records_folder(fits)  # says where those are from that are not the shipped ones
+    options.records_folder(fits)  # says where those are from that are not the shipped ones
     given = {key: value for key, value in (("constants", constants), ("n", n), ("g", g)) if value is not None}
     text = export_subject(what, lang, name, fits, SOURCES, **given)
     if out is None:

@@ -315,7 +315,7 @@ def _oblique(text: str, unit: str) -> Oblique:
 
 def _known(option: str, text: str) -> Known:
     """Return a number > 0, with or without an error."""
-    from mcml_sim.media.checks import shown
+    from mcml_sim.media.arrays import shown
     from profilefit.measured import Known
     from profilefit.measured.data import LARGEST, SMALLEST
 

@@ -62,7 +62,7 @@ def require_left_out(context: typer.Context, names: Iterable[str], where: str) -
 
 def refused(option: str, accepted: str, got: object, hint: str = "") -> InputError:
     """Return the error of an option whose value is none that is accepted."""
-    from mcml_sim.media.checks import shown
+    from mcml_sim.media.arrays import shown
 
     return InputError(f"{option} must be {accepted}, got {shown(got)}{hint}")
 

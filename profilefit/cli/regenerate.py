@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import Quiet, refused
 from profilefit.errors import InputError
 from profilefit.recipes.folder import LOCAL, fits_folder
 
@@ -48,7 +47,7 @@ def regenerate(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print what was written as JSON: constants, errors, quality.")
     ] = False,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Simulate light, refit the laws, write the records.
 
@@ -77,9 +76,9 @@ def regenerate(
     from profilefit.report.tables.record_tables import outcome, reproduced, verdict
 
     if not 0 <= seed <= MAX_SEED:
-        raise refused("seed", f"a whole number in [0, {MAX_SEED}]", seed)
+        raise options.refused("seed", f"a whole number in [0, {MAX_SEED}]", seed)
     if photons is not None and photons < 1:
-        raise refused("photons", "a whole number >= 1", photons)
+        raise options.refused("photons", "a whole number >= 1", photons)
     said = notes(quiet)
     requests = requests_of(recipes or ())
     is_named = getattr(context.get_parameter_source("out"), "name", "") == "COMMANDLINE"

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import AsJson, Fits, Quiet, evidence_folder, records_folder
 from profilefit.errors import InputError, OtherRecords, ShaderError
 
 if TYPE_CHECKING:
@@ -53,9 +52,9 @@ def report(
             "./evidence if it is there, else the one beside the records."
         ),
     ] = None,
-    fits: Fits = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
+    fits: options.Fits = None,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Show constants, their errors, and how good they are.
 
@@ -84,7 +83,7 @@ def report(
     if len(given := [option for option, value in flags.items() if value]) > 1:
         accepted = f"one of {', '.join(flags)}, or --json with --quality or --claims"
         raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
-    folder = records_folder(fits, quiet)
+    folder = options.records_folder(fits, quiet)
     chosen = records_of(names or (), fits)
     groups = {kind: {} if names else kind.paths(folder) for kind in KINDS}
     for kind, name, path in chosen:
@@ -108,7 +107,7 @@ def report(
     elif html is not None:
         from profilefit.report.page.document import write_page
 
-        where = evidence_folder(folder, evidence)
+        where = options.evidence_folder(folder, evidence)
         write_page(html, folder, where, names, lambda parts: bar(parts, "writing", "parts"))
         said.print(f"wrote {html}, {html.stat().st_size / MEGABYTE:.1f} MB", markup=False)
     elif as_json:
@@ -119,12 +118,12 @@ def report(
         if quality:
             body["quality"] = law_tables.content(measured())
         if claims:
-            body["claims"] = read_claims(evidence_folder(folder, evidence))[1]
+            body["claims"] = read_claims(options.evidence_folder(folder, evidence))[1]
         print_json(body)
     elif quality:
         show(list(law_tables.every_law(measured(), bool(names))), screen())
     elif claims:
-        made, rows = read_claims(evidence_folder(folder, evidence))
+        made, rows = read_claims(options.evidence_folder(folder, evidence))
         show(claim_tables(rows), screen())
         if stale(made, folder):
             said.print("since then records or version have changed: `make claims` measures again", markup=False)

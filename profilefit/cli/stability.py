@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 
 BROKEN = 1  # exit status
 
@@ -29,9 +28,9 @@ def stability(
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Seconds: the paper's laws and one of this project.")] = False,
-    fits: Fits = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
+    fits: options.Fits = None,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find where everything fails, and why (two minutes).
 
@@ -50,7 +49,7 @@ def stability(
     from profilefit.report.tables import stability_tables as tables
     from profilefit.studies.stability.atlas import jobs, run
 
-    folder = records_folder(fits, quiet)
+    folder = options.records_folder(fits, quiet)
     todo = jobs(names or [], folder, quick)
     if out is not None:
         require_apart(out, folder, "stability.json", "stability.csv")

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from profilefit.cli import options
-from profilefit.cli.options import AsJson, Fits, Quiet, records_folder
 
 OUT = Path("tradeoff")
 WIDTH = 120  # columns that the tables take
@@ -28,9 +27,9 @@ def tradeoff(
         Path, typer.Option(help="Folder for the figures (PNG, SVG), their data (CSV), and tradeoff.json.")
     ] = OUT,
     quick: Annotated[bool, typer.Option("--quick", help="Less of everything: under a minute, and noisy.")] = False,
-    fits: Fits = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
+    fits: options.Fits = None,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Measure and chart speed against accuracy (5 minutes).
 
@@ -53,7 +52,7 @@ def tradeoff(
     from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
 
     names = chosen(parts or [])
-    folder = records_folder(fits, quiet)
+    folder = options.records_folder(fits, quiet)
     require_apart(out, folder, "tradeoff.json", *(f"tradeoff-{name}.csv" for name in names))
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": measurement_origin(typed(), folder)}

@@ -19,8 +19,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers
+from mcml_sim.media.arrays import Floats, checked_numbers
 from profilefit.errors import InputError
 from profilefit.laws import published
 from profilefit.laws.printed_maps import Chiang, VanDeHulst

@@ -32,8 +32,7 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from mcml_sim.exact.compiled import filter_jit
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require_own_process
+from mcml_sim.media.arrays import Floats, require, require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
 from profilefit.fitting.solver import Solution
@@ -333,8 +332,7 @@ def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int
         raise InputError(f"kind must be 'statistical' or 'misfit', got {kind!r}{renamed}")
     if not fit.solution.converged:
         raise InputError(f"a posterior needs a fit that converged, got: {fit.result}")
-    if max_steps < 1:
-        raise InputError(f"max_steps must be at least 1, got {max_steps!r}")
+    require(max_steps >= 1, "max_steps", "at least 1", max_steps)
     covariance = fit.statistical if kind == "statistical" else fit.variance * scaled_inverse(_positive_curvature(fit))
     if covariance is None:
         raise InputError("the truth of this fit has no photon noise: only kind='misfit' applies, got 'statistical'")

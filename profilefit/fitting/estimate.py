@@ -34,8 +34,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require_own_process
+from mcml_sim.media.arrays import Floats, require_own_process
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.fitting.solver import Solution, least_squares, solve_batch

@@ -1,4 +1,6 @@
-"""Measures of a law's distance from the exact profile: one name and one definition each, used everywhere.
+"""Measures of a law's distance from exact light: one name and one definition each, used everywhere.
+
+Records, tables, figures, shader checks and exported texts take names and words from here.
 
 rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l*, r at 99.5 % of the energy]
 largest  the largest such error at a single radius
@@ -26,6 +28,65 @@ from profilefit.laws.base import AlbedoLaw, ProfileLaw
 NEAREST = 0.01
 ENERGY_WITHIN = 0.995
 RADII = 400
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measure.
+
+    name     in records
+    formula  what it is, as a formula or in words behind its name; words the same in a sentence
+    unit     "-" for a pure number
+    short    at the head of a narrow column; symbol where only what is wrong is named
+    is_high  whether large is good, as of r2
+    """
+
+    name: str
+    formula: str
+    words: str = ""
+    unit: str = "-"
+    short: str = ""
+    symbol: str = ""
+    is_high: bool = False
+
+    @property
+    def header(self) -> str:
+        """Name at the head of a narrow column."""
+        return self.short or self.name
+
+    @property
+    def meaning(self) -> str:
+        """The formula, with the unit if it has one."""
+        return self.formula if self.unit == "-" else f"{self.formula} [{self.unit}]"
+
+    def worst(self, values: ArrayLike) -> float:
+        """Return the worst of its values, in its own unit."""
+        return float(np.min(values) if self.is_high else np.max(values))
+
+
+_ALL = (
+    Measure("rel", "mean |law / exact − 1| of R_d", "mean relative error of R_d", symbol="rel"),
+    Measure("ks", "max |cdf − exact cdf|", "error of the cdf", symbol="ks"),
+    Measure("l1", "share of misplaced energy"),
+    Measure("mse", "of r R_d", unit="1/mfp²"),
+    Measure("r2", "of r R_d", is_high=True),
+    Measure("mse near", "of the nearer half of the trimmed range", unit="1/mfp²"),
+    Measure("mse far", "of the farther half"),
+    Measure("largest", "max |law / exact − 1| of R_d", "largest error of R_d at a radius"),
+    Measure("r2 near", "of the nearer half of the trimmed range", is_high=True),
+    Measure("r2 far", "of the farther half", is_high=True),
+    Measure("inversion_error", "max |cdf(r(ξ)) − ξ|", "error in xi", short="error", symbol="xi"),
+    Measure("delta_A", "max error of A", "error of A", symbol="A"),
+    Measure("delta_alpha", "max error of α", symbol="α"),
+    Measure("largest_s", "max |√(1 − α) / exact − 1|"),
+    Measure("monotone", "rises all the way"),
+    Measure("at_one", "α at A = 1"),
+    Measure("fold", "A where it turns"),
+)
+MEASURES: dict[str, Measure] = {one.name: one for one in _ALL}
+# Measures in records: errors by albedo, and those of a map as a whole.
+OF_PROFILE = ("rel", "ks", "inversion_error")
+OF_MAP = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold")
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.compiled import filter_jit
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 
@@ -113,8 +113,7 @@ def sampler_quality(
     albedos = np.atleast_1d(np.asarray(alpha, float))
     if not np.all((albedos > 0) & (albedos <= 1)):
         raise InputError(f"alpha must be in (0, 1], got {albedos[~((albedos > 0) & (albedos <= 1))][0]:g}")
-    if not (np.isfinite(edge) and edge > 0):
-        raise InputError(f"edge must be a distance > 0, got {edge!r}")
+    require(np.isfinite(edge) and edge > 0, "edge", "a distance > 0", edge)
     light = target or LawTarget(sampler.law)
     rows = [_at(sampler, float(value), light, edge) for value in albedos]
     names = [field.name for field in fields(SamplerQuality)]

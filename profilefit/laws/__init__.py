@@ -27,9 +27,9 @@ MAPS = {
 # Those that have other forms of the same name, where the surface refracts and where scattering has a direction.
 REFRACTING = {
     "hazard.Hazard": "two_parts.RefractingHazard",
-    "rational.Rational": "refracting_rational.RefractingRational",
+    "rational.Rational": "rational.RefractingRational",
 }
-FORWARD = {"hazard.Hazard": "two_parts.ForwardHazard", "rational.Rational": "refracting_rational.ForwardRational"}
+FORWARD = {"hazard.Hazard": "two_parts.ForwardHazard", "rational.Rational": "rational.ForwardRational"}
 
 
 def profile_classes() -> "dict[str, Any]":

@@ -14,9 +14,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from profilefit.laws.base import NEAR_CLAMPS, RATIONAL, Entry, ProfileLaw, Range, Sampler, Text
-from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import NEAR_CLAMPS, Entry, Normalisation, ProfileLaw, Range, Sampler, Text, evaluated
 
 XIE = 2.5715
 """The c of Xie et al. (2020)."""
@@ -129,7 +127,7 @@ class Burley(NormalizedDiffusion):
         "normalized diffusion",
         records=("burley-whole",),
         alpha=Range(open_low=True),
-        text=Text("burley", RATIONAL, ENDS, NEAR_CLAMPS),
+        text=Text("burley", ends=ENDS, clamps=NEAR_CLAMPS),
     )
 
     def text_numbers(self) -> dict[str, float]:
@@ -168,7 +166,7 @@ class BurleyDiffuseMfp(NormalizedDiffusion):
         "burley_diffuse_mfp",
         "normalized diffusion by diffuse mfp",
         alpha=Range(open_low=True, open_high=True),
-        text=Text("burley_diffuse_mfp", RATIONAL, ENDS, f"{NEAR_CLAMPS}; falloff rate to 1e-7 / mfp"),
+        text=Text("burley_diffuse_mfp", ends=ENDS, clamps=f"{NEAR_CLAMPS}; falloff rate to 1e-7 / mfp"),
     )
 
     @evaluated

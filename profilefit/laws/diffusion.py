@@ -16,12 +16,10 @@ import numpy as np
 from jax import Array, lax
 
 from mcml_sim.exact import single_scattering
-from mcml_sim.media import fresnel
 from mcml_sim.media.arrays import Floats
+from mcml_sim.media.medium import fresnel
 from profilefit.errors import SettingError
-from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, ProfileLaw, Sampler, Text
-from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import ANY_INDEX, CLAMPS, Entry, Normalisation, ProfileLaw, Sampler, Text, evaluated
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 # ln x [mfp] that bracket every radius of use: nearer than 1e-11 or farther than 1e17 mfp nothing is drawn.
@@ -199,7 +197,7 @@ def fresnel_moments(n: float) -> tuple[float, float]:
     critical = np.sqrt(max(1.0 - 1.0 / n**2, 0.0))  # F = 1 below this cosine, and has the slope of a root above it
     u = 0.5 * (NODES + 1.0)
     mu = critical + (1.0 - critical) * u**2
-    passed = (1.0 - critical) * u * WEIGHTS * (1.0 - fresnel.fresnel(n, 1.0, mu)[0])
+    passed = (1.0 - critical) * u * WEIGHTS * (1.0 - fresnel(n, 1.0, mu)[0])
     return float(1.0 - 2.0 * np.sum(mu * passed)), float(1.0 - 3.0 * np.sum(mu**2 * passed))
 
 
@@ -413,5 +411,5 @@ def _once_scattered_nodes(n: float, halves: int) -> tuple[Floats, Floats]:
     beyond = np.exp(np.arange(CRITICAL_NEAREST, CRITICAL_FARTHEST, step))
     k = critical + beyond
     above = (beyond + (critical - 1.0)) * (k + 1.0)
-    passed = 1.0 - fresnel.fresnel(n, 1.0, above / (k * k + 1.0))[0]
+    passed = 1.0 - fresnel(n, 1.0, above / (k * k + 1.0))[0]
     return k, passed * above / (k * (k * k + 1.0) ** 2) * step * beyond

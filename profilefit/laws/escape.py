@@ -9,8 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact import single_scattering
-from profilefit.laws.base import ProfileLaw
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import Normalisation, ProfileLaw
 
 # Nearer to white than this share of absorption the series alone is right to 2.4e-5, and Newton's step would cancel.
 NEAR_WHITE = 0.08

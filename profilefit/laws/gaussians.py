@@ -20,8 +20,7 @@ import numpy as np
 from jax import Array
 
 from profilefit.errors import InputError
-from profilefit.laws.base import CLAMPS, Entry, ProfileLaw, Sampler, Text
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import CLAMPS, Entry, Normalisation, ProfileLaw, Sampler, Text
 
 MOST, DEFAULT = 8, 6
 """d'Eon and Luebke's skin has six."""

@@ -15,9 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from profilefit.laws.base import Entry, ProfileLaw, Range, Sampler, Text
-from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import Entry, Normalisation, ProfileLaw, Range, Sampler, Text, evaluated
 
 PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
 INVERSE_CONSTANTS = ("g1", "g2", "g3", "g4", "h1", "h2", "h3")

@@ -16,9 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.arrays import Floats, is_number, require
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Mixture, Phase
 
 LEAST_G = 0.30664  # at which the second term of Haltrin's form has h = 0
@@ -46,8 +44,7 @@ def haltrin(g: float) -> Haltrin:
     condition that the mean of P_2 is the mean cosine. Petzold's waters fulfil neither: a fit of both terms is
     four times as near to them.
     """
-    if not (is_number(g) and LEAST_G < g <= 1):
-        raise InputError(f"g must be in ({LEAST_G}, 1], got {shown(g)}")
+    require(is_number(g) and LEAST_G < g <= 1, "g", f"in ({LEAST_G}, 1]", g)
     return Haltrin(*(float(value) for value in _haltrin(g)))
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array, lax
 
-from profilefit.laws.base import AlbedoLaw, Entry, Range, Text
-from profilefit.laws.evaluate import evaluated
+from profilefit.laws.base import AlbedoLaw, Entry, Range, Text, evaluated
 
 # The slope of Chiang's printed cubic stays within a factor of three: Newton settles in six.
 STEPS = 7

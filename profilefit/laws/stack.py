@@ -9,9 +9,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from profilefit.errors import InputError
-from profilefit.laws.base import CLOSED, Constants, ProfileLaw
+from profilefit.laws.base import CLOSED, Constants, ProfileLaw, evaluated
 from profilefit.laws.escape import decay_rate
-from profilefit.laws.evaluate import evaluated
 
 THICKEST = 1e6  # mean free paths that stand for an infinite first layer
 LEAST_DECAY = 1e-4  # over l: where nothing is absorbed A tends to A_1 all the same, within 1e-4

@@ -17,7 +17,7 @@ from mcml_sim.exact.light import reduced, unreduced
 from profilefit.laws.base import CLAMPS, CLOSED, Entry, ProfileLaw, Sampler, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
-from profilefit.laws.refracting_rational import COSINES, INDICES, REFRACTING, FoldedRational
+from profilefit.laws.rational import COSINES, INDICES, REFRACTING, FoldedRational
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import Floats, shown
 from mcml_sim.media.medium import Layer, Medium
 from profilefit.errors import InputError
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mcml_sim.exact.light import ExactLight
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require_own_process
+from mcml_sim.media.arrays import Floats, require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.misfit import Misfit, gaussianised, lack_of_fit, misfit, waves
 from profilefit.fitting.solver import Solution, are_apart, lowest

@@ -43,7 +43,6 @@ from mcml_sim import exact
 from mcml_sim.exact import forwards
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.forwards import decay_rate
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated, unreduced
 from mcml_sim.files.npz import kept
@@ -338,7 +337,7 @@ def centres(alpha: float, n: float, g: float, angle: float, x: Floats) -> Floats
 def sources(alpha: float, g: float) -> tuple[Floats, Floats, float]:
     """Return distances along a ray (k,) [l*], shares of its light isotropic from there (k,), and kappa [1/l*]."""
     whole = float(unreduced(alpha, g))
-    kappa, length = decay_rate(whole, g), 1.0 / (1.0 - whole * g)
+    kappa, length = forwards.decay_rate(whole, g), 1.0 / (1.0 - whole * g)
     ell = np.arange(DEGREE + 1)
     h = (2 * ell + 1) * (1.0 - whole * g**ell)
     ratio = np.zeros(DEGREE + 2)  # a_l / a_{l-1}, of the solution that falls off

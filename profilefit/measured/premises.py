@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import require, shown
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
 from profilefit.laws import takes_g
@@ -61,8 +61,7 @@ def premises(
     labels |= {name: f"{data.source}:{fact.line}: {name}" for name, fact in stated.items()}
     given = {name: fact.text for name, fact in stated.items()} | chosen
     light = given.get("light", data.illumination or "searchlight")
-    if light not in ILLUMINATIONS:
-        raise InputError(f"{labels['light']} must be one of {', '.join(ILLUMINATIONS)}, got {shown(light)}")
+    require(light in ILLUMINATIONS, labels["light"], f"one of {', '.join(ILLUMINATIONS)}", light)
     if data.illumination not in (None, light):
         raise InputError(
             f"{labels['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
@@ -111,6 +110,6 @@ def _parsed(option: str, text: str, name: str) -> tuple[float, float]:
     except ValueError:
         ends = []
     least, most = (0.0, math.inf) if name == "n" else (-1.0, 1.0)
-    if not (1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]):
-        raise InputError(f"{option} must be {ACCEPTED[name]}, got {shown(text)}")
+    is_range = 1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]
+    require(is_range, option, ACCEPTED[name], text)
     return ends[0], ends[-1]

@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import require
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
 from mcml_sim.results.mci import quoted
@@ -380,8 +380,7 @@ def _length_unit(table: _Table, unit: str | None) -> str:
     units = written | ({unit} if unit else set())
     if len({UNITS.get(one) for one in units}) > 1:
         raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
-    if unit and unit not in UNITS:
-        raise InputError(f"unit must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
+    require(not unit or unit in UNITS, "unit", f"a unit of length ({', '.join(UNITS)})", unit)
     return next(iter(written), unit or "")
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.chains import Node, Ridge, Walk, sample
@@ -253,8 +253,7 @@ def _require_held(law: Light, held: Mapping[str, float]) -> None:
 
 
 def _positive(name: str, value: float) -> float:
-    if not value > 0:
-        raise InputError(f"{name} must be a number > 0, got {value!r}")
+    require(value > 0, name, "a number > 0", value)
     return value
 
 

@@ -13,8 +13,8 @@ from mcml_sim.media.setting import Setting
 from profilefit import laws
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
-from profilefit.laws.base import AlbedoLaw, Constants, Entry, ProfileLaw
-from profilefit.laws.rational import Normalisation, Rational
+from profilefit.laws.base import AlbedoLaw, Constants, Entry, Normalisation, ProfileLaw
+from profilefit.laws.rational import Rational
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SEARCHLIGHT, Folder, Records, covers, record_setting
 

@@ -16,7 +16,7 @@ from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandl
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.arrays import is_number, shown
 from profilefit.errors import InputError
 
 Table = dict[str, Any]

@@ -22,7 +22,6 @@ from mcml_sim.runs.progress import tracked
 from profilefit.errors import RecordError
 from profilefit.recipes import kinds, recipe, record
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import CONVERGED
 from profilefit.recipes.run import RecipeRun, Step, written
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.workers import Workers
@@ -156,7 +155,7 @@ def _of_readings(name: str, shipped: Content, made: Content) -> Reproduction:
     moves = [
         abs(other["constants"][key] / value - 1.0) if value else abs(other["constants"][key])
         for one, other in pairs
-        if other.get("result", CONVERGED) == CONVERGED
+        if other.get("result", record.CONVERGED) == record.CONVERGED
         for key, value in one["constants"].items()
     ]
     problems = [f"{one['equation']}: {other['verdict']}" for one, other in pairs if one["verdict"] != other["verdict"]]

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mcml_sim.media import checks
+from mcml_sim.media import arrays
 
 LONGEST_TEXT = 1000  # characters; ours have 256
 LONGEST_SHOWN = 60  # characters of a value in a message
@@ -26,7 +26,7 @@ def is_line(value: Any) -> bool:
 
 def is_number(value: Any) -> bool:
     """Return whether a value is a number that float64 can hold; true and false are none."""
-    return checks.is_number(value) and math.isfinite(value)
+    return arrays.is_number(value) and math.isfinite(value)
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,10 @@ from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
-from profilefit.fitting.measures import MEASURES
+from profilefit.fitting.quality import MEASURES
 from profilefit.laws.base import Constants
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.recipe import Albedos
-from profilefit.recipes.record import SPANS, Records, record_setting
 from profilefit.recipes.schema import ERRORS, SETS
 from profilefit.recipes.targets import albedo_values
 
@@ -79,13 +78,13 @@ def measures(content: Content, measure: str) -> bool:
 
 def index_words(content: Content, name: str = "n") -> str:
     """Return the n, or g, that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
-    span = content.get(SPANS[name])
+    span = content.get(record.SPANS[name])
     return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting'][name]:g}"
 
 
 def at_index(content: Content) -> str:
     """Return for a title the index, and g, at which a record that spans several is reported; nothing for others."""
-    spanned = [name for name, span in SPANS.items() if content.get(span)]
+    spanned = [name for name, span in record.SPANS.items() if content.get(span)]
     return "".join(f", {name} = {content['setting'][name]:g}" for name in spanned)
 
 
@@ -140,7 +139,7 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Source(Records):
+class Source(record.Records):
     """Records with their arrays and the laws that they make."""
 
     _fitted: dict[str, Fitted] = field(default_factory=dict, repr=False, compare=False)
@@ -152,7 +151,7 @@ class Source(Records):
         if name not in self._fitted:
             content, path = self.content(name), self.paths[name]
             load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
-            of = content["law"], str(path), record_setting(content), self
+            of = content["law"], str(path), record.record_setting(content), self
             self._fitted[name] = Fitted(content, record.read_arrays(path), load(*of))
         return self._fitted[name]
 

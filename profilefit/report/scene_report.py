@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib import colormaps, image
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
-from profilefit.scenes.stage.picture import ChartPoint, RenderResult
+from profilefit.scenes.stage.judge import ChartPoint, RenderResult
 
 LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from profilefit.scenes.skin.passes import SeparableFilter
     from profilefit.scenes.skin.scene import head_scene
     from profilefit.scenes.stage.exact_law import ExactLaw
+    from profilefit.scenes.stage.judge import srgb_codes, to_srgb
     from profilefit.scenes.stage.pattern import Sampling
-    from profilefit.scenes.stage.picture import srgb_codes, to_srgb
     from profilefit.scenes.stage.stage import Stage
     from profilefit.scenes.stage.step_edge import step_response
     from profilefit.scenes.stage.surface import gathered, seen
@@ -33,7 +33,7 @@ else:
             "head_scene": "skin.scene",
             "ExactLaw": "stage.exact_law",
             "Sampling": "stage.pattern",
-            **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.picture"),
+            **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.judge"),
             "Stage": "stage.stage",
             "covering": "skin.chart",
             "step_response": "stage.step_edge",

@@ -23,8 +23,7 @@ import numpy as np
 
 from profilefit.errors import InputError
 from profilefit.laws import map_classes, profile_classes
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw, Text
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import AlbedoLaw, Constants, Normalisation, ProfileLaw, Text
 
 Numbers = dict[str, float]
 PLACEHOLDER = "LAW_"

@@ -16,7 +16,7 @@ import numpy as np
 from mcml_sim import __version__
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
-from profilefit.fitting.measures import MEASURES, OF_PROFILE
+from profilefit.fitting.quality import MEASURES, OF_PROFILE
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds

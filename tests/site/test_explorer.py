@@ -15,8 +15,8 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import profile_laws
 from profilefit.report.explorer import explorer_section
-from profilefit.report.explorer.offered import address, first, offered
-from profilefit.scenes.stage.picture import srgb_codes
+from profilefit.report.explorer.fragment import address, first, offered
+from profilefit.scenes.stage.judge import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.shader.law_file import export
 

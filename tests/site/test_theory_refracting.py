@@ -15,7 +15,7 @@ from scipy.special import hankel1, j0
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact import cone, single_scattering
 from mcml_sim.exact.stack import fluence
-from mcml_sim.media import fresnel
+from mcml_sim.media.medium import fresnel
 from tests.fixtures import slow
 from tests.site.test_theory import transform_of_formula as by_h_functions
 
@@ -217,9 +217,9 @@ def test_transmittance_and_the_law_of_n_squared(n):
     """(2) is Fresnel's from either side, and what enters is (17) at x = 0."""
     outside = np.linspace(0.01, 1.0, 50)
     inside = np.sqrt(1 - (1 - outside**2) / n**2)
-    np.testing.assert_allclose(transmittance(inside, n), 1 - fresnel.fresnel(n, 1.0, inside)[0], rtol=1e-9)
-    np.testing.assert_allclose(transmittance(inside, n), 1 - fresnel.fresnel(1.0, n, outside)[0], rtol=1e-9)
-    entering = number(lambda mu: 2 * mu * (1 - fresnel.fresnel(1.0, n, mu)[0]), 0.0, 1.0)
+    np.testing.assert_allclose(transmittance(inside, n), 1 - fresnel(n, 1.0, inside)[0], rtol=1e-9)
+    np.testing.assert_allclose(transmittance(inside, n), 1 - fresnel(1.0, n, outside)[0], rtol=1e-9)
+    entering = number(lambda mu: 2 * mu * (1 - fresnel(1.0, n, mu)[0]), 0.0, 1.0)
     assert 2 * n**2 * over_cone(lambda mu: mu * transmittance(mu, n), n) == pytest.approx(entering, rel=1e-9)
     assert single_scattering.entered(Setting("diffuse", n=n)) == pytest.approx(entering, rel=1e-9)
     assert single_scattering.entered(Setting(n=n)) == pytest.approx(4 * n / (n + 1) ** 2, rel=1e-12)

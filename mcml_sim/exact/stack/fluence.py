@@ -30,7 +30,7 @@ from scipy.special import exp1, expn, j0
 from mcml_sim.exact.stack import quadrature
 from mcml_sim.exact.stack.quadrature import Complexes, Depths, Nodes, Slants, directions, gauss, reflectance
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule

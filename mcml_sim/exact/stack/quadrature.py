@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from mcml_sim.exact.half_space import decay_rate
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import Floats, checked_whole
 from mcml_sim.media.medium import Layer, Medium
 
 FIRST_PANEL = 1.5  # mean free paths, of the panels at interfaces

@@ -32,12 +32,9 @@ from mcml_sim.errors import InputError
 from mcml_sim.exact import cone, half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import fluence, known
-from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.exact.stack.quadrature import Depths, Nodes, gauss, interpolation, slowest, stack
-from mcml_sim.media import fresnel
-from mcml_sim.media.arrays import Floats, scalar_or_array
-from mcml_sim.media.checks import checked_range, require
-from mcml_sim.media.medium import Layer, Medium
+from mcml_sim.media.arrays import Floats, checked_range, require, scalar_or_array
+from mcml_sim.media.medium import Layer, Medium, specular_reflectance
 from mcml_sim.media.setting import Setting, require_illumination
 
 MAX_LAYERS = 20
@@ -167,12 +164,12 @@ def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> floa
     return _leaves_above(*_answer(medium, k, rule), k, illumination, rule)
 
 
-def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, Field]:
+def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, fluence.Field]:
     here = stack(medium, k, rule)
     return here, fluence.solve(here, k, rule)
 
 
-def _leaves_above(here: Depths, answer: Field, k: float, illumination: str, rule: Nodes) -> float:
+def _leaves_above(here: Depths, answer: fluence.Field, k: float, illumination: str, rule: Nodes) -> float:
     scattered = float(here.weight @ (answer.phi[illumination] * answer.up))
     return scattered + fluence.thrown_back(here, k, illumination, rule)
 
@@ -200,7 +197,7 @@ def _shares(medium: Medium, illumination: str, rule: Nodes) -> tuple[float, floa
 def _specular(medium: Medium, illumination: str) -> float:
     """Return the specular light as `mcml_sim.simulate` counts it: of a single pane of clear glass, all of it."""
     if illumination == "searchlight":
-        return fresnel.specular_reflectance(medium)
+        return specular_reflectance(medium)
     return 1 - entered(Setting(illumination, n=medium.layers[0].n / medium.n_above))
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.arrays import is_number, namespace, require
 from mcml_sim.media.phase.phase import Phase
 from mcml_sim.media.phase.tabulated import STRAIGHT, Pieces, Tabulated
 

@@ -7,11 +7,10 @@ from dataclasses import fields
 from typing import Any
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.checks import require, shown
+from mcml_sim.media.arrays import require, shown
 from mcml_sim.media.phase.fournier_forand import FournierForand
-from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein, Isotropic
 from mcml_sim.media.phase.mixture import Mixture
-from mcml_sim.media.phase.phase import Phase
+from mcml_sim.media.phase.phase import HenyeyGreenstein, Isotropic, Phase
 from mcml_sim.media.phase.tabulated import Tabulated
 
 KINDS: dict[str, type[Phase]] = {

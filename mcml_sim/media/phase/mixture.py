@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import namespace
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.arrays import is_number, namespace, require
 from mcml_sim.media.phase.phase import Phase
 
 MOST_TERMS = 64

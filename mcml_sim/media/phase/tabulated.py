@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import Floats, namespace
-from mcml_sim.media.checks import checked_numbers, shown
+from mcml_sim.media.arrays import Floats, checked_numbers, namespace, shown
 from mcml_sim.media.phase.phase import Phase
 
 MOST_ROWS = 2**16

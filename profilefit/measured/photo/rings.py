@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, grey_dilation, label
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import Floats, shown
 from profilefit.errors import InputError
 from profilefit.measured.data import length
 from profilefit.measured.instrument import RING

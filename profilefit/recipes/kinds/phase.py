@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim import Setting
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import shown
 from mcml_sim.media.phase import Phase
 from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, regression

@@ -50,7 +50,7 @@ from pydantic import (
 
 from mcml_sim import Layer, Medium
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.checks import is_number
+from mcml_sim.media.arrays import is_number
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE, Material
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words

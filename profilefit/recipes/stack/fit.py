@@ -23,12 +23,11 @@ from numpy.typing import ArrayLike
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
 from mcml_sim.exact import half_space
 from mcml_sim.exact.stack.solution import MAX_LAYERS
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import Floats, shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Solution, least_squares
-from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.laws.rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.recipes import catalogue

@@ -17,7 +17,8 @@ from __future__ import annotations
 import base64
 import io
 import json
-from dataclasses import asdict, dataclass
+import re
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from string import Template
 
@@ -29,15 +30,15 @@ from mcml_sim import Setting, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, MATERIALS
-from profilefit.recipes import catalogue
-from profilefit.recipes.record import Folder
+from profilefit.recipes.catalogue import LoadedLaw, find, load, profile_laws
+from profilefit.recipes.record import Folder, Records
 from profilefit.report.drawing import inline
-from profilefit.report.explorer.offered import INDICES, STEP, first, offered
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
 from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
-from profilefit.scenes.stage.picture import srgb_codes
+from profilefit.scenes.stage.judge import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.shader.emit import text_beside
+from profilefit.shader.law_file import export
 
 _asset = partial(text_beside, __name__)
 # In this order: each file uses only what comes before it, but for what runs later.
@@ -109,6 +110,81 @@ def _data(folder: Folder) -> str:
     return json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
+PREFIX = "law"  # of the names in each text: one law runs at a time
+FIRST = ("hazard-diffuse", "hazard")  # what is shown at the start, if it is there
+ORDER = ("hazard", "quantile", "burley", "burley_diffuse_mfp", "liang", "gaussians", "better_dipole", "dipole")
+RANK = {name: place for place, name in enumerate(ORDER)}
+STEP, STEPS = 0.02, 30
+INDICES = tuple(round(1.0 + STEP * (k + 1), 2) for k in range(STEPS))  # n of a surface that refracts
+WORDS = r"([\s;]+)"  # between two words of a text; the same in laws.js
+
+
+@dataclass(frozen=True)
+class Refracting:
+    """A law's text under surfaces that refract: the same words at every index but for a few, most of them numbers.
+
+    text of the first of `INDICES`; places of the words that change; words (indices, places) of each index
+    """
+
+    text: str
+    places: list[int]
+    words: list[list[str]]
+
+
+@dataclass(frozen=True)
+class Offered:
+    """Law under one illumination: its name in addresses, its own, the illumination, its name for readers.
+
+    text, refracting  shader source in GLSL ES at n = 1, and at other indices where the law has constants for them
+    """
+
+    id: str
+    name: str
+    light: str
+    label: str
+    text: str
+    refracting: Refracting | None = None
+
+
+def offered(folder: Folder) -> list[Offered]:
+    """Return every law of a matched surface that has a text, the best first; records are those in `folder`."""
+    records, laws = Records.of(folder), []
+    for named in sorted(profile_laws(records), key=lambda one: RANK.get(one.name.partition(":")[0], len(RANK))):
+        if named.law.entry.has_text:
+            label = title = named.law.entry.title
+            if not named.records:
+                label += f", {named.constants}" if named.constants else ""
+            elif named.records[0].replace("-diffuse", "") != title:
+                label += f": {named.records[0]}"
+            text, refracting = export(named, records, "glsl-es", PREFIX), _refracting(named, records)
+            laws.append(Offered(address(named), named.name, named.setting.illumination, label, text, refracting))
+    return laws
+
+
+def first(laws: list[Offered]) -> str:
+    """Return the id of the law to begin with."""
+    there = [law.id for law in laws]
+    return next((name for name in FIRST if name in there), there[0])
+
+
+def address(named: LoadedLaw) -> str:
+    """Return the id of a law: its label, without what the address of a page may not hold."""
+    return re.sub(r"[^\w.]+", "-", named.label)
+
+
+def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
+    """Return the text of the record of the same law and light that holds for every index, if the folder has one."""
+    of = profile_laws(records, matched=False) if named.records else []
+    same = (one for one in of if one.name == named.name and one.setting == replace(named.setting, n=one.setting.n))
+    label = next((one.label for one in same if one.setting.n != named.setting.n), None)
+    if label is None:
+        return None
+    texts = [export(find(label, records, n=n), records, "glsl-es", PREFIX) for n in INDICES]
+    pieces = [re.split(WORDS, text) for text in texts]
+    places = [at for at, words in enumerate(zip(*pieces, strict=True)) if len(set(words)) > 1]
+    return Refracting(texts[0], places, [[words[at] for at in places] for words in pieces])
+
+
 LIGHTS = ("searchlight", "diffuse")
 KNOTS = (1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)  # n, denser where the light changes fastest with it
 FAINT = 1e-9  # x^2 R_d l^2 / A below which the quadrature of a refracting surface leaves no digits
@@ -172,7 +248,7 @@ VARIABLES = {
 @styled
 def still() -> str:
     """Return the picture as SVG, by the shipped record: what it shows is the same in every report."""
-    law = catalogue.load(LAW, setting=SETTING)
+    law = load(LAW, setting=SETTING)
     figure = canvas(3.2)
     profile, cdf, edge = figure.subplots(1, 3)
     alpha, mfp = (np.array(one)[:, None] for one in (BY_NAME[MATERIAL].alpha, BY_NAME[MATERIAL].mfp))

@@ -1,8 +1,8 @@
 // A law as the page tells it: its text at an index n of the surface.
-const WORDS = /([\s;]+)/; // as in offered.py
+const WORDS = /([\s;]+)/; // as in fragment.py
 
 class Law {
-  // told: of offered.py, but that texts are places in `lines`; indices: n of the words
+  // told: of fragment.py, but that texts are places in `lines`; indices: n of the words
   constructor(told, lines, indices) {
     const whole = (places) => places.map((place) => lines[place]).join("\n");
     Object.assign(this, told, { indices, text: whole(told.text) });

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.fitting.measures import MEASURES
+from profilefit.fitting.quality import MEASURES
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS

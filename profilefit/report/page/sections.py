@@ -13,7 +13,7 @@ from pathlib import Path
 from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
-from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.recipes.evidence import digest, stale
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons

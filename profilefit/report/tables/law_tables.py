@@ -18,8 +18,7 @@ from rich.text import Text
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.measures import MEASURES, OF_MAP
-from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
+from profilefit.fitting.quality import MEASURES, OF_MAP, AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.recipes.catalogue import LoadedLaw, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE

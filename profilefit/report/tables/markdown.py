@@ -8,7 +8,7 @@ from math import inf
 
 import numpy as np
 
-from profilefit.fitting.measures import MEASURES, OF_MAP
+from profilefit.fitting.quality import MEASURES, OF_MAP
 from profilefit.recipes.reproduction import LENGTH, PUBLISHED
 from profilefit.report import records
 from profilefit.report.records import Content, converged, largest_error

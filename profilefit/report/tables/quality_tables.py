@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import RenderableType
 
-from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.recipes.record import SPANS
 from profilefit.report import records
 from profilefit.report.records import Content, at_index, by_index, converged, measured_sets, measures

@@ -18,7 +18,6 @@ from rich.text import Text
 from mcml_sim.media.setting import Setting
 from profilefit.recipes import record
 from profilefit.recipes.checks import SAME_COST
-from profilefit.recipes.record import SPANS
 from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
 from profilefit.recipes.schema import ERRORS
 from profilefit.report import records
@@ -191,7 +190,7 @@ def title_of(content: Content) -> RenderableType:
     setting, protocol = content["setting"], content.get("protocol") or {}
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
     light = f"{setting['illumination']}{beam}"
-    for name, ranges in SPANS.items():
+    for name, ranges in record.SPANS.items():
         is_in = f"every {name} in" if content.get(ranges) else f"{name} ="
         light += f", {is_in} {records.index_words(content, name)}"
     if content.get("indices"):

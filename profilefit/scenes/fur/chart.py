@@ -12,7 +12,7 @@ from profilefit.scenes.fur.ball import FurView
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch, cast, random_patch
 from profilefit.scenes.fur.ways import WAYS
-from profilefit.scenes.stage.picture import ChartPoint
+from profilefit.scenes.stage.judge import ChartPoint
 from profilefit.scenes.stage.renderer import Renderer
 
 WIDER = 1.3  # than a ray's way over the skin

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require, require_one_shape, shown
+from mcml_sim.media.arrays import Floats, checked_numbers, checked_whole, is_number, require, require_one_shape, shown
 from profilefit.shader import emit
 from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 

@@ -8,17 +8,16 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import checked_whole
 from profilefit.recipes.declared import LISTED, Declared, words
 from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import LayerTechnique
-from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance
 from profilefit.scenes.stage.technique import RADIANCE
-from profilefit.scenes.stage.world import Light, Rgb, unit
+from profilefit.scenes.stage.world import Light, Rgb, Singles, unit
 from profilefit.shader.emit import read_text, text_beside
 
 HITS = "hit_map"

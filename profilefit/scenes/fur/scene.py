@@ -17,10 +17,10 @@ from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, 
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
-from profilefit.scenes.stage.judge import TURNS, Judge
-from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, averaged
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, RenderResult
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import Samples, TechniqueTable, Viewpoint, ViewRequest
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
 
 KINDS = ("swept", "shells")
 VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, is_number, require
+from mcml_sim.media.arrays import Floats, checked_whole, is_number, require
 from profilefit.scenes.fur.law import MOST_LAYERS
 
 MOST_STRANDS = 1 << 20

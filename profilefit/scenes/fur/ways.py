@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import is_number, require
+from mcml_sim.media.arrays import Floats, is_number, require
 from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
 

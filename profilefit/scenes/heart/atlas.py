@@ -23,15 +23,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements
-from profilefit.scenes.stage.buffers import INSIDE, Singles
 from profilefit.scenes.stage.renderer import GpuOwner, Pass, Read, Renderer
 from profilefit.scenes.stage.technique import Unwraps, maps
-from profilefit.scenes.stage.world import Mesh, Part
+from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Singles
 from profilefit.shader.emit import text_beside
 
 EIGHT = np.ones((3, 3))  # a texel and its neighbours

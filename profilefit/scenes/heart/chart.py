@@ -11,9 +11,8 @@ from mcml_sim.media.arrays import Floats
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.scene import HeartRender, HeartRequest
 from profilefit.scenes.heart.truth import Elements, summed
-from profilefit.scenes.stage.judge import TURNS, points
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, points
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.picture import ChartPoint
 
 SURE = Sampling(64)  # where the error of a technique is asked for, not its noise
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
 from profilefit.recipes.declared import Declared, OneOf, Refused, Tolerance
@@ -28,15 +28,12 @@ from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
-from profilefit.scenes.stage import request
-from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.picture import RenderResult, TruthError
-from profilefit.scenes.stage.request import TechniqueTable, Viewpoint, ViewRequest
+from profilefit.scenes.stage.judge import Judge, RenderResult
+from profilefit.scenes.stage.request import MOST_PIXELS, TechniqueTable, Viewpoint, ViewRequest, draw_lit, rendered
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import evenly, world
+from profilefit.scenes.stage.surface import TruthError, evenly, world
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
-from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
+from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
@@ -132,7 +129,7 @@ read = HeartRequest.of
 def draw(context: moderngl.Context, of: HeartRequest) -> RenderResult:
     """Draw the picture beside its reference: a minute, half of it for exact light if no record has these layers."""
     with reference_render(context, of, light_of(of, of.technique.gaussians)) as drawn:
-        return request.rendered(drawn.stage, drawn.judge, of, drawn.named(of.technique.kind))
+        return rendered(drawn.stage, drawn.judge, of, drawn.named(of.technique.kind))
 
 
 @dataclass(frozen=True)
@@ -172,13 +169,13 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
     part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.surface.roughness)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
-        request.draw_lit(stage, Scene((part,), of.light, of.ambient, of.camera, f0), of.file)
+        draw_lit(stage, Scene((part,), of.light, of.ambient, of.camera, f0), of.file)
         yield stage, part
 
 
 @contextmanager
 def reference_render(
-    context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = request.MOST_PIXELS
+    context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = MOST_PIXELS
 ) -> Iterator[HeartRender]:
     """Open the passes and the reference image of a request, judged at so many pixels at most."""
     size, margin = atlas_size(of.mesh, of.technique.texel, MOST_TEXELS)

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require
+from mcml_sim.media.arrays import Floats, checked_finite, checked_numbers, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import finite
 
 NEIGHBOURS = 24  # points that gather together
 COARSE = 0.6  # sigma, in the spacing of elements, below which a Gaussian is none: light comes out where it went in
@@ -121,4 +119,4 @@ def sphere_blur(radius: float, cosine: ArrayLike, variances: ArrayLike, weights:
 
 
 def _finite(name: str, value: ArrayLike) -> Floats:
-    return finite(name, checked_numbers(name, value, "numbers"))
+    return checked_finite(name, checked_numbers(name, value, "numbers"))

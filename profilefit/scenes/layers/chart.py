@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from profilefit.scenes.layers.scene import LayersRequest, laws_of, reference, technique
 from profilefit.scenes.layers.truth import StackTable
-from profilefit.scenes.stage.judge import TURNS, points
-from profilefit.scenes.stage.picture import ChartPoint
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, points
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique
 

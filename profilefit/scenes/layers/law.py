@@ -33,10 +33,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim import exact
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_range, require, require_one_shape
-from mcml_sim.media.fresnel import fresnel
-from mcml_sim.media.medium import Layer, Medium
+from mcml_sim.media.arrays import Floats, checked_numbers, checked_range, require, require_one_shape
+from mcml_sim.media.medium import Layer, Medium, fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve

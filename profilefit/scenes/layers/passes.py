@@ -16,9 +16,9 @@ from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.scenes.layers.law import Plate, single_scattering
-from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, maps
+from profilefit.scenes.stage.world import Singles
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
 from profilefit.shader.stack_text import single_text, stack_text
 

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.medium import normal_reflectance
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
@@ -26,9 +26,7 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
-from profilefit.scenes.stage.judge import Judge, surface_judge
-from profilefit.scenes.stage.picture import RenderResult
-from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
+from profilefit.scenes.stage.judge import Judge, RenderResult, surface_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
@@ -41,7 +39,7 @@ NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
 COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
 
 
-class LayersTechnique(TechniqueTable):
+class LayersTechnique(request.TechniqueTable):
     """Table [technique]: kind  of the technique;  single  whether light scattered once leaves in its own directions."""
 
     kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
@@ -49,14 +47,14 @@ class LayersTechnique(TechniqueTable):
     tolerance: Tolerance = 0.02
 
 
-class LayersRequest(ViewRequest, StackRequest):
+class LayersRequest(request.ViewRequest, StackRequest):
     """Picture of a layered head that a file requests; `choose` is read by `profilefit choose`."""
 
     scene: Annotated[str, OneOf("layers")] = "layers"
     technique: LayersTechnique = LayersTechnique()
     uneven: Annotated[float, Field(ge=0.0, lt=1.0), words("a share in [0, 1)")] = 0.5
     pose: Annotated[str, OneOf(*POSES)] = POSES[0]
-    choose: OfChoose = None
+    choose: request.OfChoose = None
 
     @property
     def mfp(self) -> Rgb:

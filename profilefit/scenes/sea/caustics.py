@@ -13,8 +13,7 @@ from typing import NamedTuple
 import moderngl
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, require
+from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside

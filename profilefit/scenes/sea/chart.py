@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.arrays import Floats, checked_whole
 from mcml_sim.media.phase import Phase
 from profilefit.scenes.sea.law import segment_between
 

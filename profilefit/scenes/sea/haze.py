@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ellipe
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.sea.law import Lobes, beam_share, water_mtf
 
 BROADENED, SCALED, SINGLE = KINDS = ("broadened", "scaled", "single")

@@ -20,8 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.special import hankel1
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_range, checked_whole, is_number, require_one_shape, shown
+from mcml_sim.media.arrays import (
+    Floats,
+    checked_numbers,
+    checked_range,
+    checked_whole,
+    is_number,
+    require,
+    require_one_shape,
+    shown,
+)
 from profilefit.errors import InputError
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.phases import haltrin as haltrin
@@ -170,8 +178,7 @@ def failing_depth(omega: ArrayLike, cw: ArrayLike, lobes: Lobes, by: float = 0.1
     omega, cw  which broadcast;  by  by how much there is more light within the radius than e^-ct, > 0
     """
     terms = _checked_lobes(lobes)
-    if not (is_number(by) and 0 < by < np.inf):
-        raise InputError(f"by must be a number > 0, got {shown(by)}")
+    require(is_number(by) and 0 < by < np.inf, "by", "a number > 0", by)
     albedo, radius = np.broadcast_arrays(*_checked(omega=omega, cw=cw))
     fails = (albedo > 0) & (radius > 0)
     some, within = np.where(fails, albedo, 1.0).ravel(), np.where(fails, radius, 1.0).ravel()
@@ -300,10 +307,9 @@ def _checked(**values: ArrayLike) -> list[Floats]:
 def _checked_lobes(lobes: Lobes) -> Floats:
     accepted = "a list of pairs (weight, g)"
     terms = checked_numbers("lobes", lobes, accepted)
-    if terms.ndim != 2 or terms.shape[1] != 2 or not len(terms):
-        raise InputError(f"lobes must be {accepted}, got {shown(lobes)}")
-    if not np.all((terms[:, 0] >= 0) & (terms[:, 0] <= 1 + ROUNDING)) or np.sum(terms[:, 0]) > 1 + ROUNDING:
-        raise InputError(f"weights of lobes must be >= 0 and sum to at most 1, got {shown(terms[:, 0].tolist())}")
-    if not np.all(np.abs(terms[:, 1]) < 1):
-        raise InputError(f"g of lobes must be in (-1, 1), got {shown(terms[:, 1].tolist())}")
+    require(terms.ndim == 2 and terms.shape[1] == 2 and len(terms), "lobes", accepted, lobes)
+    weights, g = terms.T
+    are_shares = np.all((weights >= 0) & (weights <= 1 + ROUNDING)) and np.sum(weights) <= 1 + ROUNDING
+    require(are_shares, "weights of lobes", ">= 0 and sum to at most 1", weights.tolist())
+    require(np.all(np.abs(g) < 1), "g of lobes", "in (-1, 1)", g.tolist())
     return terms

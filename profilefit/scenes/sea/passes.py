@@ -7,17 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.arrays import Floats, checked_whole
+from mcml_sim.media.medium import fresnel
 from profilefit.scenes.sea.caustics import Caustics, Splat
 from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways
 from profilefit.scenes.sea.haze import table as fade_table
 from profilefit.scenes.sea.law import water_gaussians
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.renderer import Pass, Read, Renderer
-from profilefit.scenes.stage.world import Camera, rgb, unit
+from profilefit.scenes.stage.world import Camera, Singles, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 VIEW, SHAFTS = "view_map", "shaft_map"

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.arrays import Floats, checked_whole
+from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
 from profilefit.scenes.sea.truth import Photons, boxes
 from profilefit.scenes.sea.water import World

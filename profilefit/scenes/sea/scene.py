@@ -22,9 +22,9 @@ from profilefit.scenes.sea.paths import Sunlight, traced
 from profilefit.scenes.sea.water import World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.judge import TURNS, Judge
-from profilefit.scenes.stage.picture import ChartPoint, RenderResult, averaged
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, RenderResult
 from profilefit.scenes.stage.renderer import Pass, Renderer
+from profilefit.scenes.stage.surface import averaged
 from profilefit.scenes.stage.world import Camera
 
 PHASE = "petzold"

@@ -13,11 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, is_number, require
+from mcml_sim.media.arrays import Floats, checked_finite, checked_whole, is_number, require
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
-from profilefit.scenes.stage.buffers import finite
 
 Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
 PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
@@ -52,7 +50,7 @@ def caustic_irradiance(
     The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
     Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
     """
-    where = finite("x", x, "finite numbers [m]")
+    where = checked_finite("x", x, "finite numbers [m]")
     rays = Rays(surface, where, depth, tilt, n, slope, curvature, spacing)
     target, place, _ = rays.arrivals(where.ravel())
     _, stretch, flux = rays.at(place)

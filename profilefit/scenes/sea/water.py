@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, require
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.arrays import Floats, checked_numbers, require
+from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
 from profilefit.scenes.stage.world import Rgb

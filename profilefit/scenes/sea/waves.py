@@ -15,12 +15,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require, require_index
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.arrays import (
+    Floats,
+    checked_finite,
+    checked_numbers,
+    checked_whole,
+    is_number,
+    require,
+    require_index,
+)
+from mcml_sim.media.medium import fresnel
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS
-from profilefit.scenes.stage.buffers import finite
 
 GRAVITY = 9.81  # [m/s^2]
 WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, fit into a tile a few times
@@ -63,7 +69,7 @@ class Waves:
         tile = _length("tile", self.tile)
         require(is_number(self.mean) and np.isfinite(self.mean), "mean", "a level [m]", self.mean)
         for name in ("amplitudes", "vectors", "phases"):
-            object.__setattr__(self, name, finite(name, getattr(self, name), "finite numbers"))
+            object.__setattr__(self, name, checked_finite(name, getattr(self, name), "finite numbers"))
         count = self.amplitudes.size
         for name, accepted in (("amplitudes", (count,)), ("vectors", (count, 2)), ("phases", (count,))):
             if getattr(self, name).shape != accepted:
@@ -446,7 +452,7 @@ def _checked_rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floa
         array = checked_numbers(name, value, "finite numbers (..., 3)")
         if not array.ndim or array.shape[-1] != 3:
             raise InputError(f"{name} must have shape (..., 3), got {array.shape}")
-        found.append(finite(name, array))
+        found.append(checked_finite(name, array))
     length = np.linalg.norm(found[1], axis=-1)
     deviation = np.abs(length - 1.0)
     if np.any(deviation > UNIT):

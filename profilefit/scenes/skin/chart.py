@@ -7,11 +7,10 @@ from typing import TypeVar
 import moderngl
 import numpy as np
 
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.world import Scene
+from profilefit.scenes.stage.world import INSIDE, Scene
 
 ROWS = 270  # of the picture that is searched with
 STEPS = 12  # of the bisection: the height to 1 in 4000

@@ -22,8 +22,7 @@ from scipy.optimize import brentq
 from scipy.special import erf
 
 from mcml_sim import Setting
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.skin.truth import exact_quartile
 from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
 from mcml_sim import Setting, exact
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.materials import BY_NAME
 from profilefit.recipes.declared import Range
 from profilefit.scenes.skin.truth import albedo_of

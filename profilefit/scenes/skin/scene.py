@@ -12,11 +12,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from mcml_sim import Setting
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.media.checks import require
-from mcml_sim.media.fresnel import normal_reflectance
+from mcml_sim.media.arrays import require
+from mcml_sim.media.medium import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import SettingError
-from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.laws.rational import REFRACTING
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.recipes.declared import (
@@ -36,9 +36,7 @@ from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, t
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.judge import surface_judge
-from profilefit.scenes.stage.picture import RenderResult
-from profilefit.scenes.stage.request import OfChoose, TechniqueTable, ViewRequest
+from profilefit.scenes.stage.judge import RenderResult, surface_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene
@@ -109,7 +107,7 @@ class MaterialTable(Declared):
         return Painted((a.reflectance, b.reflectance, c.reflectance), (a.mfp, b.mfp, c.mfp))
 
 
-class SkinTechnique(TechniqueTable):
+class SkinTechnique(request.TechniqueTable):
     """Table [technique]: samples of a law, the separable filter, or none."""
 
     kind: Annotated[str, OneOf(*KINDS)] = SAMPLED
@@ -126,7 +124,7 @@ class SkinTechnique(TechniqueTable):
         return self
 
 
-class SceneRequest(ViewRequest):
+class SceneRequest(request.ViewRequest):
     """Scene of skin that a file requests; `layers` and `choose` are read by `profilefit choose`."""
 
     scene: Annotated[str, OneOf("skin")] = "skin"
@@ -138,8 +136,8 @@ class SceneRequest(ViewRequest):
         SKIN
     )
     technique: SkinTechnique = SkinTechnique()
-    layers: OfChoose = None
-    choose: OfChoose = None
+    layers: request.OfChoose = None
+    choose: request.OfChoose = None
 
     @property
     def material(self) -> str | Painted:

@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from mcml_sim import Setting, exact
-from mcml_sim.media.arrays import Floats, namespace
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, namespace, require
 from profilefit.errors import SettingError
-from profilefit.scenes.stage.buffers import Singles
+from profilefit.scenes.stage.world import Singles
 from profilefit.shader.emit import literal, text_beside
 
 DIFFUSE = Setting("diffuse")  # the light that irradiance is

@@ -1,9 +1,9 @@
-"""Judge of pictures: a reference, errors of pictures against it, and points of error against cost for a report."""
+"""Pictures of a technique and their judge: a reference, errors against it, and points of error against cost."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,19 +11,55 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter
 
 from mcml_sim import Setting
-from mcml_sim.media.arrays import Floats
-from profilefit.scenes.stage.buffers import INSIDE
+from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.picture import UNKNOWN, ChartPoint, RenderResult, TruthError, to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import exitance_of, own_error
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
 from profilefit.scenes.stage.technique import NamedTechnique
-from profilefit.scenes.stage.world import Scene
+from profilefit.scenes.stage.world import INSIDE, Scene
 
+Bytes = NDArray[np.uint8]
 TURNS = 5
 EXPOSURE = 1.1  # of pictures whose lamp is chosen for it: few of their pixels are clipped by it
 SQUARE = 7  # pixels of a side, over which a map of errors that are noisy takes a mean
+
+
+@dataclass(frozen=True)
+class ChartPoint:
+    """Error and cost of a technique with so many samples of a pixel (of the separable filter: taps).
+
+    rmse          root mean square error of the light, over the mean of the reference [-]
+    milliseconds  of the technique's passes, each time that they were run (turns,)
+    """
+
+    label: str
+    samples: int
+    rmse: float
+    milliseconds: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RenderResult:
+    """Scene, drawn beside its reference; row 0 at the top.
+
+    picture, truth  (h, w, 3) as a screen shows them
+    error  (h, w) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none is
+           measured. Its own root mean square is `point.rmse`, or more if the reference has noise
+    chart  the point of the technique, and others with other numbers of samples, the least first
+    frame, passes  milliseconds of a whole frame, each time that it was drawn (turns,); of its parts by their names
+    of     light that the errors are of
+    """
+
+    picture: Bytes
+    truth: Bytes
+    error: Floats
+    point: ChartPoint
+    chart: tuple[ChartPoint, ...]
+    frame: tuple[float, ...]
+    truth_error: TruthError
+    of: str = "scattered light"
+    passes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -154,3 +190,15 @@ def surface_judge(
             fine.draw(scene)
             error = own_error(fine.buffers(), mfp, table)
     return Judge(exitance_of(buffers, mfp, table), buffers.mask > INSIDE, error)
+
+
+def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:
+    """Return linear light (h, w, 3) times `exposure` as 8-bit values of a screen (IEC 61966-2-1), rows as they are."""
+    require(exposure > 0, "exposure", "a factor > 0", exposure)
+    return np.round(srgb_codes(np.asarray(image, float) * exposure)).astype(np.uint8)
+
+
+def srgb_codes(linear: ArrayLike) -> Floats:
+    """Return values of a screen [8-bit steps, 0 to 255] for linear ones, white 1; they are not rounded."""
+    clipped = np.clip(np.asarray(linear, float), 0.0, 1.0)
+    return 255.0 * np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)

@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, require
+from mcml_sim.media.arrays import Floats, checked_whole, require
 
 WRAPS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 1, 2)
 KINDS = ("uniform", "importance", "importance blue")

@@ -12,8 +12,7 @@ import moderngl
 import numpy as np
 
 from profilefit.errors import ShaderError
-from profilefit.scenes.stage.buffers import Singles
-from profilefit.scenes.stage.world import Mesh
+from profilefit.scenes.stage.world import Mesh, Singles
 from profilefit.shader.context import check_errors, fragments, program, seconds
 
 VERSION = "#version 330\n"

@@ -9,13 +9,11 @@ from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
-from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.judge import TURNS, Judge, points
+from profilefit.scenes.stage.judge import TURNS, Judge, RenderResult, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
-from profilefit.scenes.stage.picture import RenderResult
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
-from profilefit.scenes.stage.world import Camera, Light, Rgb, Scene, unit
+from profilefit.scenes.stage.world import INSIDE, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
 # The reference sums over all pairs of pixels, six minutes on a core for so many.

@@ -17,14 +17,23 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import checked_whole, require
+from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import INSIDE, PLACE, SURFACE, Buffers, Singles
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
-from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
+from profilefit.scenes.stage.world import (
+    INSIDE,
+    PLACE,
+    SURFACE,
+    Buffers,
+    Part,
+    Scene,
+    Singles,
+    looking,
+    orthographic,
+    unit,
+)
 from profilefit.shader.context import seconds
 from profilefit.shader.emit import text_beside
 

@@ -28,12 +28,11 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import Setting, exact
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require_all
 from profilefit.errors import InputError, SettingError
 from profilefit.fitting.sampling import ExactTarget, LawTarget, Target
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.scenes.stage import pattern
-from profilefit.scenes.stage.buffers import require
 
 NODES, PANEL = 12, 1.0  # Gauss nodes of a panel, and the greatest width in u of one
 FARTHEST = 1e7  # radius [mfp] beyond which less than 1e-7 of white light leaves, and none of any other
@@ -55,9 +54,9 @@ def step_response(
     SettingError where the setting is not the law's or has no exact solution.
     """
     places, albedos, length = np.broadcast_arrays(*(np.asarray(value, float) for value in (x, alpha, mfp)))
-    require("x", places, np.isfinite(places), "a finite place")
-    require("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
-    require("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
+    require_all("x", places, np.isfinite(places), "a finite place")
+    require_all("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
+    require_all("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
     target: Target
     if law is None:
         target = ExactTarget(setting or Setting())

@@ -29,13 +29,10 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, Curves, CurveTable, cubic, exact_table
-from profilefit.scenes.stage.picture import TruthError, averaged
-from profilefit.scenes.stage.world import Camera
+from profilefit.scenes.stage.world import INSIDE, Buffers, Camera
 
 FORWARD = np.array([0.0, 0.0, -1.0])
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
@@ -212,6 +209,27 @@ def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = 
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
 
+class TruthError(NamedTuple):
+    """Error of a reference over its mean [-]: half of the pixels and nine in ten are below the first two.
+
+    Of a surface integral it is what half the pixel's side changes, of paths and rays the standard error; the root mean
+    square is what outlines set.
+    """
+
+    half: float
+    most: float
+    rms: float
+
+    @classmethod
+    def of(cls, share: Floats) -> TruthError:
+        """Return the error of pixels whose errors are known, each over the reference's mean [-]."""
+        half, most = np.quantile(share, (0.5, 0.9)).tolist()
+        return cls(half, most, float(np.sqrt(np.mean(share**2))))
+
+
+UNKNOWN = TruthError(np.nan, np.nan, np.nan)
+
+
 def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:
     """Return what half the pixel's side changes in `exitance_of`, at some pixels of a picture of even size.
 
@@ -349,3 +367,9 @@ def _divided(scene: _Scene, pixels: Array, count: int) -> tuple[Array, Array, Ar
     position = scene.position[pixels, None] + a * scene.across[pixels, None] + b * scene.along[pixels, None]
     area = scene.area[pixels, None] * (0.25 * np.outer(weights, weights).ravel())
     return position.reshape(-1, 3), area.ravel(), jnp.repeat(scene.irradiance[pixels], count * count, axis=0)
+
+
+def averaged(fine: Floats, each: int) -> Floats:
+    """Return the means (rows, columns, c) of pixels with so many rays along a side, in linear light."""
+    rows, columns, channels = fine.shape
+    return np.asarray(fine.reshape(rows // each, each, columns // each, each, channels).mean(axis=(1, 3)))

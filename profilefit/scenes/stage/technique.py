@@ -14,11 +14,10 @@ from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage import pattern
-from profilefit.scenes.stage.buffers import Singles
 from profilefit.scenes.stage.exact_law import NAME, ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import Pass, Read
-from profilefit.scenes.stage.world import Part, Rgb, Scene, unit
+from profilefit.scenes.stage.world import Part, Rgb, Scene, Singles, unit
 from profilefit.shader.emit import law_text, prefix, text_beside
 
 Law = ProfileLaw | ExactLaw

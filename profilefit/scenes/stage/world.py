@@ -1,5 +1,7 @@
 """Scene: parts with a mesh and a texture, one light far away, a little light from everywhere, and a camera.
 
+Its G-buffer is the surface that the camera sees, pixel by pixel, as numpy arrays.
+
 World and view space are in millimetres, y up; a view looks along -z.
 """
 
@@ -12,11 +14,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats
-from mcml_sim.media.checks import require
+from mcml_sim.media.arrays import Floats, checked_finite, require, require_all
 from profilefit.errors import InputError
 
 Rgb = tuple[float, float, float]
+Singles = NDArray[np.float32]
+VECTORS = ("irradiance", "reflectance", "position", "normal")
+NUMBERS = ("mask", "thickness", "visibility", "roughness")
+INSIDE = 0.5  # the shaders' threshold of the mask: light scatters inside where it is beyond
+ROUNDING = 1e-6  # a float32 that came from a texture's filter may end so far beyond 1
+SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
+PLACE = "place_map"  # u, v, and 1 where a surface is
 KINDS = ("perspective", "orthographic")
 # Of central differences, over the largest coordinate: there rounding, eps / step, is as large as the rest, step^2.
 DIFFERENCE = float(np.cbrt(np.finfo(float).eps))
@@ -117,6 +125,76 @@ class Scene:
     def zoomed(self, height: float) -> Self:
         """Return the scene seen by a camera that shows `height` [mm] at its target."""
         return replace(self, camera=replace(self.camera, height=height))
+
+
+@dataclass(frozen=True)
+class Buffers:
+    """Float32 arrays, row 0 at the bottom; (h, w, 3) or (h, w).
+
+    irradiance   E, all light that arrives [-];  reflectance  A [-], both red, green, blue
+    position     in view space [mm]: x right, y up, z < 0 before the camera;  normal  in view space, unit length
+    mask         1 where light scatters inside, 0 elsewhere
+    thickness    way of the light through the part [mm]
+    pixel        side of a pixel [mm]; in perspective at a depth of 1 mm
+    visibility   share of the light that no shadow takes [-];  roughness  of GGX [-]
+
+    Where mask > 0.5 all are finite and A is in [0, 1]; elsewhere only the mask need be finite. Raises InputError.
+    """
+
+    irradiance: Singles
+    reflectance: Singles
+    position: Singles
+    normal: Singles
+    mask: Singles
+    thickness: Singles
+    pixel: float
+    is_perspective: bool = False
+    visibility: Singles | None = None
+    roughness: Singles | None = None
+
+    def __post_init__(self) -> None:
+        require(0 < self.pixel < np.inf, "pixel", "a length > 0 [mm]", self.pixel)
+        rows, columns = np.shape(self.mask)[:2]
+        given = {name: array for name in VECTORS + NUMBERS if (array := getattr(self, name)) is not None}
+        for name, array in given.items():
+            accepted = (rows, columns, 3) if name in VECTORS else (rows, columns)
+            if np.shape(array) != accepted:
+                raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
+        mask = np.asarray(self.mask)
+        checked_finite("mask", mask)  # NaN would be neither inside nor outside
+        inside = mask > INSIDE
+        for name, array in given.items():
+            checked_finite(name, np.asarray(array)[inside], f"finite where mask > {INSIDE}")
+        albedo = np.asarray(self.reflectance)[inside]
+        good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
+        require_all("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        rows, columns = self.mask.shape
+        return columns, rows
+
+    def maps(self) -> dict[str, Singles]:
+        """Return the four float maps (h, w, 4) of `SURFACE`, by name."""
+        ones = np.ones_like(self.mask)
+        fourth = (
+            self.thickness,
+            ones if self.visibility is None else self.visibility,
+            self.mask,
+            0.42 * ones if self.roughness is None else self.roughness,
+        )
+        return {
+            name: np.concatenate([getattr(self, vector), last[..., None]], axis=-1).astype(np.float32)
+            for name, vector, last in zip(SURFACE, VECTORS, fourth, strict=True)
+        }
+
+    @classmethod
+    def of_maps(cls, maps: Iterable[Singles], pixel: float, is_perspective: bool) -> Buffers:
+        """Return the G-buffer of four maps (h, w, 4), in the order of `SURFACE`."""
+        one, two, three, four = maps
+        vectors = one[..., :3], two[..., :3], three[..., :3], four[..., :3]
+        return cls(*vectors, three[..., 3], one[..., 3], pixel, is_perspective, two[..., 3], four[..., 3])
 
 
 def _require_light(name: str, light: Rgb) -> None:

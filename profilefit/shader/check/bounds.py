@@ -17,8 +17,7 @@ from mcml_sim import exact
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
-from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.fitting.quality import albedo_quality, profile_quality
+from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE, albedo_quality, profile_quality
 from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Range
 from profilefit.laws.liang import Liang
 from profilefit.laws.printed_maps import LiangAlbedo

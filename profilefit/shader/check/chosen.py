@@ -11,7 +11,6 @@ from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check.law_check import HalfCheck, LawCheck, MapCheck, check_half, check_laws, check_map
 from profilefit.shader.check.law_cost import YARDSTICK, Cost, costs
@@ -21,7 +20,7 @@ from profilefit.shader.context import opened, renderer
 REGENERATED = "regenerated"
 # Indices, and mean cosines, that a law which spans them is checked at, of those: both ends and between.
 INDICES, COSINES = (1.001, 1.02, 1.2, 1.4, 1.6), (0.1, 0.5, 0.95)
-Chosen = tuple[list[LoadedLaw], list[LoadedLaw]]
+Chosen = tuple[list[catalogue.LoadedLaw], list[catalogue.LoadedLaw]]
 """Profile laws, and maps between A and alpha."""
 
 
@@ -62,7 +61,7 @@ def regenerated(folder: Folder) -> Chosen:
     """List all laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
 
-    def spread(loaded: LoadedLaw) -> list[LoadedLaw]:
+    def spread(loaded: catalogue.LoadedLaw) -> list[catalogue.LoadedLaw]:
         content = records.content(loaded.label)
         low, high = content.get("indices") or (0.0, 0.0)
         cosines = COSINES if "cosines" in content else (loaded.setting.g,)

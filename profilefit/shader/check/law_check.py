@@ -24,8 +24,7 @@ import numpy as np
 from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
-from profilefit.fitting.measures import MEASURES
-from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
+from profilefit.fitting.quality import ENERGY_WITHIN, MEASURES, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.pipelines import inversion_error

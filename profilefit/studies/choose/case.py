@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import Floats, require
 from profilefit.laws.base import ProfileLaw
 
 SAMPLES = (4, 8, 16, 32, 64, 128, 256)
@@ -78,10 +77,8 @@ class Within:
     pixels: int = 2
 
     def __post_init__(self) -> None:
-        if not 0 < self.mfp <= 100:
-            raise InputError(f"within.mfp must be a number of mean free paths in (0, 100], got {self.mfp!r}")
-        if not 1 <= self.pixels <= 100:
-            raise InputError(f"within.pixels must be a whole number in 1 ... 100, got {self.pixels!r}")
+        require(0 < self.mfp <= 100, "within.mfp", "a number of mean free paths in (0, 100]", self.mfp)
+        require(1 <= self.pixels <= 100, "within.pixels", "a whole number in 1 ... 100", self.pixels)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from profilefit.errors import InputError
 from profilefit.fitting.sampling import LawTarget
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.laws.rational import REFRACTING
 from profilefit.scenes.skin.law import DARKEST, FOLLOW, Separable, kernel_quartile
 from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_response

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field
 
 from mcml_sim import Setting
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.checks import shown
+from mcml_sim.media.arrays import shown
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS, LISTED, Declared, NumberRange, OneOf, Range, Table, Tolerance, words
 from profilefit.recipes.stack.file import LayerStack, read_layers

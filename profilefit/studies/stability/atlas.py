@@ -13,13 +13,10 @@ from profilefit.errors import InputError
 from profilefit.laws import MAPS
 from profilefit.laws.base import EVERYWHERE
 from profilefit.recipes import catalogue
-from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder, Records
 from profilefit.shader.check import bounds
 from profilefit.studies.stability import exact_cells, fit_cases, gradients, law_cells, map_cells, misuse, scenes, stacks
 from profilefit.studies.stability.cells import QUANTITIES, TEXT16, TEXT32, Cells, Region, regions_of
-from profilefit.studies.stability.fit_cases import FitCase
-from profilefit.studies.stability.map_cells import map_label
 
 IF_NAMED = ("heart", "sea", "fur")  # one needs OpenGL, and none is of a law
 SETTINGS = (Setting(), Setting("diffuse"))
@@ -51,7 +48,7 @@ class Findings:
     name: str
     cells: tuple[Cells, ...]
     regions: tuple[Region, ...]
-    fits: tuple[FitCase, ...] = ()
+    fits: tuple[fit_cases.FitCase, ...] = ()
 
     @property
     def failures(self) -> int:
@@ -68,14 +65,14 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     profiles = [one for one in catalogue.all_profiles(records) if one.law.entry.has_text]  # no shader runs a quadrature
     albedos = catalogue.albedo_laws(records, matched=False)
 
-    def chosen(named: LoadedLaw, label: str) -> bool:
+    def chosen(named: catalogue.LoadedLaw, label: str) -> bool:
         return bool({label, named.name, *named.records} & set(requested)) if requested else not quick or label in QUICK
 
-    def job(name: str, look: Callable[..., Iterable[Cells | FitCase]], *of: Any) -> Job:
+    def job(name: str, look: Callable[..., Iterable[Cells | fit_cases.FitCase]], *of: Any) -> Job:
         return name, partial(_findings, name, look, *of, records, quick)
 
     todo = [job(one.label, _of_law, one, bool(requested)) for one in profiles if chosen(one, one.label)]
-    todo += [job(map_label(one), _of_map, one) for one in albedos if chosen(one, map_label(one))]
+    todo += [job(map_cells.map_label(one), _of_map, one) for one in albedos if chosen(one, map_cells.map_label(one))]
     usual = () if requested or quick else set(FUNCTIONS) - set(IF_NAMED)
     todo += [job(name, look) for name, look in FUNCTIONS.items() if name in {*requested, *usual}]
     every = [*profiles, *albedos]
@@ -99,15 +96,15 @@ def run(todo: list[Job]) -> Iterator[Findings]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _findings(name: str, look: Callable[..., Iterable[Cells | FitCase]], *given: Any) -> Findings:
+def _findings(name: str, look: Callable[..., Iterable[Cells | fit_cases.FitCase]], *given: Any) -> Findings:
     """Return the cells and the fits that a function yields."""
     every = list(look(*given))
     cells = tuple(one for one in every if isinstance(one, Cells))
-    fits = tuple(one for one in every if isinstance(one, FitCase))
+    fits = tuple(one for one in every if isinstance(one, fit_cases.FitCase))
     return Findings(name, cells, tuple(region for each in cells for region in regions_of(each)), fits)
 
 
-def _of_law(named: LoadedLaw, is_named: bool, folder: Records, quick: bool) -> Iterator[Cells]:
+def _of_law(named: catalogue.LoadedLaw, is_named: bool, folder: Records, quick: bool) -> Iterator[Cells]:
     limits, text = law_cells.limits_of(named, folder), map_cells.in_reduced(named)
     yield from law_cells.cells_of(text, limits, QUICK_ARITHMETICS if quick else law_cells.COMPUTED)
     yield from law_cells.model_cells(named, limits)
@@ -117,7 +114,7 @@ def _of_law(named: LoadedLaw, is_named: bool, folder: Records, quick: bool) -> I
         yield from gradients.of_law(text, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
 
 
-def _of_map(named: LoadedLaw, folder: Records, quick: bool) -> Iterator[Cells]:
+def _of_map(named: catalogue.LoadedLaw, folder: Records, quick: bool) -> Iterator[Cells]:
     text = map_cells.in_reduced(named)
     yield from map_cells.cells_of(named, folder)
     yield from misuse.of_law(text)
@@ -133,7 +130,7 @@ def _of_exact(folder: Records, quick: bool) -> Iterator[Cells]:
     yield from misuse.of_exact()
 
 
-def _of_solver(folder: Records, quick: bool) -> Iterator[FitCase]:
+def _of_solver(folder: Records, quick: bool) -> Iterator[fit_cases.FitCase]:
     for name, objective, lanes in FITTED[:2] if quick else FITTED:
         law = (catalogue.albedo_law if name in MAPS else catalogue.load)(name, folder=folder)
         yield from fit_cases.fits_of(law, objective, name, lanes)
@@ -141,7 +138,7 @@ def _of_solver(folder: Records, quick: bool) -> Iterator[FitCase]:
     yield from fit_cases.trimmed_fits(start)  # type: ignore[arg-type]
 
 
-FUNCTIONS: dict[str, Callable[[Records, bool], Iterable[Cells | FitCase]]] = {
+FUNCTIONS: dict[str, Callable[[Records, bool], Iterable[Cells | fit_cases.FitCase]]] = {
     "exact": _of_exact,
     "convert": lambda *_: [*map_cells.conversion_cells(), *misuse.of_convert()],
     "solver": _of_solver,

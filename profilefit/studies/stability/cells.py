@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from mcml_sim.media.arrays import Floats
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.laws.evaluate import POSITIVE
+from profilefit.laws.base import POSITIVE, AlbedoLaw, ProfileLaw
 from profilefit.shader import emit
 
 Mask = NDArray[np.bool_]

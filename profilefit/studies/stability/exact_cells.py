@@ -19,8 +19,7 @@ from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.single_scattering import source_strength
 from mcml_sim.exact.stack import solution
 from mcml_sim.media.arrays import Floats
-from profilefit.laws.base import Range
-from profilefit.laws.rational import Normalisation
+from profilefit.laws.base import Normalisation, Range
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import Axes, Cells, Mask, absolute, axis, relative, steps_down, steps_up
 

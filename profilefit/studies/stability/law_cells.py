@@ -26,7 +26,6 @@ from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds, dense_grid
-from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentGrid, Axes, Cells, Mask, RoundedText, absolute, axis, relative
 
@@ -75,7 +74,7 @@ def limits_of(named: LoadedLaw, folder: Folder) -> Limits:
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
     errors = {cells.PROFILE: rel, cells.PDF: rel, cells.CDF: ks, cells.SAMPLE: drawn}
-    known = {name: ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
+    known = {name: bounds.ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
     return Limits(known, bounds.valid_profile(named, folder))
 
 

@@ -20,7 +20,6 @@ from profilefit.laws.base import AlbedoLaw, Range
 from profilefit.recipes.catalogue import LoadedLaw
 from profilefit.recipes.record import Folder
 from profilefit.shader.check import bounds
-from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability import cells
 from profilefit.studies.stability.cells import ArgumentAxis, Cells, RoundedText, Verdict, absolute, axis, steps_down
 
@@ -39,7 +38,7 @@ def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
     """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
     text, model, spans = in_reduced(named), bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
     for (name, measure), span in zip(WAYS.items(), spans, strict=True):
-        limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
+        limit = bounds.ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
             at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", cells.DTYPES[arithmetic])
             value = _value(text.law, name, arithmetic, at)

@@ -36,9 +36,8 @@ from profilefit.laws.quantile import Quantile, radius
 from profilefit.laws.two_parts import TwoPartHazard
 from profilefit.recipes import catalogue
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, STEP, Curves, exact_table
-from profilefit.studies.tradeoff import stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
-from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
+from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track, Work, silent, take_turns
 
 Function = Callable[[Array, Array], Any]
 YARDSTICK, TABLE = "normalized diffusion", "exact, tabulated"
@@ -341,7 +340,7 @@ class ContenderResult:
     ks: Floats
 
 
-def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
+def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
     contestants, left_out = contenders(folder, [one for one in SPECS if not quick or one.label in QUICKLY])
@@ -365,7 +364,7 @@ def counts(contender: Contender) -> dict[str, FunctionCounts]:
     return {part: count(functions[part]) for part in PARTS if part in functions}
 
 
-def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, stopwatch.Work]:
+def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, Work]:
     """Return the timed calls of a contender, by part."""
     calls = {}
     for part, function in contender.parts.items():
@@ -375,7 +374,7 @@ def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSi
     return calls
 
 
-def timed(function: Function, radii: bool, points: int) -> stopwatch.Work:
+def timed(function: Function, radii: bool, points: int) -> Work:
     """Return a call on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
     shares = np.random.default_rng(1).random(points)
     near, far = RADII
@@ -383,7 +382,7 @@ def timed(function: Function, radii: bool, points: int) -> stopwatch.Work:
     return _work(lambda values: function(values, jnp.float32(MATERIAL)), given)
 
 
-def _work(function: Callable[[Array], Any], given: Array) -> stopwatch.Work:
+def _work(function: Callable[[Array], Any], given: Array) -> Work:
     compiled = jax.jit(function)
 
     def work(_: int) -> int:
@@ -393,18 +392,16 @@ def _work(function: Callable[[Array], Any], given: Array) -> stopwatch.Work:
     return work
 
 
-def measured(
-    contestants: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent
-) -> list[ContenderResult]:
+def measured(contestants: Sequence[Contender], sizes: LawSizes, track: Track = silent) -> list[ContenderResult]:
     """Count, time and judge every contender; the yardstick must be one of them."""
     counted = {contender.name: counts(contender) for contender in contestants}
-    jobs: dict[str, stopwatch.Work] = {}
+    jobs: dict[str, Work] = {}
     for one in contestants:
         jobs |= {f"{part} of {one.name}": work for part, work in works(one, counted[one.name], sizes).items()}
         if one.setup is not None:
             alphas = jnp.linspace(0.05, 0.995, sizes.albedos, dtype=jnp.float32)
             jobs[f"setup of {one.name}"] = _work(one.setup, alphas)
-    rates = stopwatch.take_turns(jobs, sizes.turns, track, "laws")
+    rates = take_turns(jobs, sizes.turns, track, "laws")
     rows: Iterable[int] = track(range(len(contestants)), "errors of laws")
     return [_row(contestants[i], counted[contestants[i].name], rates, sizes) for i in rows]
 

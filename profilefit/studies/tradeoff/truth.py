@@ -27,7 +27,6 @@ from mcml_sim.media.arrays import Floats
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread, photons_text
-from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
 RingEnergies = tuple[Floats, Floats | None]
 """Ring energies (albedos, rings) [-], and the relative error (albedos, rings) that the method states itself."""
@@ -153,7 +152,7 @@ class Contestant:
         return f"{self.annuli.panel}: {self.method}, {self.label}"
 
 
-def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> TradeoffPart:
+def measure(sizes: TruthSizes = FULL, track: stopwatch.Track = stopwatch.silent) -> TradeoffPart:
     """Run every method in turns, and judge its answers."""
     every, notes = contestants(sizes)
     energies: dict[str, list[RingEnergies]] = {one.key: [] for one in every}
@@ -202,7 +201,7 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     return found, [] if trace else [f"left out: the {SCALAR} {scalar.ABSENT}"]
 
 
-def _point(contestant: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
+def _point(contestant: Contestant, rates: stopwatch.Rates, energies: list[RingEnergies], estimate: bool) -> Point:
     case, method, label = contestant.annuli, contestant.method, contestant.label
     middle, worst = zip(*(case.errors(energy) for energy, _ in energies), strict=True)
     stated = [each[case.judged] for _, each in energies if each is not None]

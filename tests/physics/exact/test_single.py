@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from mcml_sim import Grid, InputError, Setting, exact, phase, simulate_orders
 from mcml_sim.exact import single_scattering
-from mcml_sim.media import fresnel
+from mcml_sim.media.medium import fresnel
 
 LN2 = np.log(2)
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 50.0, 40)])
@@ -32,7 +32,7 @@ def photons_that_scatter_once(setting, photons, seed):
     if setting.illumination == "diffuse":
         # Cosine-weighted light outside refracts on its way in; each photon weighs what the surface lets in.
         outside = np.sqrt(source.random(photons))
-        reflected, cosine = fresnel.fresnel(1.0, setting.n, outside)
+        reflected, cosine = fresnel(1.0, setting.n, outside)
         passes = (1 - reflected) / single_scattering.entered(setting)
     down = np.stack([np.sqrt(1 - cosine**2), np.zeros(photons), cosine])
     place = source.exponential(size=photons) * down
@@ -44,7 +44,7 @@ def photons_that_scatter_once(setting, photons, seed):
     up = away[2] < 0
     place, away = place[:, up], away[:, up]
     path = place[2] / -away[2]
-    reflected, _ = fresnel.fresnel(setting.n, 1.0, -away[2])
+    reflected, _ = fresnel(setting.n, 1.0, -away[2])
     exit_ = place + path * away
     return np.hypot(exit_[0], exit_[1]), np.broadcast_to(passes, photons)[up] * np.exp(-path) * (1 - reflected)
 
@@ -118,7 +118,7 @@ def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):
     def integrand(mu):
         rate = np.sqrt((1 + mu) / (1 - mu))
         within = np.exp(-ring[0] * rate) - np.exp(-ring[1] * rate)
-        passes = 1 - fresnel.fresnel(setting.n, 1.0, mu)[0]
+        passes = 1 - fresnel(setting.n, 1.0, mu)[0]
         return 2 * np.pi * phase.HenyeyGreenstein(setting.g).pdf(-mu) * mu / (1 + mu) * within * passes
 
     critical = np.sqrt(max(1 - setting.n**-2, 0))

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality, r_squared
+from profilefit.fitting.quality import (
+    MEASURES,
+    OF_MAP,
+    OF_PROFILE,
+    AlbedoQuality,
+    Quality,
+    albedo_quality,
+    profile_quality,
+    r_squared,
+)
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.printed_maps import LiangAlbedo
 from profilefit.recipes.folder import fits_folder

@@ -12,8 +12,7 @@ from mcml_sim.exact import single_scattering
 from profilefit import albedo_law, albedo_quality
 from profilefit.laws import published
 from profilefit.laws.printed_maps import Chiang, LiangAlbedo, VanDeHulst
-from profilefit.laws.rational import Rational
-from profilefit.laws.refracting_rational import RefractingRational
+from profilefit.laws.rational import Rational, RefractingRational
 from tests.fixtures import NORMALISATION, slow
 from tests.physics.tracing.adding_doubling import solve
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from mcml_sim.media import fresnel
+from mcml_sim.media.medium import fresnel
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def solve(medium, angles=18, nodes=4, diffuse=False):
     inside = layers[0]
     for below in layers[1:]:
         inside = _add(inside, below)
-    surface = fresnel.fresnel(relative, 1.0, bundles.mu)[0]
+    surface = fresnel(relative, 1.0, bundles.mu)[0]
     beam = np.zeros(bundles.mu.size)
     beam[-1] = 1 - surface[-1]
     if diffuse:

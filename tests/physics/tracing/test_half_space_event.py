@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, Setting, half_space, simulate, simulate_orders
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import half_space_event, orders_batch, rng
 from mcml_sim.tracing.order_bins import OrderBins

@@ -16,9 +16,8 @@ import profilefit
 from mcml_sim import Setting
 from mcml_sim.runs.input_runs import Compiling
 from profilefit import laws
-from profilefit.laws.base import Entry, Range, Sampler, Text
+from profilefit.laws.base import BLOCKS, Entry, Range, Sampler, Text, evaluated
 from profilefit.laws.escape import EscapeLaw
-from profilefit.laws.evaluate import BLOCKS, evaluated
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Layer, Medium, Setting, half_space
-from mcml_sim.media import fresnel
-from mcml_sim.media.medium import MAX_LAYERS
+from mcml_sim.media.medium import MAX_LAYERS, fresnel, specular_reflectance
 from tests.fixtures import refused
 
 TISSUE = Layer(n=1.4, mu_a=1, mu_s=99, g=0.9, thickness=0.1)
@@ -157,31 +156,31 @@ def polarised(n1, n2, angle):
 @pytest.mark.parametrize(("n1", "n2"), [(1.0, 1.5), (1.5, 1.0), (1.37, 1.4)])
 def test_fresnel_is_the_mean_of_the_textbooks_polarisations(n1, n2):
     angle = np.linspace(0.01, 0.99, 50) * (np.arcsin(min(n2 / n1, 1.0)))
-    reflectance, cosine = fresnel.fresnel(n1, n2, np.cos(angle))
+    reflectance, cosine = fresnel(n1, n2, np.cos(angle))
     np.testing.assert_allclose(reflectance, np.mean(polarised(n1, n2, angle), axis=0), rtol=1e-9)
     np.testing.assert_allclose(np.sqrt(1 - cosine**2) * n2, n1 * np.sin(angle), rtol=1e-9)
 
 
 def test_fresnel_at_angles_that_stand_out():
     """Normal, Brewster's, beyond the critical angle, and grazing."""
-    reflectance, cosine = fresnel.fresnel(1.0, 1.5, 1.0)
+    reflectance, cosine = fresnel(1.0, 1.5, 1.0)
     assert reflectance == pytest.approx(0.04)
     assert cosine == 1.0
     angle = np.arctan(1.5)
     across, along = polarised(1.0, 1.5, angle)
     assert along == pytest.approx(0, abs=1e-30)
-    assert fresnel.fresnel(1.0, 1.5, np.cos(angle))[0] == pytest.approx(across / 2)
+    assert fresnel(1.0, 1.5, np.cos(angle))[0] == pytest.approx(across / 2)
     critical = np.sqrt(1 - (1 / 1.5) ** 2)
-    reflectance, cosine = fresnel.fresnel(1.5, 1.0, np.array([0.0, 0.3, critical - 1e-9, critical + 1e-6]))
+    reflectance, cosine = fresnel(1.5, 1.0, np.array([0.0, 0.3, critical - 1e-9, critical + 1e-6]))
     np.testing.assert_array_equal(reflectance[:3], 1)
     np.testing.assert_array_equal(cosine[:3], 0)
     assert reflectance[3] < 1
     assert 0 < cosine[3] < 0.01
-    assert fresnel.fresnel(1.0, 1.5, 0.0)[0] == 1
+    assert fresnel(1.0, 1.5, 0.0)[0] == 1
     # Equal indices neither reflect nor bend.
-    assert fresnel.fresnel(1.4, 1.4, 0.0) == (0, 0)
+    assert fresnel(1.4, 1.4, 0.0) == (0, 0)
     cosine = np.random.default_rng(0).random(1000).astype(np.float32)
-    reflectance, refracted = fresnel.fresnel(np.float32(1.37), np.float32(1.37), cosine)
+    reflectance, refracted = fresnel(np.float32(1.37), np.float32(1.37), cosine)
     assert np.all(reflectance == 0)
     np.testing.assert_array_equal(refracted, cosine)
 
@@ -189,8 +188,8 @@ def test_fresnel_at_angles_that_stand_out():
 def test_fresnel_of_jax_arrays_is_that_of_numpy_in_single_precision():
     cosine = np.linspace(0, 1, 1001)
     for n1, n2 in ((1.0, 1.5), (1.5, 1.0)):
-        single = fresnel.fresnel(jnp.float32(n1), jnp.float32(n2), jnp.asarray(cosine, jnp.float32))
-        for fast, exact in zip(single, fresnel.fresnel(n1, n2, cosine), strict=True):
+        single = fresnel(jnp.float32(n1), jnp.float32(n2), jnp.asarray(cosine, jnp.float32))
+        for fast, exact in zip(single, fresnel(n1, n2, cosine), strict=True):
             assert fast.dtype == jnp.float32
             # Near the critical angle both rise as a square root, and 1e-7 in the cosine becomes 3e-4.
             assert np.all(np.isfinite(fast))
@@ -200,10 +199,10 @@ def test_fresnel_of_jax_arrays_is_that_of_numpy_in_single_precision():
 
 def test_tissue_reflects_as_its_surface_and_glass_with_all_orders_between_its_faces():
     medium = Medium((Layer(1.37, 1, 100, 0.9, 0.1), Layer(1.5, 1, 10, 0, 0.1)))
-    assert fresnel.specular_reflectance(medium) == pytest.approx((0.37 / 2.37) ** 2)
-    assert fresnel.specular_reflectance(Medium((Layer(1.0, 1, 1, 0),))) == 0, "a matched one reflects nothing"
+    assert specular_reflectance(medium) == pytest.approx((0.37 / 2.37) ** 2)
+    assert specular_reflectance(Medium((Layer(1.0, 1, 1, 0),))) == 0, "a matched one reflects nothing"
     glass, tissue = Layer(1.5, 0, 0, 0, 0.1), Layer(1.37, 1, 10, 0, 0.1)
     top, bottom = (0.4 / 2.6) ** 2, (0.13 / 2.87) ** 2
     series = top + sum((1 - top) ** 2 * bottom * (top * bottom) ** k for k in range(20))
     for medium in (Medium((glass, tissue), 1.1), Medium((glass,), 1.1, 1.37)):
-        assert fresnel.specular_reflectance(medium) == pytest.approx(series, rel=1e-12)
+        assert specular_reflectance(medium) == pytest.approx(series, rel=1e-12)

@@ -12,7 +12,7 @@ from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Solution
 from profilefit.laws import published
-from profilefit.laws.refracting_rational import RefractingRational
+from profilefit.laws.rational import RefractingRational
 from profilefit.recipes import catalogue, checks, recipe, targets
 from profilefit.recipes.pipelines import inversion_error, needs_photons, printed_sets
 from profilefit.recipes.recipe import Albedos, RingLayout

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from mcml_sim import Layer, Medium
-from mcml_sim.media import fresnel
+from mcml_sim.media.medium import fresnel
 from mcml_sim.tracing import layered_event, rng
 from mcml_sim.tracing.layered_event import CUT, EVENTS_PER_TURN, FIRST_TOSS, MAX_EVENTS, REFLECTED, ROULETTED, THRESHOLD
 
@@ -119,7 +119,7 @@ def test_a_matched_interface_lets_everyone_through_without_bending():
 def test_an_interface_reflects_by_fresnel_and_bends_by_snell():
     direction = unit(1, 1, -1)
     after = settle(lanes(direction, z=0.5, layer=3, weight=-1))
-    reflectance, cosine = fresnel.fresnel(1.6, 1.4, -direction[2])
+    reflectance, cosine = fresnel(1.6, 1.4, -direction[2])
     reflected = np.asarray(after.layer) == 3
     assert abs(reflected.mean() - reflectance) < 4 * np.sqrt(reflectance / NUMBER)
     up, down = direction_of(after)[:, ~reflected], direction_of(after)[:, reflected]

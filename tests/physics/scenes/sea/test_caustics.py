@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.sea_boxes import SUN, caustic_boxes
 from benchmarks.sea_filter import adaptive_filter, sigma
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.scenes.sea.caustics import Caustics, Splat, caustic_map, focus, splat_for
 from profilefit.scenes.sea.truth import caustic_irradiance, caustic_photons, misfit, photons
 from profilefit.scenes.sea.waves import Waves, first_hit, random_floor, random_sea, refracted

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from benchmarks.sea_photons import scattered_once, trace_beam, trace_view
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Isotropic
 from profilefit.scenes.sea import paths
 from profilefit.scenes.sea.caustics import Splat, caustic_map

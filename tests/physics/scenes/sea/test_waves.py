@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import fresnel
 from profilefit.scenes.sea import waves
 from profilefit.scenes.sea.waves import Waves, dense_hit, first_hit, newton_hit, random_floor, random_sea, refracted
 from profilefit.scenes.stage.renderer import float_texture
