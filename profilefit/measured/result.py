@@ -219,7 +219,8 @@ def fit(
     _require_held(light, held)
     known = scale if isinstance(scale, Known) else None
     if not (scale is None or isinstance(scale, Known)):
-        held["scale"] = _positive("scale", scale)
+        require(scale > 0, "scale", "a number > 0", scale)
+        held["scale"] = scale
     notes = where.notes
     if data.n is not None and not math.isclose(data.n, n):
         notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")
@@ -247,14 +248,9 @@ def _require_held(law: Light, held: Mapping[str, float]) -> None:
         raise InputError("held must have one of alpha and A, which say the same, got both")
     for name, value in held.items():
         if name == "l":
-            _positive("held l", value)
+            require(value > 0, "held l", "a number > 0", value)
         else:
             held_albedo(law, name, value)
-
-
-def _positive(name: str, value: float) -> float:
-    require(value > 0, name, "a number > 0", value)
-    return value
 
 
 def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:
