@@ -31,14 +31,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact.special_functions import (
-    dispersion,
-    inverse_sinh,
-    logarithm,
-    sinh_and_cosh,
-    square_root,
-    squared_decay_rate,
-)
+from mcml_sim.exact import special_functions as special
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].
 NEAREST_RADIUS = 1e-6
@@ -141,7 +134,7 @@ def _of_values(alpha: jax.Array, k: jax.Array, weight: jax.Array, value: jax.Arr
 
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
     """Return k and dk, each (rule.k,)."""
-    kappa = jnp.sqrt(squared_decay_rate(jax.lax.stop_gradient(alpha)))
+    kappa = jnp.sqrt(special.squared_decay_rate(jax.lax.stop_gradient(alpha)))
     scale = jnp.where(kappa > 0.0, (1.0 - START) * kappa, CONSERVATIVE_SCALE)
     step = (jnp.log(LAST_WAVE / (NEAREST_RADIUS * scale)) - FIRST_V) / (rule.k - 1)
     v = FIRST_V + step * np.arange(rule.k)
@@ -151,7 +144,7 @@ def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
 
 def over_alpha(alpha: jax.Array, k: jax.Array, illumination: str, rule: Rule) -> jax.Array:
     """Return R^(k) / alpha for k of shape (n,), not 0."""
-    branch = square_root(1.0 + k * k)[:, None]
+    branch = special.square_root(1.0 + k * k)[:, None]
     cosh, m, dm = _m_line(k[:, None], branch, rule)
     s = cosh / m
     h, of_k = _h_function(alpha, k[:, None], branch, s, rule)
@@ -160,7 +153,7 @@ def over_alpha(alpha: jax.Array, k: jax.Array, illumination: str, rule: Rule) ->
         pairs = outgoing[:, :, None] * outgoing[:, None, :]
         return jnp.sum(pairs / (s[:, :, None] + s[:, None, :]), axis=(1, 2))
     normal = outgoing / (1.0 + s)
-    inverse_h = square_root(of_k) + 0.5 * alpha * jnp.sum(normal / cosh**2, axis=1)
+    inverse_h = special.square_root(of_k) + 0.5 * alpha * jnp.sum(normal / cosh**2, axis=1)
     return 0.5 * jnp.sum(normal, axis=1) / inverse_h
 
 
@@ -171,8 +164,8 @@ def _m_line(k: jax.Array, branch: jax.Array, rule: Rule) -> tuple[jax.Array, jax
     """
     nodes, weights = np.polynomial.legendre.leggauss(rule.m)
     t = 0.5 * (nodes + 1.0)
-    top = inverse_sinh(k, branch)
-    sinh, cosh = sinh_and_cosh(top * t**2)
+    top = special.inverse_sinh(k, branch)
+    sinh, cosh = special.sinh_and_cosh(top * t**2)
     return cosh, sinh / k, cosh * (top / k) * (weights * t)
 
 
@@ -180,7 +173,7 @@ def _h_function(
     alpha: jax.Array, k: jax.Array, branch: jax.Array, s: jax.Array, rule: Rule
 ) -> tuple[jax.Array, jax.Array]:
     """Return H_k(1/s) for k and sqrt(1 + k^2) of shape (n, 1) and s of shape (n, m), and L(k), (n,)."""
-    square = squared_decay_rate(alpha)
+    square = special.squared_decay_rate(alpha)
     # The first node, u = 0, has no weight and is there for its integrand.
     step = np.log(2.0 * X_LAST / X_SCALE) / rule.x
     u = np.append(0.0, step * (np.arange(rule.x) + 0.5))
@@ -189,9 +182,9 @@ def _h_function(
     ray = 0.5 * X_SCALE * (branch + jnp.sqrt(branch.real**2 + branch.imag**2))  # halves the argument of the branch
     x = ray * np.sinh(u)
     squared = k * k + x * x
-    values = dispersion(alpha, squared)
-    rest = logarithm(values * (squared + 1.0) / (squared + square)) * (ray * np.cosh(u) * du)
+    values = special.dispersion(alpha, squared)
+    rest = special.logarithm(values * (squared + 1.0) / (squared + square)) * (ray * np.cosh(u) * du)
     # Held, or XLA works out each of them anew for every term of the sum.
     rest, s_square, x_square = jax.lax.optimization_barrier((rest, s * s, x * x))
     integral = s * jnp.sum(rest[:, None, :] / (s_square[:, :, None] + x_square[:, None, :]), axis=2)
-    return (s + branch) / (s + square_root(k * k + square)) * jnp.exp(-integral / np.pi), values[:, 0]
+    return (s + branch) / (s + special.square_root(k * k + square)) * jnp.exp(-integral / np.pi), values[:, 0]

@@ -113,8 +113,7 @@ class _Fold(Generic[R]):
         self._stopped = False
         self._next = self._added = 0
         self._early: dict[int, R] = {}
-        self.sum: R | None = None
-        """Sum so far; None before the first batch."""
+        self.sum: R | None = None  # of the batches so far
 
     def take(self) -> int | None:
         """Return the next batch, as soon as it is not too far ahead of the sum; None if no more are needed."""

@@ -8,17 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from datetime import timedelta
 from typing import TypeVar
 
+from rich import progress as bars
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    Task,
-    TextColumn,
-    TimeElapsedColumn,
-)
 from rich.text import Text
 
 T = TypeVar("T")
@@ -32,7 +23,7 @@ def is_watched() -> bool:
     return sys.stderr is not None and sys.stderr.isatty()
 
 
-def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
+def bar(unit: str, shown: bool | None = None, kept: bool = False) -> bars.Progress:
     """Return a bar that counts in `unit`, such as "photons".
 
     Args:
@@ -40,18 +31,18 @@ def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
         shown: whether it is shown; None and True: on a terminal only, as elsewhere it would be a file full of bars.
         kept: whether it stays on the screen when all is done.
     """
-    counted = () if unit == "photons" else (MofNCompleteColumn(),)
+    counted = () if unit == "photons" else (bars.MofNCompleteColumn(),)
     speed = _Words(lambda task: rate(_speed(task), unit), "dim")
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
         *counted,
-        TimeElapsedColumn(),
+        bars.TimeElapsedColumn(),
         speed,
         _Words(_remaining, "cyan"),
     )
     is_shown = is_watched() if shown is None else shown
-    return Progress(
+    return bars.Progress(
         *columns, console=Console(stderr=True), transient=not kept, disable=not is_shown, speed_estimate_period=PERIOD
     )
 
@@ -68,32 +59,32 @@ def tracked(
 @contextlib.contextmanager
 def working(what: str, quiet: bool = False) -> Iterator[None]:
     """Show a spinner, and for how long already, while something runs whose length nobody knows."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    shown = Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet or not is_watched())
+    columns = (bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.TimeElapsedColumn())
+    shown = bars.Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet or not is_watched())
     with shown:
         shown.add_task(what, total=None)
         yield
 
 
-class _Words(ProgressColumn):
+class _Words(bars.ProgressColumn):
     """Column of words that are blank until there are any."""
 
-    def __init__(self, words: Callable[[Task], str], style: str) -> None:
+    def __init__(self, words: Callable[[bars.Task], str], style: str) -> None:
         super().__init__()
         self._words, self._style = words, style
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: bars.Task) -> Text:
         return Text(self._words(task), style=self._style)
 
 
-def _remaining(task: Task) -> str:
+def _remaining(task: bars.Task) -> str:
     """Return the time that remains, blank until anything is done, and once all is."""
     speed = _speed(task)
     left = 0.0 if task.total is None or not speed else (task.total - task.completed) / speed
     return f"{timedelta(seconds=round(left))} left" if left > 0 else ""
 
 
-def _speed(task: Task) -> float | None:
+def _speed(task: bars.Task) -> float | None:
     """Return the units per second, lately; or since the start, before there are two steps."""
     since = task.completed / task.elapsed if task.elapsed else None
     return task.finished_speed or task.speed or since

@@ -252,17 +252,12 @@ class Dipole(DiffusionLaw):
         return 1.0 + 4.0 / 3.0 * (1.0 + reflected) / (1.0 - reflected)
 
     def shape_profile(self, x: Array, alpha: Array) -> Array:
-        sigma = transport_rate(alpha)
+        sigma = jnp.sqrt(3.0 * (1.0 - alpha))  # sqrt(3 sigma_a sigma_t') for sigma_t' = 1 [1/mfp]
         return flux(x, 1.0, sigma) + flux(x, self.image, sigma)
 
     def shape_energy(self, x: Array, alpha: Array) -> Array:
-        sigma = transport_rate(alpha)
+        sigma = jnp.sqrt(3.0 * (1.0 - alpha))
         return flux_within(x, 1.0, sigma) + flux_within(x, self.image, sigma)
-
-
-def transport_rate(alpha: Array) -> Array:
-    """sigma_tr = sqrt(3 sigma_a sigma_t') for sigma_t' = 1 [1/mfp]."""
-    return jnp.sqrt(3.0 * (1.0 - alpha))
 
 
 def diffuse_fresnel(n: float) -> float:

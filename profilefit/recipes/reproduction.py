@@ -390,18 +390,15 @@ def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Content
     fits = _fit("k1", alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit("k2", alpha, k2, [3.0, 2.5, 0.4])
     found = np.concatenate([one.parameters for one in fits])
     printed = _printed("(20)")  # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
-    curves, laws = (_bracket(found), _bracket(printed)), _both_k(alpha, printed)
+    curves = _bracket(found), _bracket(printed)
+    laws = FORMS["k1"](alpha, printed[:4]), FORMS["k2"](alpha, printed[4:])
     off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), laws, strict=True)]
     evidence = f"alpha .1 to .9 by .1, .95, .99: k1, k2 at each one are {off[0]:.3f}, {off[1]:.3f} rms from (20)"
     return _reading("(20)", f"{name}; residual in {residual}", found, curves, evidence)
 
 
-def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
-    return FORMS["k1"](alpha, p[:4]), FORMS["k2"](alpha, p[4:])
-
-
 def _bracket(p: Floats) -> Floats:  # k1 xi - k2 of (19), (alphas, shares)
-    k1, k2 = _both_k(INVERSE_ALPHAS, p)
+    k1, k2 = FORMS["k1"](INVERSE_ALPHAS, p[:4]), FORMS["k2"](INVERSE_ALPHAS, p[4:])
     return k1[:, None] * INVERSE_SHARES - k2[:, None]
 
 

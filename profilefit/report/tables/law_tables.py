@@ -186,12 +186,12 @@ def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[Rendera
         shown = []
         for one in samplers:
             errors = (one.exact_error, *(getattr(one.quality, name) for name in COLUMNS.values()))
-            shown.append((_sampler_label(one), *map(_worst, errors)))
+            shown.append((f"{one.of.label}: {one.name}", *map(_worst, errors)))
         header = ("law: sampler", "exact", *COLUMNS)
         caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
         yield row_table(f"Samplers, {setting}", header, shown, caption, fold=header[:1])
         if in_detail:
-            yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
+            yield from sampler_tables({f"{one.of.label}: {one.name}": one.quality for one in samplers})
     if not (qualities.profiles or qualities.maps or qualities.samplers):
         yield Text(NOTHING)
 
@@ -257,10 +257,6 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     if setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
-
-
-def _sampler_label(sampler: MeasuredSampler) -> str:
-    return f"{sampler.of.label}: {sampler.name}"
 
 
 def _number(measure: str, value: float) -> str:
