@@ -129,8 +129,7 @@ def test_published_frames_come_back_and_the_range_of_software_s_ratios_holds_the
 def test_what_was_measured_is_kept(hazard):
     made = Ratios("a device", 0.5, {"separable": 0.1}, {"separable": 0.01})
     assert Ratios(**json.loads(ratios_json(made))) == made
-    assert made.of(NOTHING) == 0.5
-    assert made.of(Option("gaussians", 10, 3)) == pytest.approx(0.5 + 3 * 0.2)
+    assert (made.of(NOTHING), made.of(Option("gaussians", 10, 3))) == (0.5, pytest.approx(0.5 + 3 * 0.2))
     refused(r"gpu must be one of switch, .* got 'voodoo'", milliseconds, SEVENTEEN, cost.shipped(), "voodoo")
     with pytest.raises(InputError, match=r"option must be one whose cost was measured \(separable\), got 'hazard'"):
         made.of(Option("sampled", 16, law=hazard))
@@ -169,8 +168,7 @@ def test_two_halves_are_one_layer():
     assert (found.photons, found.error) == (0, pytest.approx(0.0, abs=1e-6))
     assert traced.error < 3.0 * traced.standard_error
     for one, mfp in ((found, 1e-4), (traced, 0.01)):
-        assert one.alpha == pytest.approx(0.9, abs=0.1 * mfp)
-        assert one.mfp == pytest.approx(1.0, abs=mfp)
+        assert (one.alpha, one.mfp) == (pytest.approx(0.9, abs=0.1 * mfp), pytest.approx(1.0, abs=mfp))
         assert one.verdict(0.02) == "enough"
 
 

@@ -26,8 +26,7 @@ def test_nothing_leaves_the_whole_step_and_each_part_is_named(light, case):
     found = error(NOTHING, case, light, WITHIN)
     x = case.places(0, WITHIN)
     missed = light.beyond(case.reflectance[0])(x)
-    assert found.model == pytest.approx(0.6 * np.sqrt(np.mean(missed**2)), rel=1e-3)
-    assert found.channel == 0
+    assert (found.model, found.channel) == (pytest.approx(0.6 * np.sqrt(np.mean(missed**2)), rel=1e-3), 0)
     assert found.noise == found.curvature == 0.0
     assert found.total == pytest.approx(found.model, rel=0.02)
     # Large pixels and curves are named.

@@ -50,8 +50,7 @@ def written(tmp_path):
 
 def test_a_painted_face():
     scene = read(EXAMPLES / "skin.toml")
-    assert scene.setting == Setting("diffuse", n=1.4)
-    assert scene.reflectance[0] == (0.55, 0.75)
+    assert (scene.setting, scene.reflectance[0]) == (Setting("diffuse", n=1.4), (0.55, 0.75))
     assert (scene.pixel, scene.radius, scene.resolution) == ((0.15, 0.8), 5.0, (1920, 1080))
     assert (scene.tolerance, scene.budget.ms) == (0.02, 5.0)
     assert scene.layers.is_grey
@@ -89,8 +88,7 @@ def test_layers_require_what_the_half_space_nearest_to_them_does():
 
 def test_defaults(written):
     scene = read(written())
-    assert scene.mfp == ((1.0, 2.0), (0.7, 0.7), (0.5, 0.5))
-    assert scene.setting == Setting("diffuse")
+    assert (scene.mfp, scene.setting) == (((1.0, 2.0), (0.7, 0.7), (0.5, 0.5)), Setting("diffuse"))
     assert math.isinf(scene.radius)
     assert (scene.pixel, scene.resolution) == ((0.5, 0.5), (80, 60))
     assert (scene.unit, scene.budget.ms, scene.layers) == ("mm", None, None)

@@ -198,8 +198,7 @@ def test_structure_of_tables_noise_and_waves():
     """Two albedos, four rings, one of them unused: rms over seven, lag-1 sums by hand."""
     table = np.array([[1.0, 1.0, -1.0, -1.0], [2.0, 2.0, 2.0, 0.0]])
     found = residual_structure(table)
-    assert found.rms == pytest.approx(np.sqrt(16 / 7))
-    assert found.largest == 2.0
+    assert (found.rms, found.largest) == (pytest.approx(np.sqrt(16 / 7)), 2.0)
     # Products along r: 1 - 1 + 1 + 4 + 4 + 0 = 9; squares of the later ones 3 + 8, of the earlier ones 3 + 12.
     assert found.along_r == pytest.approx(9 / np.sqrt(11 * 15))
     # Along alpha: 2 + 2 - 2 + 0 = 2; squares 12 and 4.
@@ -214,8 +213,7 @@ def test_structure_of_tables_noise_and_waves():
     assert noise.half_waves == pytest.approx(50.5 * 10.5, rel=0.15)
     wave = residual_structure(np.outer(np.ones(20), np.sin(np.linspace(0.01, 3 * np.pi - 0.01, 100))))
     assert wave.along_r > 0.98
-    assert wave.along_alpha == pytest.approx(1.0)
-    assert wave.half_waves == 3.0
+    assert (wave.along_alpha, wave.half_waves) == (pytest.approx(1.0), 3.0)
     found = residual_structure(np.zeros((3, 4)))
     assert (found.rms, found.largest, found.along_r, found.along_alpha, found.half_waves) == (0, 0, 0, 0, 0)
 

@@ -127,8 +127,7 @@ def test_a_stretch_costs_nothing_and_a_clip_is_an_atom(burley):
     assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
     found = sampler_quality(Clipped(burley, 2.0), ALPHA)
     beyond = 1 - burley.cdf(2.0, ALPHA)
-    assert found.atom[0] == pytest.approx(beyond, rel=1e-10)
-    assert found.bias[0] == pytest.approx(-beyond, rel=1e-9)
+    assert (found.atom[0], found.bias[0]) == (pytest.approx(beyond, rel=1e-10), pytest.approx(-beyond, rel=1e-9))
     assert found.inversion_error[0] == pytest.approx(0.999 - burley.cdf(2.0, ALPHA), rel=1e-10)
     # Divided by the law's density every sample weighs 1, those of the atom too: even light hides it.
     assert found.bias_by_law_pdf[0] == pytest.approx(0.0, abs=1e-6)

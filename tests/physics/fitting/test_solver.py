@@ -136,8 +136,7 @@ def test_bounds_hold_an_optimum_release_a_start_and_fix_a_parameter():
     assert not np.any(found.at_bound)
     found = solve(differences(noisy, 1e-6), np.array([2.5, 1.0]), ([2.5, 0.0], [2.5, 9.0]))
     alone = solve(differences(lambda p: noisy(np.append(2.5, p)), 1e-6), np.array([1.0]))
-    assert found.parameters[0] == 2.5
-    assert found.parameters[1] == pytest.approx(alone.parameters[0], rel=1e-8)
+    assert (found.parameters[0], found.parameters[1]) == (2.5, pytest.approx(alone.parameters[0], rel=1e-8))
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -409,8 +409,7 @@ def test_quantities_and_their_slopes():
             assert (two[name][0] - two[name][1]) / (2 * step) == pytest.approx(slopes[name][at], abs=1e-8)
     names = ("alpha", "mu_a")
     np.testing.assert_allclose(model.correlation(slopes, np.diag([1.0, 0, 0]), names), [[1, -1], [-1, 1]])
-    assert model.unit_of("mu_a", "mm") == "1/mm"
-    assert model.unit_of("l", "") == "unit of r"
+    assert (model.unit_of("mu_a", "mm"), model.unit_of("l", "")) == ("1/mm", "unit of r")
 
 
 def test_a_held_reflectance_is_an_albedo():

@@ -147,8 +147,7 @@ def test_a_fibre_averages_over_its_core(r):
 
 
 def test_beams_from_words(tmp_path):
-    assert beam_of("beam", "0.5mm", "cm") == Gaussian(0.05)
-    assert beam_of("beam", "tophat:0.5", "mm") == TopHat(0.5)
+    assert (beam_of("beam", "0.5mm", "cm"), beam_of("beam", "tophat:0.5", "mm")) == (Gaussian(0.05), TopHat(0.5))
     path = tmp_path / "beam.csv"
     path.write_text("r, irradiance\n0.1, 7  # counts\n0.5; 7\n0.6\t0\n")
     read = beam_of("beam", str(path), "mm")

@@ -264,8 +264,7 @@ def test_derivatives_are_differences(carded):
 
 def test_light_without_noise_gives_its_medium(carded, fit):
     assert fit.converged
-    assert fit.values["mu_s'"] == pytest.approx(1.0, rel=1e-4)
-    assert fit.values["mu_a"] == pytest.approx(0.05, rel=1e-4)
+    assert (fit.values["mu_s'"], fit.values["mu_a"]) == (pytest.approx(1.0, rel=1e-4), pytest.approx(0.05, rel=1e-4))
     assert fit.chi2 < 1e-3
     np.testing.assert_allclose(fit.x, carded[1], atol=1e-3)
 
@@ -297,8 +296,7 @@ def test_the_lowest_chi_square_is_kept_though_its_descent_did_not_end():
         for at, result in ((1.0, "no convergence"), (2.0, CONVERGED))
     )
     kept = lowest([high, low])
-    assert kept.cost == low.cost
-    assert kept.others == (high,)
+    assert (kept.cost, kept.others) == (low.cost, (high,))
 
 
 def test_a_beam_of_two_pixels_gives_its_medium():

@@ -76,9 +76,7 @@ def test_counts_what_the_answer_needs_once_for_each_point_or_material_or_step_of
         return jnp.where(x > 0, jnp.exp(jnp.sqrt(alpha) * x), 0.0) + jnp.sum(jnp.cos(x[:, None] * nodes), axis=1)
 
     found = count(function)
-    assert found.point == Counter(exp=1, cos=3)
-    assert found.material == Counter(sqrt=1, log=3)
-    assert found.transcendental == 4
+    assert (found.point, found.material, found.transcendental) == (Counter(exp=1, cos=3), Counter(sqrt=1, log=3), 4)
     found = count(lambda x, alpha: jax.lax.fori_loop(0, 5, lambda _, y: jnp.sqrt(jnp.log(y + alpha)), x))
     assert (found.point, found.transcendental) == (Counter(log=5, sqrt=5), 5)
     with pytest.raises(ValueError, match="no loop of unknown length"):
@@ -108,8 +106,7 @@ def test_costly_samplers_are_not_timed():
     counted = laws.counts(beam)
     assert counted["profile"].transcendental > laws.MANY
     works = laws.works(beam, counted, SMALL)
-    assert set(works) == {"profile"}
-    assert works["profile"](0) == SMALL.costly
+    assert (set(works), works["profile"](0)) == ({"profile"}, SMALL.costly)
 
 
 def test_time_is_over_the_yardsticks_in_each_turn():

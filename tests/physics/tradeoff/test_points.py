@@ -33,8 +33,7 @@ def test_measured_is_the_median_between_its_percentiles():
 def test_front_of_what_is_known_without_error():
     points = [point(*one) for one in ((1, 0.5), (2, 0.3), (3, 0.1), (4, 0.2), (0.5, 0.9), (3, 0.1), (2, 0.4))]
     assert [points[i].cost.value for i in front(points)] == [0.5, 1, 2, 3, 3]
-    assert standings(points) == [FRONT, FRONT, FRONT, BEATEN, FRONT, FRONT, TIED]
-    assert standings([]) == []
+    assert (standings(points), standings([])) == ([FRONT, FRONT, FRONT, BEATEN, FRONT, FRONT, TIED], [])
     # Of distinct numbers, on the front is what no other is below in both.
     values = np.random.default_rng(1).random((60, 2))
     plain = [not any(np.all(other < one) for other in values) for one in values]
@@ -98,8 +97,7 @@ def test_what_disturbs_a_turn_disturbs_no_ratio():
     rates = Rates({"slow": [1.0, 0.1, 1.0], "fast": [4.0, 0.4, 4.0]})
     np.testing.assert_allclose(rates.times("slow", "fast"), 4.0)
     ratio = rates.ratio("fast", "slow")
-    assert (ratio.median, ratio.least, ratio.most) == pytest.approx((4.0, 4.0, 4.0))
-    assert str(ratio) == "4.00"
+    assert ((ratio.median, ratio.least, ratio.most), str(ratio)) == (pytest.approx((4.0, 4.0, 4.0)), "4.00")
     assert str(Rates({"a": [30.0, 10.0], "b": [1.0, 1.0]}).ratio("a", "b")) == "20.0 (10.0 ... 30.0)"
     assert rates.best("slow") == 1.0
 

@@ -39,8 +39,7 @@ def test_furs_are_within_their_ends_and_the_same_again():
 def test_the_sum_leaves_out_what_no_way_serves():
     ways = [("swept", 12, error, least) for error, least in ((0.049, 10), (0.051, 13), (0.05, 12))]
     told = summary([Judged(Fur(0.1, 20.0, 45.0, 0.05), *way) for way in (*ways, (None,) * 4)])
-    assert (told["furs"], told["with a way"]) == (4, 3)
-    assert told["within"] == pytest.approx(2 / 3)
+    assert (told["furs"], told["with a way"], told["within"]) == (4, 3, pytest.approx(2 / 3))
     assert (told["median ratio"], told["mean ratio"]) == pytest.approx((1.0, (1.2 + 12 / 13 + 1.0) / 3))
 
 

@@ -70,8 +70,7 @@ def test_measures_are_0_for_the_truth_and_know_a_difference():
     mask = np.zeros((32, 32), bool)
     mask[:16] = True
     judge = Judged(truth, mask, stage=None, mfp=(1.0, 1.0, 1.0))
-    assert judge.rmse(truth) == 0
-    assert judge.flip(truth) == pytest.approx(0, abs=1e-6)
+    assert (judge.rmse(truth), judge.flip(truth)) == (0, pytest.approx(0, abs=1e-6))
     assert judge.rmse(1.1 * truth) == pytest.approx(0.1 * np.sqrt(4 / 3), rel=0.05)  # of even numbers in [0, 1]
     assert judge.flip(0.5 * truth) > 0.05
     elsewhere = truth.copy()

@@ -56,9 +56,7 @@ def test_json_has_every_convention_and_null_for_none(table):
     colours = {"alpha", "alpha_unreduced", "n", "g", "mu_a", "mu_s", "mu_s_unreduced"}
     colours |= {f"{kind}_{light}" for kind in ("reflectance", "matched") for light in ("searchlight", "diffuse")}
     assert set(BY_NAME) | {"unit", "typed"} | colours == set(printed)
-    assert printed["unit"] == "cm"
-    assert printed["mfp"] == [2.0, 2.0]
-    assert printed["mu_a"] == [0.25, 0.0]
+    assert (printed["unit"], printed["mfp"], printed["mu_a"]) == ("cm", [2.0, 2.0], [0.25, 0.0])
     assert printed["dmfp"][1] is None
     assert printed["dmfp"][0] == pytest.approx(2.0)  # sqrt(1.5 / 1.5) l
     assert table("--alpha", "0.5", "--mfp", "2")["unit"] is None
@@ -120,8 +118,7 @@ def test_every_length_is_an_option(table, name):
 def test_coefficients_are_a_colour_and_a_length(table):
     found = table("--mu-a", "0.032,0.17,0.48/mm", "--mu-s", "0.74/mm,0.88/mm,1.01/mm")
     np.testing.assert_allclose(found["mu_s"], [0.74, 0.88, 1.01], rtol=1e-14)
-    assert found["unit"] == "mm"
-    assert found["mfp"][0] == pytest.approx(1 / 0.772, rel=1e-14)
+    assert (found["unit"], found["mfp"][0]) == ("mm", pytest.approx(1 / 0.772, rel=1e-14))
 
 
 def test_the_light_of_a_colour_matters(table):

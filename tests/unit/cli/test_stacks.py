@@ -69,8 +69,7 @@ def test_every_language_says_what_it_is(done, mine, lang):
     if lang == "json":
         told = json.loads(text)
         assert (told["label"], told["setting"]) == ("heart", {"illumination": "diffuse", "n": 1.38, "g": 0.0})
-        assert told["constants"] == record.read(path)["constants"]
-        assert list(told["numbers"]) == sorted(CHANNELS)
+        assert (told["constants"], list(told["numbers"])) == (record.read(path)["constants"], sorted(CHANNELS))
         assert told["half_spaces"] == record.read(path)["half_spaces"]
     else:
         mark = "#" if lang == "python" else "//"

@@ -229,8 +229,7 @@ def test_what_was_asked_for_comes_first_then_what_is_here_then_what_is_shipped(t
     Path("mine").mkdir()
     with pytest.warns(OtherRecords, match="records of 'mine'$"):
         assert records_folder(Path("mine")) == Path("mine")
-    assert records_folder(Path("mine"), quiet=True) == Path("mine")
-    assert records_folder(fits_folder()) == fits_folder()
+    assert (records_folder(Path("mine"), quiet=True), records_folder(fits_folder())) == (Path("mine"), fits_folder())
     with pytest.raises(InputError, match=r"--fits must be a folder of records, got 'asked', which is none"):
         records_folder(Path("asked"))
 

@@ -40,8 +40,7 @@ def test_a_file_states_and_options_go_before_it(stated):
     assert premises(stated("# measured by hand\n")) == Premises(Setting(), assumed=("n", "g")), "nothing told"
     data = stated("# n = 1.4\n# G: 0.9\n# beam = 0.5mm\n# light=diffuse\n")
     found = premises(data)
-    assert found.setting == Setting("diffuse", 1.4, 0.9)
-    assert (found.instrument.beam, found.assumed) == (Gaussian(0.5), ())
+    assert (found.setting, found.instrument.beam, found.assumed) == (Setting("diffuse", 1.4, 0.9), Gaussian(0.5), ())
     assert premises(data, options={"g": "0.8", "beam": None}).setting.g == 0.8
     assert stated("# unit = cm\n", ROWS.replace(" [mm]", "")).unit == "cm"
     assert premises(stated("", ROWS + "# n = 1.4\n")).setting.n == 1.4, "wherever the comment stands"
@@ -123,8 +122,7 @@ def test_a_range_is_its_middle_and_its_ends(stated):
     assert found.ranges == {"n": (1.33, 1.45), "g": (0.7, 0.9)}
     assert premises(stated(""), options={"n": "1.4", "g": "0.9"}).ranges == {}
     beamed = premises(stated(""), options={"beam": "0.3:700um"})
-    assert beamed.instrument.beam == Gaussian(0.5)
-    assert beamed.ranges["beam"] == pytest.approx((0.3, 0.7))
+    assert (beamed.instrument.beam, beamed.ranges["beam"]) == (Gaussian(0.5), pytest.approx((0.3, 0.7)))
     with pytest.raises(InputError, match=r"g must be a number where a law is fitted, got '0\.1:0\.9'"):
         premises(stated(""), "hazard", {"g": "0.1:0.9"})
 
@@ -179,8 +177,7 @@ def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
     parts = fitted(near, FitSpec(law, {"scale": 1.0}, source=origin("hazard", "regenerated", Setting(), fits_folder())))
     result = fit(near, "hazard", walk=False)
-    assert result.fit.values == parts.values
-    assert result.walk is None
+    assert (result.fit.values, result.walk) == (parts.values, None)
     assert result.identifiability.all_identified
     assert result.fit.rel is not None, "the law's record was found"
     with pytest.raises(InputError, match=r"none\.csv"):  # it reads files
@@ -190,8 +187,7 @@ def test_it_is_the_fit_of_its_parts(near):
 def test_what_is_known_goes_in(near):
     assert fit(near, held={"l": 1.1}, walk=False).fit.values["l"] == pytest.approx(1.1, rel=1e-12)
     free = fit(near, held={"A": 0.53}, scale=None, walk=False).fit
-    assert free.values["A"] == pytest.approx(0.53, rel=1e-6)
-    assert free.spec.held.keys() == {"A"}
+    assert (free.values["A"], free.spec.held.keys()) == (pytest.approx(0.53, rel=1e-6), {"A"})
     measured = fit(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).fit
     assert measured.spec.held == {}
     assert measured.values["alpha"] == pytest.approx(0.95, abs=4 * measured.errors(measured.statistical)["alpha"])

@@ -31,8 +31,7 @@ def test_grids_differ_by_what_they_resolve():
     grids += [
         Grid(0.5, 2, dz, nz, na=na) for dz, nz, na in ((0.5, 2, None), (0.5, 3, None), (0.4, 2, None), (0.5, 2, 2))
     ]
-    assert len({grid.digest for grid in grids}) == len(grids)
-    assert len(set(grids)) == len(grids)
+    assert (len({grid.digest for grid in grids}), len(set(grids))) == (len(grids), len(grids))
     assert grids[0] != "grid"
 
 

@@ -17,12 +17,9 @@ NO_NUMBERS = (np.nan, None, True, False, np.complex128(0.5), np.complex128(1.4))
 
 
 def test_derived_numbers_of_a_layer():
-    assert TISSUE.mu_t == 100
-    assert TISSUE.alpha == 0.99
-    assert TISSUE.mfp == 0.01
+    assert (TISSUE.mu_t, TISSUE.alpha, TISSUE.mfp) == (100, 0.99, 0.01)
     similar = TISSUE.similar
-    assert (similar.g, similar.mu_a, similar.thickness) == (0, 1, 0.1)
-    assert similar.mu_s == pytest.approx(9.9)
+    assert (similar.g, similar.mu_a, similar.thickness, similar.mu_s) == (0, 1, 0.1, pytest.approx(9.9))
     glass = Layer(n=1.5, mu_a=0, mu_s=0, g=1, thickness=0.1)
     assert (glass.mu_t, glass.alpha, glass.mfp) == (0, 0, math.inf)
 
@@ -60,11 +57,8 @@ def test_which_media_are_matched_isotropic_half_spaces(medium, matched):
 
 def test_half_space_takes_the_mean_free_path_of_the_light_itself():
     (layer,) = half_space(0.8, mfp=2.0, n=1.3, g=0.5).layers
-    assert (layer.n, layer.g, layer.thickness) == (1.3, 0.5, math.inf)
-    assert layer.mu_a == pytest.approx(0.1)
-    assert layer.mu_s == pytest.approx(0.4)
-    assert layer.alpha == pytest.approx(0.8)
-    assert layer.mfp == pytest.approx(2.0)
+    assert (layer.n, layer.g, layer.thickness, layer.mu_a) == (1.3, 0.5, math.inf, pytest.approx(0.1))
+    assert (layer.mu_s, layer.alpha, layer.mfp) == (pytest.approx(0.4), pytest.approx(0.8), pytest.approx(2.0))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, "1", None, True, np.True_, np.complex128(0.5)])
@@ -108,8 +102,7 @@ def test_a_medium_names_what_is_wrong():
 
 
 def test_settings_are_values():
-    assert Setting() == Setting("searchlight", 1.0, 0.0)
-    assert str(Setting()) == "searchlight, n = 1, g = 0"
+    assert (Setting(), str(Setting())) == (Setting("searchlight", 1.0, 0.0), "searchlight, n = 1, g = 0")
     assert str(Setting("diffuse", 1.4, 0.75)) == "diffuse, n = 1.4, g = 0.75"
     assert hash(Setting()) == hash(Setting("searchlight"))
     assert Setting(n=np.float32(1.5), g=np.float64(0.5)) == Setting(n=1.5, g=0.5)

@@ -34,8 +34,7 @@ def test_albedos_are_even_in_their_spacing_and_rings_are_edges_of_the_run():
     for rings in (even, RingLayout(last=100.0, first=0.01, count=34)):
         edges = ring_edges(rings)
         assert set(edges) <= set(RUN_EDGES)
-        assert edges[0] == 0.0
-        assert edges[-1] == pytest.approx(rings.last, rel=0.05)
+        assert (edges[0], edges[-1]) == (0.0, pytest.approx(rings.last, rel=0.05))
     assert np.diff(ring_edges(even, mfp=0.5)) == pytest.approx(0.1)
     assert np.diff(ring_edges(even, mfp=5.0)) == pytest.approx(0.01)
     for rings in (RingLayout(last=20.0, dr=0.013), RingLayout(last=60.0, dr=0.05)):
@@ -67,8 +66,7 @@ def test_starts_printed_sets_and_photons_are_those_of_the_recipe(tmp_path):
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
     mapped = starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
-    assert mapped.setting == Setting(n=1.4)
-    assert mapped.constants() == RefractingRational.entry.start
+    assert (mapped.setting, mapped.constants()) == (Setting(n=1.4), RefractingRational.entry.start)
     searchlight, diffuse = printed_sets(burley), printed_sets(burley.changed(setting_table={"illumination": "diffuse"}))
     assert (searchlight["published"]["s0"], diffuse["published"]["s0"]) == (1.85, 1.9)
     assert printed_sets(burley.changed(setting_table={"n": 1.4})) == {}
@@ -137,23 +135,19 @@ def test_outcomes_are_told_apart():
     failed = f"{STOPPED}: fix a constant"
     found = [NEAR, FAR, NEAR, solution([9, 9], 5e-6, failed), FAR, NEAR, solution([np.inf, 1], np.nan, "not finite: x")]
     told = summarised(NEAR, found)
-    assert told["result"] == checks.OWN_IS_BEST
-    assert told["share_best"] == pytest.approx(3 / 7)
+    assert (told["result"], told["share_best"]) == (checks.OWN_IS_BEST, pytest.approx(3 / 7))
     assert [outcome["count"] for outcome in told["outcomes"]] == [3, 2, 1, 1]
     assert [outcome["cost_ratio"] for outcome in told["outcomes"]] == pytest.approx([1, 2, 5, np.inf])
-    assert told["outcomes"][1]["constants"] == {"a": 5.0, "b": 1.0}
-    assert told["outcomes"][2]["result"] == failed
+    assert (told["outcomes"][1]["constants"], told["outcomes"][2]["result"]) == ({"a": 5.0, "b": 1.0}, failed)
     assert (told["others"], told["count"]) == (0, 7)
     many = [solution([1, 2 + i], 1e-6 * (1 + i)) for i in range(20)]  # of which not all are listed
     told = summarised(many[0], many)
-    assert len(told["outcomes"]) == checks.MOST_OUTCOMES
-    assert told["others"] == 20 - checks.MOST_OUTCOMES
+    assert (len(told["outcomes"]), told["others"]) == (checks.MOST_OUTCOMES, 20 - checks.MOST_OUTCOMES)
 
 
 def test_a_better_optimum_than_the_recipes_own_is_told():
     told = summarised(FAR, [FAR, NEAR, FAR])
-    assert told["result"] == checks.OWN_IS_BEATEN
-    assert told["outcomes"][0]["constants"] == {"a": 1.0, "b": 2.0}
+    assert (told["result"], told["outcomes"][0]["constants"]) == (checks.OWN_IS_BEATEN, {"a": 1.0, "b": 2.0})
     assert told["share_best"] == pytest.approx(1 / 3)
     failed = solution([1, 2], 1e-7, STOPPED)
     assert summarised(FAR, [failed, FAR])["result"] == checks.OWN_IS_BEST  # where it stopped is no optimum

@@ -149,8 +149,7 @@ def test_traced_light_is_that_of_its_run(monkeypatch):
         Tracing.of(GIVEN, "skin-0", EXACT).rings(medium, light, edges, 2**20, offset)
     assert [given[3:5] for given in calls] == [(1000, 7)] * 3 + [(1000, 10)]
     stores = [given[5] for given in calls]
-    assert len(set(stores)) == 4
-    assert {store.parent for store in stores} == {Path("photons/stacks/skin-0")}
+    assert (len(set(stores)), {store.parent for store in stores}) == (4, {Path("photons/stacks/skin-0")})
     Tracing.of(replace(GIVEN, photons=None), "skin-0", EXACT).rings(1, "diffuse", edges, 2**20, 0)
     Tracing().rings(1, "diffuse", edges, 2**20, 0)
     assert [given[3:] for given in calls[-2:]] == [(20 * 2**20, 7, stores[0]), (2**20, 1, None)]

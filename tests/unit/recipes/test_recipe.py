@@ -99,11 +99,9 @@ def test_every_objective_has_a_pipeline_and_the_other_way_round():
 def test_a_good_recipe_holds_what_its_file_says(write):
     recipe = read(write(GOOD))
     assert (recipe.name, recipe.law, recipe.pipeline, recipe.truth) == ("mine", "liang", "profile", "exact")
-    assert (recipe.albedos.low, recipe.albedos.high, recipe.albedos.count) == (0.1, 0.9, 9)
-    assert recipe.rings.last == 30.0
+    assert (recipe.albedos.low, recipe.albedos.high, recipe.albedos.count, recipe.rings.last) == (0.1, 0.9, 9, 30.0)
     assert isinstance(recipe.rings.last, float)
-    assert recipe.weighting.energy_limit == 3.0
-    assert (recipe.mfp, recipe.held, recipe.note) == ((1.0,), (), "")
+    assert (recipe.weighting.energy_limit, recipe.mfp, recipe.held, recipe.note) == (3.0, (1.0,), (), "")
     assert (recipe.check, recipe.random_starts, recipe.setting) == ("", 0, Setting())
     assert all(read(write(good)).law == "liang" for good in (EVEN, INVERSE))
     checked = read(write(CHECKED))
@@ -286,8 +284,7 @@ def test_find_by_name_or_path(write, tmp_path):
     path = write(GOOD)
     write(GOOD, "another.toml")
     assert list(available(tmp_path, "toml")) == ["another", "mine"]
-    assert find("mine", tmp_path) == read(path)
-    assert find(str(path), Path("/")).path == path
+    assert (find("mine", tmp_path), find(str(path), Path("/")).path) == (read(path), path)
     with pytest.raises(RecipeError, match=r"recipe must be one of another, mine or a \.toml file, got 'yours'"):
         find("yours", tmp_path)
     refused(r"one of \(none\) or a \.toml file", find, "yours", tmp_path / "empty", error=RecipeError)

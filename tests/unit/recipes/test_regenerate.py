@@ -139,8 +139,7 @@ def test_a_small_record_is_reproduced_and_compared_with_its_own_kind(made, tmp_p
     assert found.intervals < 1.0
     path, name = Path(shutil.copy(made, tmp_path)), made.stem
     path.write_text(json.dumps({**(of := json.loads(path.read_text())), "seed": of["seed"] + 1}))
-    assert reproduction(path, name) is None
-    assert reproduction(path, "nothing-of-this-name") is None
+    assert (reproduction(path, name), reproduction(path, "nothing-of-this-name")) == (None, None)
     assert reproduction(FITS / made.name, name) is None
 
 
@@ -218,8 +217,7 @@ OF_PROCESS = "__import__('time').sleep(0.2) or __import__('os').%s"
 def test_every_job_is_done_once_whatever_the_processes(processes):
     with Workers(processes) as workers:
         assert dict(workers.each(math.factorial, range(8))) == dict(enumerate(map(math.factorial, range(8))))
-        assert list(workers.each(operator.neg, [5])) == [(0, -5)]
-        assert list(workers.each(operator.neg, [])) == []
+        assert (list(workers.each(operator.neg, [5])), list(workers.each(operator.neg, []))) == ([(0, -5)], [])
         numbers = {number for _, number in workers.each(eval, [OF_PROCESS % "getpid()"] * 2 * processes)}
         assert len(numbers) == processes
         assert (os.getpid() in numbers) == (processes == 1)

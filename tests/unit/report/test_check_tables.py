@@ -41,8 +41,7 @@ def test_a_line_a_law_says_whether_it_passes():
     text = rendered(check_tables.check_tables(found(*laws)), 100)
     rows = [line.split() for line in text.splitlines() if "-refracting" in line]
     assert " ".join(rows[0]) == "hazard-refracting 1.4 0.049 1.0e-06 0.0096 2.0e-07 4.0e-07 2.0e-07 0 0 pass"
-    assert rows[1][-1] == "FAIL"
-    assert rows[2][6:8] == ["–", "–"]
+    assert (rows[1][-1], rows[2][6:8]) == ("FAIL", ["–", "–"])
     assert " ".join(rows[3]) == "albedo-rational-refracting 1.4 0.00040 1.0e-07 – 2.0e-07 0 7 pass"
     assert "a device" in text
 
@@ -80,5 +79,4 @@ def test_json_takes_numbers_and_text_only():
     told = check_tables.content(found(law(BAD)))
     assert told["passed"] is False
     assert told["laws"][0]["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
-    assert told["laws"][0]["broken"] == [str(BAD)]
-    assert told["costs"]["hazard"]["ratio"]["both"] == 2.5
+    assert (told["laws"][0]["broken"], told["costs"]["hazard"]["ratio"]["both"]) == ([str(BAD)], 2.5)

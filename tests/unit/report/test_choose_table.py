@@ -103,10 +103,8 @@ def test_a_budget_within_the_range_is_likely_kept(choice):
 
 def test_as_data(choice):
     made = data(choice, LAYER)
-    assert made["chosen"] == "separable, 17 taps"
-    assert [one["ms"] for one in made["options"]] == [2.0, 3.0, 5.0]
-    assert made["options"][2]["ms_range"] == [4.0, 8.0]
-    assert made["one_layer"]["verdict"] == "enough"
+    assert (made["chosen"], [one["ms"] for one in made["options"]]) == ("separable, 17 taps", [2.0, 3.0, 5.0])
+    assert (made["options"][2]["ms_range"], made["one_layer"]["verdict"]) == ([4.0, 8.0], "enough")
     (one,) = made["filters"]
     assert math.isclose(sum(tap[0] for tap in one["taps"]), 1.0, rel_tol=1e-6)
 
@@ -147,5 +145,4 @@ def test_what_fur_needs_and_which_way():
     assert told["by_angle"][0] == {"angle": 45, "layers": layers[45], "cheapest": "swept"}
     none = FurNeed({75: dict.fromkeys(names)}, 0.05)
     answer = "no way is within the tolerance at 75 degrees, by 256 layers (requested: 5.0 % of the length)"
-    assert tables.fur_lines(none)[-1] == answer
-    assert tables.fur_content(none)["way"] is None
+    assert (tables.fur_lines(none)[-1], tables.fur_content(none)["way"]) == (answer, None)

@@ -53,8 +53,7 @@ def test_reads_the_runs_of_the_template_and_the_example(tmp_path):
     # And the three layers of the example.
     (run,) = read_mci(str(DATA / "example.mci"))
     rows = [(1.37, 1, 100, 0.9, 0.1), (1.37, 1, 10, 0, 0.1), (1.37, 2, 10, 0.7, 0.2)]
-    assert run.medium.layers == tuple(Layer(*row) for row in rows)
-    assert (run.medium.n_above, run.medium.n_below) == (1, 1)
+    assert (run.medium.layers, run.medium.n_above, run.medium.n_below) == (tuple(Layer(*row) for row in rows), 1, 1)
     assert (run.photons, run.grid) == (1_000_000, Grid(0.01, 50, 0.01, 40, na=1))
     # Depths and rings are not mixed up.
     (run,) = read_mci(written(tmp_path, SMALL))
@@ -273,8 +272,7 @@ def test_both_runs_of_mcml_2_are_read():
     first, second = parsed_2(SECOND)
     assert (first.output, first.format, first.photons, first.seed, first.limit) == ("one.mco", "A", 1000, 7, "10:00")
     assert first.medium.layers == (Layer(1.5, 0, 0, 0, 0.1), Layer(1.4, 1, 100, 0.9, 0.2))
-    assert (first.medium.n_above, first.medium.n_below) == (1.0, 1.0)
-    assert first.grid == Grid(0.02, 4, 0.01, 3, na=5)
+    assert (first.medium.n_above, first.medium.n_below, first.grid) == (1.0, 1.0, Grid(0.02, 4, 0.01, 3, na=5))
     assert (second.output, second.format, second.photons, second.seed, second.limit) == ("two.mco", "B", 20_000, 0, "")
     assert second.medium.layers == (Layer(1.4, 1, 100, 0.9, 1e8),)
     assert (second.medium.n_above, second.medium.n_below) == (1.5, 1.0)

@@ -307,8 +307,7 @@ Rd_a #Rd[0], [1],..Rd[na-1]. [sr-1]
 
 def test_v1_is_read():
     found = parse_mco(V1.encode(), "sample.mco")
-    assert found.run.photons == 1000
-    assert found.run.medium == Medium((Layer(1.37, 1.0, 100.0, 0.9, 1e8),))
+    assert (found.run.photons, found.run.medium) == (1000, Medium((Layer(1.37, 1.0, 100.0, 0.9, 1e8),)))
     assert (found.run.grid.rings, found.run.dr) == (3, 0.02)
     assert (found.specular_reflectance, found.diffuse_reflectance) == (0.0243729, 0.237826)
     np.testing.assert_array_equal(found.reflectance_r, [30.0, 2.0, 1e-3])
@@ -318,8 +317,7 @@ def test_what_was_written_comes_back(tally, tmp_path):
     tally = made_up(tally.medium, Grid(0.03, 40, 0.02, 3, na=7))
     write_mco(tally, tmp_path / "out.mco")
     found = read_mco(tmp_path / "out.mco")
-    assert found.run.medium.layers[0] == tally.medium.layers[0]
-    assert found.run.medium.layers[1].thickness == 1e8
+    assert (found.run.medium.layers[0], found.run.medium.layers[1].thickness) == (tally.medium.layers[0], 1e8)
     assert found.run.grid == tally.grid
     np.testing.assert_allclose(found.reflectance_r[:-1], tally.reflectance_r.value[:-1], rtol=5.1e-5)  # as printed
     assert found.diffuse_reflectance == pytest.approx(float(tally.diffuse_reflectance), rel=5.1e-6)

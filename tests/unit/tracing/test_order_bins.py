@@ -61,9 +61,7 @@ def test_bins_hold_every_order_once(reach):
 def test_roulette_weight_doubles_just_after_each_toss():
     passed = np.searchsorted(bins.stops[:-1], bins.orders)  # a photon that leaves at n has not tossed at n
     np.testing.assert_array_equal(bins.roulette_weight(bins.orders), 2**passed)
-    assert bins.roulette_weight(64) == 1
-    assert bins.roulette_weight(65) == 2
-    assert bins.roulette_weight(8192) == 128
+    assert (bins.roulette_weight(64), bins.roulette_weight(65), bins.roulette_weight(8192)) == (1, 2, 128)
 
 
 def test_light_that_turns_slowly_has_more_orders():

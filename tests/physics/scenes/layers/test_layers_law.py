@@ -151,8 +151,7 @@ def test_any_phase_function_grazing_light_and_light_that_cannot_enter():
     assert np.all((grazing > 0) & (grazing < 1e-8))
     # From a denser medium above, beyond the critical angle: nothing.
     denser = Medium((Layer(1.0, 0.1, 1.0, 0.0),), n_above=1.5)
-    assert single_scattering(denser, 0.3, 1.0, 0.0) == 0.0
-    assert single_scattering(denser, 1.0, 0.3, 0.0) == 0.0
+    assert (single_scattering(denser, 0.3, 1.0, 0.0), single_scattering(denser, 1.0, 0.3, 0.0)) == (0.0, 0.0)
 
 
 test_refused = refusals(

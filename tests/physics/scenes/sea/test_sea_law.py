@@ -180,8 +180,7 @@ def test_gaussians_follow_the_blur():
     np.testing.assert_allclose(found.share([0.03, 0.3, 3.0]), beam_share(0.8, 2.0, [0.03, 0.3, 3.0], THREE), rtol=0.02)
     # Where nothing is scattered, a blur is none.
     nothing = water_gaussians(0.0, 2.0, THREE, 3)
-    assert nothing.mtf(5.0) == pytest.approx(np.exp(-2.0))
-    assert nothing.error == 0
+    assert (nothing.mtf(5.0), nothing.error) == (pytest.approx(np.exp(-2.0)), 0)
 
 
 def test_where_unscattered_light_fails():

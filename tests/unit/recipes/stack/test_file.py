@@ -100,16 +100,14 @@ def test_three_colours(read):
 def test_single_numbers_are_grey_infinite_may_be_said_and_a_material_be_named(read):
     stack = read(new='unit = "cm"\nother = 1\n[[layers]]\nn = 1\nmu_a = 0.1\nmu_s = [9, 9.0, 9]\ng = 0\nthickness = 2')
     assert stack.is_grey
-    assert stack.unit == "cm"
-    assert stack.media[2] == Medium((Layer(1.0, 0.1, 9.0, 0.0, 2.0),))
+    assert (stack.unit, stack.media[2]) == ("cm", Medium((Layer(1.0, 0.1, 9.0, 0.0, 2.0),)))
     assert math.isinf(read("g = 0\n", "g = 0\nthickness = inf\n").media[0].layers[1].thickness)
     given, marble = "mu_a = 1\nmu_s = [1, 2, 3]\ng = 0\n", BY_NAME["marble"]
     stack = read(given, 'material = "marble"\n')
     assert [medium.layers[1] for medium in stack.media] == [
         Layer(1.3, mu_a, mu_s, 0.0) for mu_a, mu_s in zip(marble.absorption, marble.scattering, strict=True)
     ]
-    assert stack.names == ("veil", "marble")
-    assert stack.sources == ("measured", SOURCE)
+    assert (stack.names, stack.sources) == (("veil", "marble"), ("measured", SOURCE))
     named = read(given, 'material = "marble"\nname = "slab"\nsource = "a book"\n')
     assert (named.names[1], named.sources[1]) == ("slab", "a book")
 
@@ -154,8 +152,7 @@ def test_values_are_thicknesses(of_image, tmp_path):
     values = np.array([[0.0, 0.25, 1.0]], np.float32)
     stack = of_image(Image.fromarray(values), "float.tiff")
     np.testing.assert_array_equal(stack.map.values, values)
-    assert stack.map.mean == pytest.approx(0.05 + 0.35 * 1.25 / 3.0)
-    assert stack.layers[0]["thickness"] == stack.map.mean
+    assert (stack.map.mean, stack.layers[0]["thickness"]) == (pytest.approx(0.05 + 0.35 * 1.25 / 3.0), stack.map.mean)
     values = np.arange(0, 60000, 1000, dtype=np.uint16).reshape(6, 10)
     image = _tiff(10, 6, 16, values.astype(">u2").tobytes(), order=">")
     np.testing.assert_allclose(of_image(image, "a.tif").map.values, values / 65535.0, rtol=1e-6)
@@ -255,8 +252,7 @@ def test_the_largest_image_and_one_of_no_thickness(of_image, read, monkeypatch):
     monkeypatch.chdir(Path(__file__).parent)
     assert of_image(GREY, "beside.png").map.mean == pytest.approx(0.05 + 0.35 * 100 / 255)
     stack = of_image(Image.new("L", (4096, 4096), 255))
-    assert stack.map.values.shape == (4096, 4096)
-    assert stack.map.mean == pytest.approx(0.4)
+    assert (stack.map.values.shape, stack.map.mean) == ((4096, 4096), pytest.approx(0.4))
     of_image(Image.new("L", (2, 2), 0))
     message = r"\[layers 1\] thickness must be > 0, or infinite in the last layer, got 0.0"
     refused(lambda: read("thickness = 0.25", IMAGE.replace("0.05", "0")), message)

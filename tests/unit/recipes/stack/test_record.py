@@ -125,8 +125,7 @@ def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, t
     assert [re.sub(r"[\d.]+ s", "SECONDS", line) for line in said] == [f"stacks/heart: SECONDS, {of.title}"]
     found = load(path)
     assert (found.name, found.stack.media, found.stack.names) == ("heart", of.stack.media, of.stack.names)
-    assert found.stack.sources == of.stack.sources
-    assert found.setting == Setting("diffuse", n=1.38)
+    assert (found.stack.sources, found.setting) == (of.stack.sources, Setting("diffuse", n=1.38))
     assert found.digest == hashlib.sha256(path.read_bytes()).hexdigest()
     assert found.content["title"] == of.title
     own = catalogue.load("hazard", setting=found.setting)
@@ -135,8 +134,7 @@ def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, t
         for number in reversed(range(len(tops))):
             rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
             known = StackLaw(found.setting, tops[number], known, medium.layers[number].thickness, **rounded)
-        assert law.constants() == known.constants()
-        assert law.thickness == medium.layers[0].thickness
+        assert (law.constants(), law.thickness) == (known.constants(), medium.layers[0].thickness)
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
@@ -330,8 +328,7 @@ def test_a_record_says_what_it_is_worth_and_is_found_by_path_and_by_name(written
     content = record.read(written)
     assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
     assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
-    assert content["fit"]["result"] == "converged"
-    assert content["layers"] == load(written).stack.layers
+    assert (content["fit"]["result"], content["layers"]) == ("converged", load(written).stack.layers)
     assert len(content["constants"]) == 3 * len(CONSTANTS)
     assert content["constants"]["green.1.w"] == {**FITTED, "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}")}
     folder = tmp_path / "mine"

@@ -57,8 +57,7 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
         known = made_sums(of.stack.media, light)
         values = {name: one["regenerated"] for name, one in known["constants"].items()}
         for place, (channel, law) in enumerate(zip(CHANNELS, found.laws(light, count), strict=True)):
-            assert law.setting == Setting(light, n=1.38)
-            assert law.total_reflectance == known["reflectance"][place]
+            assert (law.setting, law.total_reflectance) == (Setting(light, n=1.38), known["reflectance"][place])
             unit = of.stack.media[place].layers[0].mfp
             variance = [values[f"{count}.v{i + 1}"] / unit**2 for i in range(count)]
             weight = [values[f"{count}.{channel}.w{i + 1}"] for i in range(count)]
@@ -72,8 +71,7 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
     again = recorded(sums.fit(of, RUN), tmp_path / "again")
     for ending in (".json", ".npz"):
         assert again.with_suffix(ending).read_bytes() == written.with_suffix(ending).read_bytes()
-    assert find("heart", tmp_path / "mine").path == written
-    assert find("skin", tmp_path / "mine") is None
+    assert (find("heart", tmp_path / "mine").path, find("skin", tmp_path / "mine")) == (written, None)
 
 
 DAMAGE = [

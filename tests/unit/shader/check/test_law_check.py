@@ -100,8 +100,7 @@ def test_an_index_between_has_the_worse_of_its_neighbours_errors():
     known = {n: rel for n, rel in zip(*(content["quality"]["by_index"][key] for key in ("n", "rel")), strict=True)}
     for n, near in ((1.2, (1.2,)), (1.25, (1.2, 1.3)), (1.4, (1.4,)), (1.55, (1.5, 1.6)), (1.6, (1.6,))):
         found = bounds.model_of_profile(catalogue.find("hazard-refracting", FITS, n=n), FITS)
-        assert found.values["rel"] == max(known[one] for one in near)
-        assert found.source == "hazard-refracting"
+        assert (found.values["rel"], found.source) == (max(known[one] for one in near), "hazard-refracting")
 
 
 def test_a_map_passes_and_a_wrong_sign_does_not(context):
@@ -115,8 +114,7 @@ def test_a_map_passes_and_a_wrong_sign_does_not(context):
 def test_what_the_paper_promises_is_judged_of_its_constants_alone():
     laws, maps = chosen(["liang"], "published", FITS)
     valid = bounds.valid_profile(laws[0], FITS)
-    assert str(valid.alpha) == "[1e-06, 1]"
-    assert str(valid.xi) == "[0, 1]"
+    assert (str(valid.alpha), str(valid.xi)) == ("[1e-06, 1]", "[0, 1]")
     assert str(bounds.valid_map(maps[0], FITS)[0]) == "[0, 1]"
     whole = catalogue.find("liang-whole", FITS)
     assert str(bounds.valid_profile(whole, FITS).xi) == "[0.01, 1]"
@@ -170,8 +168,7 @@ def test_errors_that_are_no_number_are_the_largest():
     at = dense_grid.Arguments(np.full((3, 1, 1), 0.5), np.array([[[1.0]]]), np.array([[[0.5]]]), np.array([1.0]))
     error = np.array([0.1, np.nan, 0.2]).reshape(3, 1, 1)
     found = dense_grid.spread(error, np.ones((3, 1, 1), bool), at)
-    assert found.largest == np.inf
-    assert found.half == 0.2
+    assert (found.largest, found.half) == (np.inf, 0.2)
     assert dense_grid.spread(error, np.zeros((3, 1, 1), bool), at) is None
     assert Bound("x", float("nan"), 1.0).broken
     assert not Bound("x", 1.0, 1.0).broken
