@@ -196,8 +196,7 @@ def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:
 
 
 def test_no_two_classes_have_one_name():
-    homes = class_homes(ROOT, PACKAGES)
-    assert {name for name, modules in homes.items() if len(modules) > 1} == SHARED_NAMES
+    assert {name for name, modules in class_homes(ROOT, PACKAGES).items() if len(modules) > 1} == SHARED_NAMES
 
 
 def written(folder: Path, texts: dict[str, str]) -> None:

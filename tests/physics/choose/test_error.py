@@ -24,8 +24,7 @@ WITHIN = Within()
 def test_nothing_leaves_the_whole_step_and_each_part_is_named(light, case):
     """What Lambert misses is the light from beyond the edge: here by hand, of the brightest channel."""
     found = error(NOTHING, case, light, WITHIN)
-    x = case.places(0, WITHIN)
-    missed = light.beyond(case.reflectance[0])(x)
+    missed = light.beyond(case.reflectance[0])(case.places(0, WITHIN))
     assert (found.model, found.channel) == (pytest.approx(0.6 * np.sqrt(np.mean(missed**2)), rel=1e-3), 0)
     assert found.noise == found.curvature == 0.0
     assert found.total == pytest.approx(found.model, rel=0.02)
@@ -66,8 +65,7 @@ def test_places():
     flat = Case((0.5, 0.5, 0.5), (1.0, 0.5, 0.02), pixel=0.1)
     np.testing.assert_allclose(flat.places(1, WITHIN)[[0, -1]], [0.05, 1.95])
     np.testing.assert_allclose(flat.places(2, WITHIN), [0.05, 0.15])  # two pixels at the least
-    bent = replace(flat, radius=2.0)
-    assert bent.places(0, WITHIN).max() <= 2.0 * np.sin(STEEPEST)
+    assert replace(flat, radius=2.0).places(0, WITHIN).max() <= 2.0 * np.sin(STEEPEST)
     refused(r"within.mfp must be a number of mean free paths in \(0, 100\], got 0", Within, mfp=0)
     refused(r"within.pixels must be a whole number in 1 ... 100, got 1000", Within, pixels=1000)
 
@@ -86,8 +84,7 @@ def test_gaussians_are_found_again():
 def test_taps_of_a_gaussian():
     taps = module.OneGaussian(sigma=(2.0, 1.0, 0.5)).taps(33, np.array([2.0, 1.0, 0.5]))
     np.testing.assert_allclose(taps[:, :3].sum(axis=0), 1.0, rtol=1e-6)
-    spread = np.sqrt(taps[:, 3] ** 2 @ taps[:, :3])
-    np.testing.assert_allclose(spread, [2.0, 1.0, 0.5], rtol=0.05)
+    np.testing.assert_allclose(np.sqrt(taps[:, 3] ** 2 @ taps[:, :3]), [2.0, 1.0, 0.5], rtol=0.05)
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
@@ -167,9 +164,8 @@ def test_cylinder_is_the_obvious_loop(hazard, case):
 
 def test_short_paths_fade_to_lambert(hazard, case):
     """Below a twentieth of a pixel nothing is blurred; between that and a tenth a part is."""
-    x = np.array([10.0])
     for pixel, is_blurred in ((30.0, False), (12.0, True)):
-        found = estimates(hazard, ALPHA, 4, replace(case, pixel=pixel), 0, 0.05 * x)
+        found = estimates(hazard, ALPHA, 4, replace(case, pixel=pixel), 0, 0.05 * np.array([10.0]))
         assert np.any(found < 1.0) == is_blurred
 
 
@@ -229,6 +225,5 @@ def test_average_is_the_mean_over_the_pixel(share, radius):
     middles = pixel * (np.arange(3) + 0.5)
     fine = middles[:, None] + pixel * ((np.arange(20000) + 0.5) / 20000 - 0.5)
     expected = response(share, fine, 1.0, radius).mean(axis=1)
-    found = module.averaged(share, middles, pixel, 1.0, radius)
-    np.testing.assert_allclose(found, expected, atol=1e-5)
+    np.testing.assert_allclose(module.averaged(share, middles, pixel, 1.0, radius), expected, atol=1e-5)
     assert abs(response(share, middles[:1], 1.0, radius) - expected[0])[0] > 1e-3

@@ -68,8 +68,7 @@ def test_an_atlas_for_what_is_hidden_only():
 def test_a_ball_shows_the_half_before_its_outline(context, kind):
     part = Part(meshes.ball(8.0), np.ones((1, 1, 3), np.float32))
     camera = Camera((30.0, 0.0, 40.0), height=20.0, kind=kind)
-    random = np.random.default_rng(1)
-    points = random.standard_normal((4000, 3))
+    points = np.random.default_rng(1).standard_normal((4000, 3))
     points *= 8.0 / np.linalg.norm(points, axis=1, keepdims=True)
     with Stage(context, (128, 128), 64) as stage:
         stage.draw(Scene((part,), camera=camera))
@@ -150,8 +149,7 @@ def test_layers_hold_for_other_rays_and_few_less_would_not(degrees, tolerance, w
 def test_what_is_held_to_a_tolerance_is_above_the_mean():
     """By its noise; and of more than any is there are no layers."""
     looked = RandomFur(0.16, 1.0, 20.0, float(np.radians(45.0)))
-    goal = 0.05**2
-    found = looked.largest(SWEPT, 11, goal)
+    found = looked.largest(SWEPT, 11, 0.05**2)
     mean = np.mean([one.error(SWEPT, 11) ** 2 for one in looked._made])
     assert mean < found < 1.5 * mean
     assert looked.least_layers(QUADRATIC, 0.05) is None

@@ -124,8 +124,7 @@ def test_the_band_of_a_law_holds_the_truth_where_nothing_was_fitted():
     error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / number)
     assert np.abs((off.T @ off / number - closed) / error).max() < 4
     # Negative control: as if the fit had not followed.
-    plain = AMPLITUDE**2 * np.eye(3)
-    assert np.abs((off.T @ off / number - plain) / error).max() > 8
+    assert np.abs((off.T @ off / number - AMPLITUDE**2 * np.eye(3)) / error).max() > 8
     np.testing.assert_array_equal(apart(np.eye(3), np.zeros((1, 3))), np.ones((3, 1)))
 
 

@@ -196,8 +196,7 @@ def test_no_convergence_is_returned_and_settings_do_not_mix(line, tallies, toy):
 
 def test_structure_of_tables_noise_and_waves():
     """Two albedos, four rings, one of them unused: rms over seven, lag-1 sums by hand."""
-    table = np.array([[1.0, 1.0, -1.0, -1.0], [2.0, 2.0, 2.0, 0.0]])
-    found = residual_structure(table)
+    found = residual_structure(np.array([[1.0, 1.0, -1.0, -1.0], [2.0, 2.0, 2.0, 0.0]]))
     assert (found.rms, found.largest) == (pytest.approx(np.sqrt(16 / 7)), 2.0)
     # Products along r: 1 - 1 + 1 + 4 + 4 + 0 = 9; squares of the later ones 3 + 8, of the earlier ones 3 + 12.
     assert found.along_r == pytest.approx(9 / np.sqrt(11 * 15))
@@ -205,8 +204,7 @@ def test_structure_of_tables_noise_and_waves():
     assert found.along_alpha == pytest.approx(2 / np.sqrt(12 * 4))
     # Stretches of one sign along r: 2 and 1, along alpha: 1, 1, 2, 1.
     assert found.half_waves == pytest.approx(1.5 * 1.25)
-    rng = np.random.default_rng(6)
-    noise = residual_structure(rng.standard_normal((20, 100)))
+    noise = residual_structure(np.random.default_rng(6).standard_normal((20, 100)))
     # Lag-1 of white noise: 1 / sqrt(2000) = .022; 4 of them. Signs change at every other step.
     assert abs(noise.along_r) < 0.09
     assert abs(noise.along_alpha) < 0.09

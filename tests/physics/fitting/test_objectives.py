@@ -43,8 +43,7 @@ def test_energy_rows_are_weighted_and_rings_that_do_not_count_add_nothing(burley
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond)
     table = np.hstack(objectives.energy(burley, off))[:, :-2]
-    expected = 0.1 * np.sqrt(off.energy / off.reflectance[:, None])
-    np.testing.assert_allclose(table, expected, rtol=1e-10)
+    np.testing.assert_allclose(table, 0.1 * np.sqrt(off.energy / off.reflectance[:, None]), rtol=1e-10)
     # So a law that is off by f everywhere has the sum of squares f^2 (its rings' share of A).
     np.testing.assert_allclose(np.sum(table**2, axis=1), 0.01 * off.energy.sum(axis=1) / off.reflectance, rtol=1e-10)
     # Rows of limits, weight times (law / limit - 1): the unscaled energy over A, twice the source strength over alpha.
@@ -159,8 +158,7 @@ def test_rings_of_leaves_out_what_is_not_trusted():
     error = np.array([[0.01, 0.015, 0.015, 0.0]])
     profiles = Profiles(np.array([0.5]), np.arange(5.0), energy, error, effective, np.zeros(1), "orders", Setting())
     np.testing.assert_array_equal(rings_of(profiles).used, [[1, 0, 1, 0]])
-    used = np.array([[False, True, True, True]])
-    chosen = rings_of(profiles, used, limits=(1.0, 2.0), xi=(0.4, 0.5))
+    chosen = rings_of(profiles, np.array([[False, True, True, True]]), limits=(1.0, 2.0), xi=(0.4, 0.5))
     np.testing.assert_array_equal(chosen.used, [[0, 0, 1, 0]])
     np.testing.assert_array_equal(chosen.limits, [1.0, 2.0])
     np.testing.assert_array_equal(chosen.xi, [0.4, 0.5])

@@ -106,8 +106,7 @@ def test_light_beyond_an_edge_and_variance_are_plain_integrals(which, burley):
     # int f^2 / pdf dr - 1, by another quadrature in another variable.
     sampler = Stretched(burley, 1.1)  # that of another test, which has compiled it
     square = integral(lambda x: target.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
-    found = sampler_quality(sampler, ALPHA, target)
-    assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
+    assert sampler_quality(sampler, ALPHA, target).variance[0] == pytest.approx(square - 1, abs=1e-5)
 
 
 def test_a_stretch_costs_nothing_and_a_clip_is_an_atom(burley):

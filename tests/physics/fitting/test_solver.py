@@ -28,8 +28,7 @@ def test_known_parameters_come_back_whatever_scale_start_and_precision():
     assert found.cost < 1e-18
     assert 0 < found.steps < 50
     # Constants that differ by ten decades are found as well as equal ones: they are scaled by their start.
-    data = {"x": X * 1e5, "y": 2e-5 * np.exp(-1.7 * X)}
-    found = least_squares(decay, [1e-5, 1e-5], data)
+    found = least_squares(decay, [1e-5, 1e-5], {"x": X * 1e5, "y": 2e-5 * np.exp(-1.7 * X)})
     np.testing.assert_allclose(found.parameters, [2e-5, 1.7e-5], rtol=1e-6)
     found = least_squares(decay, [0.0, 0.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-8)

@@ -95,8 +95,7 @@ def test_a_stack_over_a_stack(n):
 def test_it_is_a_value_between_its_ends():
     """A pytree: its constants by name, traced, differentiated."""
     law, d = stack(), np.linspace(0.0, 3.0, 200)
-    total = law.total(d)
-    assert np.all(np.diff(total) * np.sign(law.top.reflectance - law.below.reflectance) > 0)
+    assert np.all(np.diff(law.total(d)) * np.sign(law.top.reflectance - law.below.reflectance) > 0)
     assert law.reflectance == law.total(0.1)
     assert law.profile(0.3) == law.profile(0.3, 0.1)
     assert law.constants() == CONSTANTS

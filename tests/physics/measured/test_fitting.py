@@ -34,8 +34,7 @@ TOTAL = LAW.albedo.reflectance(ALPHA)
 
 def light(inner, outer, scale=1.0) -> np.ndarray:
     """What the law itself would give of this medium."""
-    point = np.array([u_of(ALPHA), np.log(MFP), np.log(scale)])
-    return Model(LAW).predicted(point[None], inner, outer)[0, :-1]
+    return Model(LAW).predicted(np.array([u_of(ALPHA), np.log(MFP), np.log(scale)])[None], inner, outer)[0, :-1]
 
 
 def measured(inner, outer, value, sigma) -> Measured:
@@ -392,8 +391,7 @@ def test_rings_are_averages():
 @pytest.mark.parametrize("alpha", [1e-6, 0.3, 0.9, 1 - 1e-9])
 def test_alpha_keeps_its_digits(alpha):
     assert alpha_of(u_of(alpha)) == pytest.approx(alpha, rel=1e-12)
-    s = 1.0 / (1.0 + np.exp(-u_of(alpha)))
-    assert s == pytest.approx(np.sqrt(1 - alpha), rel=1e-9)
+    assert 1.0 / (1.0 + np.exp(-u_of(alpha))) == pytest.approx(np.sqrt(1 - alpha), rel=1e-9)
 
 
 def test_quantities_and_their_slopes():

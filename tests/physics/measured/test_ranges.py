@@ -63,10 +63,8 @@ def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
 
 
 def test_data_find_the_width_of_a_beam(measured):
-    instrument = Instrument(Gaussian(0.5))
-    data = own_data.rows(ONE, np.random.default_rng(5), instrument)
-    spec = asked({"beam": (0.1, 2.0)}, instrument=Instrument(Gaussian(1.05)))
-    found = fitted(data, spec)
+    data = own_data.rows(ONE, np.random.default_rng(5), Instrument(Gaussian(0.5)))
+    found = fitted(data, asked({"beam": (0.1, 2.0)}, instrument=Instrument(Gaussian(1.05))))
     assert found.range_marginal.error["beam"] < 0.05
     assert abs(found.range_marginal.mean["beam"] - 0.5) < 3 * found.range_marginal.error["beam"]
     assert found.spec.instrument.beam.w == found.range_marginal.mean["beam"]
@@ -79,8 +77,7 @@ def test_a_known_reflectance_counts_at_every_value(measured):
         there = held.problem.under({"n": n})
         assert there.model.predicted(there.spec.base[None], *EDGES)[0, -1] == pytest.approx(0.4, abs=1e-9)
     loose = fitted(measured, asked({"g": RANGE}))
-    total = Known(loose.values["A"], 0.002)
-    tight = fitted(measured, asked({"g": RANGE}, total=total))
+    tight = fitted(measured, asked({"g": RANGE}, total=Known(loose.values["A"], 0.002)))
     assert tight.range_marginal.covariance[0, 0] <= loose.range_marginal.covariance[0, 0] * 1.05
     assert tight.errors(tight.total_covariance)["A"] < 0.0022
 
@@ -156,8 +153,7 @@ def test_a_held_reflectance_is_held_under_tissue(measured):
 
 
 def test_what_is_held_is_not_moved_by_ranges(measured):
-    spec = asked({"g": RANGE}, held={"alpha": 0.98, "l": 1.0, "scale": 1.0})
-    found = fitted(measured, spec)
+    found = fitted(measured, asked({"g": RANGE}, held={"alpha": 0.98, "l": 1.0, "scale": 1.0}))
     np.testing.assert_allclose(found.range_marginal.offsets, 0.0, atol=1e-12)
     assert found.range_marginal.error["g"] < 0.1, "the data say what g must be then"
 

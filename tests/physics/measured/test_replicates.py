@@ -157,8 +157,7 @@ def null(noise):
 
 @pytest.mark.parametrize("name", ["chance", "scatter", "waves"])
 def test_chances_of_noise_are_uniform(null, name):
-    chances = [getattr(one, name) for one in null]
-    assert stats.kstest(chances, "uniform").pvalue > 1e-3
+    assert stats.kstest([getattr(one, name) for one in null], "uniform").pvalue > 1e-3
     assert not any(one.detected for one in null)
 
 

@@ -201,8 +201,7 @@ def test_misuse():
     refused("mfp must be a mean free path > 0, got 0", step_response, 1.0, 0.5, 0.0)
     hazard = {"setting": DIFFUSE, "law": profilefit.load("hazard")}
     refused("the law belongs to searchlight", step_response, 1.0, 0.5, **hazard, error=SettingError)
-    unsolved = Setting(n=0.9)
-    refused("give a law of that setting", step_response, 1.0, 0.5, setting=unsolved, error=SettingError)
+    refused("give a law of that setting", step_response, 1.0, 0.5, setting=Setting(n=0.9), error=SettingError)
     one_trial = shifted_points(2, 1, 1)
     refused(r"points must be \(trials >= 2", edge_estimate, by_quantile(0.5), one_trial, [0.0], 0.5, SEARCHLIGHT)
 

@@ -147,8 +147,7 @@ def test_is_the_double_loop():
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 1.0])
 def test_even_light_on_even_skin_is_conserved(reflectance):
-    surface = flat(12, 24, reflectance, 0.75)
-    found = gathered(surface, VIEW, MFP)
+    found = gathered(flat(12, 24, reflectance, 0.75), VIEW, MFP)
     np.testing.assert_allclose(found.light, 0.75 * reflectance, rtol=1e-14, atol=0.0)
     assert np.all((found.share > 0.1) & (found.share < 1.0))
 

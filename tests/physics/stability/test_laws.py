@@ -77,9 +77,8 @@ def test_single_precision_is_right_and_half_is_not():
 
 
 def test_a_text_keeps_its_type():
-    law = catalogue.load("quantile")
     for dtype in (np.float16, np.float32, cells.EXTENDED):
-        text = RoundedText(law, dtype)
+        text = RoundedText(catalogue.load("quantile"), dtype)
         assert text.call("profile", np.array([1.0]), np.array([0.5]), np.array([1.0])).dtype == dtype
 
 

@@ -95,8 +95,7 @@ def test_plain_loop_reflects_what_it_should():
 
 def test_compiled_is_the_same_loop():
     pytest.importorskip("numba")
-    compiled = scalar.compiled()
-    for one, other in zip(traced(scalar.trace, 300), traced(compiled, 300), strict=True):
+    for one, other in zip(traced(scalar.trace, 300), traced(scalar.compiled(), 300), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
 
 

@@ -386,8 +386,7 @@ def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):
 def test_every_example_is_copied_and_named(done, refused):
     Path("file").write_text("")
     refused("examples --out file/inside", "profilefit: cannot write")
-    out = done("examples")
-    assert out.splitlines() == [f"examples/{name}" for name in EXAMPLES]
+    assert done("examples").splitlines() == [f"examples/{name}" for name in EXAMPLES]
     assert all(Path("examples", name).read_bytes() == Path(path).read_bytes() for name, path in EXAMPLES.items())
 
 

@@ -109,8 +109,7 @@ def test_a_bracket_and_its_cards_give_the_medium(done, folder, tmp_path):
             np.testing.assert_allclose([float(number) for number in text.split(", ")], expected, rtol=digits)
     with opened() as context:
         main = "out float y; void main() { y = medium_profile(1.0, medium_albedo.g, medium_mfp.g); }"
-        program = context.program(EMPTY, "\n".join(["#version 330", told, main]))
-        program.release()
+        context.program(EMPTY, "\n".join(["#version 330", told, main])).release()
 
 
 SCALE = ("--scale", "0.1mm/px")

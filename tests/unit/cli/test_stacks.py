@@ -104,8 +104,7 @@ def test_a_stack_is_reported_by_its_name(command, done, mine):
     for name in content["constants"]:
         assert [row[:3] for row in rows].count(name.split(".")) == 1
     assert ["green", "1", "0.200", "mm", "0.012", "0.0030", "-0.0015"] in rows
-    both = json.loads(command("report", "heart", "hazard", "--json")[1])
-    assert list(both["records"]) == ["heart", "hazard"]
+    assert list(json.loads(command("report", "heart", "hazard", "--json")[1])["records"]) == ["heart", "hazard"]
     told = json.loads(command("report", "heart", "--fits", "mine", "--json")[1])
     sums = record.read(Path("mine/gaussians/heart.json"))
     assert told == {"records": {"heart": content}, "gaussians": {"heart": sums}}

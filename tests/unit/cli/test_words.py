@@ -135,8 +135,7 @@ def completed(done, monkeypatch):
         monkeypatch.setenv("_PROFILEFIT_COMPLETE", "complete_bash")
         monkeypatch.setenv("COMP_WORDS", " ".join(("profilefit", *typed)))
         monkeypatch.setenv("COMP_CWORD", str(len(typed)))
-        out = done()
-        return set(out.split())
+        return set(done().split())
 
     return run
 

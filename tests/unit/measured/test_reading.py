@@ -53,8 +53,7 @@ def test_delimiters_comments_blank_lines_and_marks(table, delimiter):
 
 
 def test_columns_may_stand_in_any_order_and_case(table):
-    text = 'Sigma,R [mm],"value [1/mm^2]"\n.01,1,.5\n.01,2,.2\n.01,3,.1\n'
-    found = table(text)
+    found = table('Sigma,R [mm],"value [1/mm^2]"\n.01,1,.5\n.01,2,.2\n.01,3,.1\n')
     np.testing.assert_array_equal(found.value, [0.5, 0.2, 0.1])
     assert found.unit == "mm"
 

@@ -88,8 +88,7 @@ def test_a_table_of_a_known_function():
     table, known = Tabulated(angles, HenyeyGreenstein(0.7).pdf(np.cos(angles))), HenyeyGreenstein(0.7)
     for order in range(6):
         assert table.moment(order) == pytest.approx(known.moment(order), abs=2e-5)
-    values = np.where(angles < np.pi / 2, 1 / (2 * np.pi), 0.0)
-    half = Tabulated(angles, values)
+    half = Tabulated(angles, np.where(angles < np.pi / 2, 1 / (2 * np.pi), 0.0))
     assert (half.invert(-0.1), half.mean_cosine) == (0, pytest.approx(0.5, abs=5e-3))
     assert np.all(half.sample(np.linspace(0, 1, 101)) > -0.01)
 

@@ -56,8 +56,7 @@ def test_broken_bounds_are_lines_that_say_where_and_by_how_much():
 
 
 def test_the_readme_has_laws_maps_broken_bounds_and_costs():
-    text = check_tables.markdown_checks(found(law(GOOD, BAD)))
-    laws, maps, broken, costs, device = text.split("\n\n")
+    laws, maps, broken, costs, device = check_tables.markdown_checks(found(law(GOOD, BAD))).split("\n\n")
     assert laws.splitlines()[2].split()[1:8:2] == ["hazard-refracting", "searchlight", "1.4", "0"]
     assert maps.splitlines()[2].split()[-2:] == ["pass", "|"]
     assert broken.startswith("- `hazard-refracting, n = 1.4`: float32 ks: 0.02")

@@ -65,8 +65,7 @@ def test_says_it_in_one_line_and_why(choice):
 @pytest.mark.parametrize(("error", "verdict"), [(0.014, "enough"), (0.017, "enough alone"), (0.03, "not enough")])
 def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice, error, verdict):
     """0.012 of 0.02 leaves 0.016, in squares."""
-    layer = replace(LAYER, error=error, standard_error=0.0005)
-    assert data(choice, layer)["one_layer"]["verdict"] == verdict
+    assert data(choice, replace(LAYER, error=error, standard_error=0.0005))["one_layer"]["verdict"] == verdict
 
 
 def test_the_worst_of_three_colours_is_told(choice):

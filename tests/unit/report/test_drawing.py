@@ -166,8 +166,7 @@ def test_pictures_keep_every_pixel():
 
 def test_a_photograph_may_lose_what_nobody_sees():
     ramp = np.add.outer(np.arange(256.0), np.arange(256.0)) / 510
-    noise = np.random.default_rng(1).normal(0.0, 0.01, (256, 256, 3))
-    pixels, file = png(ramp[..., None] + noise)
+    pixels, file = png(ramp[..., None] + np.random.default_rng(1).normal(0.0, 0.01, (256, 256, 3)))
     exactly, small = (address(file, loss) for loss in (False, True))
     assert len(small) < 0.5 * len(exactly)
     shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(small.split(",")[1])))).astype(float)

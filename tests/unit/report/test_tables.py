@@ -209,7 +209,8 @@ def test_digits_end_with_those_of_the_error(value, error, text):
 
 
 def test_decimal_points_stand_in_one_column_and_an_interval_has_two_digits_of_its_half_width():
-    assert (cells.interval((0.0621350586906, 0.0625785745179)), cells.interval(None)) == ("0.06214 … 0.06258", "–")
+    assert cells.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
+    assert cells.interval(None) == "–"
     padded = cells.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
     from_right = {len(text) - (text.index(".") if "." in text else len(text.rstrip())) for text in padded}
     assert from_right == {len(".2e-05")}

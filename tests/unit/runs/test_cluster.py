@@ -73,8 +73,7 @@ def test_two_processes_give_the_bits_of_one(workers, alone, monkeypatch):
 
 
 def test_a_worker_killed_in_the_middle_changes_no_bit(workers, alone, tmp_path):
-    victims = pids(workers)
-    victim = min(victims)
+    victim = min(pids(workers))
     saved = []
 
     class Killing(Store):

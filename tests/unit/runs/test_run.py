@@ -151,8 +151,7 @@ def test_enough_is_asked_on_a_fixed_schedule_and_ends_the_run_there(tmp_path, wo
 
 @pytest.mark.parametrize("batches", [5, 8, 20])
 def test_a_run_that_never_has_enough_traces_all_its_photons_and_an_error_in_enough_rises(batches):
-    total = run_batches(jittery, 10, 10 * batches - 3, enough=lambda result: False)
-    assert total.started == 10 * batches - 3
+    assert run_batches(jittery, 10, 10 * batches - 3, enough=lambda result: False).started == 10 * batches - 3
     with pytest.raises(ZeroDivisionError):
         run_batches(one, 10, 1000, enough=lambda result: 1 / 0)
 

@@ -108,8 +108,7 @@ def test_looking_at_a_store_writes_nothing_and_another_versions_is_refused(store
 
 
 def test_a_batch_from_another_store_is_refused(store, tmp_path):
-    other = Store(tmp_path / "other", MADE_BY | {"seed": 2}, READ)
-    other.save(0, COUNTS)
+    Store(tmp_path / "other", MADE_BY | {"seed": 2}, READ).save(0, COUNTS)
     (tmp_path / "other" / "batch-00000000.npz").rename(tmp_path / "batch-00000000.npz")
     remedy = "if that is still at work, use another folder; if not, delete that file to redo just that batch"
     refused(rf"batch-00000000.npz was made by another run; {remedy}", store.load, 0, error=StoreError)

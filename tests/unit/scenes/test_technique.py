@@ -41,10 +41,9 @@ class Scaled(Technique):
 
     def passes(self, frame):
         source = SOURCE.replace("uniform vec3 switched_off[2], too;", "")
-        steps = (("irradiance_map", "between_map"), ("between_map", EXITANCE))
         return [
             Pass("scaled", {"irradiance_map": read, "table": self.table}, into, source, self.uniforms)
-            for read, into in steps
+            for read, into in (("irradiance_map", "between_map"), ("between_map", EXITANCE))
         ]
 
     def through(self):

@@ -32,9 +32,8 @@ def test_one_triangle_covers_the_whole_target(context):
 
 
 def test_a_broken_shader_is_told_by_name_line_and_message(context):
-    broken = HALF.replace("0.25", "missing")
     with pytest.raises(ShaderError, match=r"shader 'half' does not compile, line 5, `colour = .*missing.*`: .*missing"):
-        program(context, "half", broken)
+        program(context, "half", HALF.replace("0.25", "missing"))
     with pytest.raises(ShaderError, match=r"shader 'half' does not compile, line 1, `#version 330 nonsense`"):
         program(context, "half", HALF, vertex="#version 330 nonsense\nvoid main() {}\n")
 

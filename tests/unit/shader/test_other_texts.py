@@ -60,8 +60,7 @@ def test_phases_in_float64(phase):
     made = functions(phase_text(phase, "python"))
     np.testing.assert_allclose(made["phase_pdf"](OFF), phase.pdf(1 - OFF) + 0 * OFF, rtol=1e-8)
     # Terms one after the other, the light of each from its straight back to its straight on.
-    drawn = np.sort(made["phase_sample"](XI))
-    np.testing.assert_allclose(1 - phase.invert(1 - drawn), XI, atol=1.5 / XI.size)
+    np.testing.assert_allclose(1 - phase.invert(1 - np.sort(made["phase_sample"](XI))), XI, atol=1.5 / XI.size)
 
 
 @PHASES
@@ -232,8 +231,7 @@ def test_what_an_eye_and_a_lamp_share(context):
         assert np.all(exact <= DOUBLE.call("shadow", radius, one) * (1.0 + 1e-9))
     np.testing.assert_allclose(SINGLE.call("shared", *given), exact, rtol=1e-6)
     calls = "found = vec4(fur_shared(q.x, q.y, q.z, q.w), 0.0, 0.0, 0.0);"
-    drawn = on_opengl(context, strand_text(), calls)(*given)[0]
-    np.testing.assert_allclose(drawn, exact, rtol=3e-6)
+    np.testing.assert_allclose(on_opengl(context, strand_text(), calls)(*given)[0], exact, rtol=3e-6)
 
 
 def test_the_shadow_in_float32():

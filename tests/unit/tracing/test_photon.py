@@ -142,8 +142,7 @@ def test_what_has_left_is_marked_and_stays_as_it_is():
     out = np.asarray(after.layer) == REFLECTED
     np.testing.assert_array_equal(after.ended, out)
     np.testing.assert_array_equal(np.asarray(after.weight)[out], np.float32(-0.7))
-    again = settle(scatter(after)[0])
-    for old, new in zip(jax.tree.leaves(after), jax.tree.leaves(again), strict=True):
+    for old, new in zip(jax.tree.leaves(after), jax.tree.leaves(settle(scatter(after)[0])), strict=True):
         np.testing.assert_array_equal(np.asarray(old)[out], np.asarray(new)[out])
 
 
@@ -161,8 +160,7 @@ def test_roulette_keeps_the_weight_of_all(weight, event, chance):
 def test_nothing_ends_for_good_but_by_weight_zero_and_the_cap():
     # Long paths toss once an octave, and not where they are cut.
     events = np.arange(0, MAX_EVENTS + EVENTS_PER_TURN, EVENTS_PER_TURN, dtype=np.uint32) + EVENTS_PER_TURN - 1
-    late = np.asarray(layered_event.is_late(jnp.asarray(events)))
-    assert np.sum(late) == np.log2(MAX_EVENTS // FIRST_TOSS)
+    assert np.sum(np.asarray(layered_event.is_late(jnp.asarray(events)))) == np.log2(MAX_EVENTS // FIRST_TOSS)
     above = settle(lanes(weight=1.01 * THRESHOLD))  # which is left alone
     assert not np.any(above.ended)
     np.testing.assert_array_equal(above.weight, np.float32(1.01 * THRESHOLD))

@@ -108,8 +108,7 @@ def test_words_repeat_as_often_as_birthdays_say(draw):
 
 
 def test_keys_of_seeds_and_batches_all_differ():
-    keys = {rng.batch_key(seed, batch).tobytes() for seed in range(64) for batch in range(64)}
-    assert len(keys) == 64**2
+    assert len({rng.batch_key(seed, batch).tobytes() for seed in range(64) for batch in range(64)}) == 64**2
 
 
 def test_uniform_is_inside_its_interval_and_fine_near_zero():
@@ -122,8 +121,7 @@ def test_uniform_is_inside_its_interval_and_fine_near_zero():
 
 def test_exponential_is_the_logarithm_of_uniforms_from_end_to_end():
     ends = np.concatenate([np.arange(2**17), 2**32 - 1 - np.arange(2**17), 2 ** np.arange(32), 2 ** np.arange(32) - 1])
-    between = np.random.default_rng(0).integers(0, 2**32, 10**6)
-    drawn = np.concatenate([ends, between]).astype(np.uint32)
+    drawn = np.concatenate([ends, np.random.default_rng(0).integers(0, 2**32, 10**6)]).astype(np.uint32)
     paths = np.asarray(jax.jit(rng.exponential)(drawn), np.float64)
     rounded = np.minimum((drawn | 1).astype(np.float32), np.float32(rng.LARGEST_WORD)).astype(np.float64)
     np.testing.assert_allclose(paths, -np.log(rounded / 2.0**32), rtol=4e-7)

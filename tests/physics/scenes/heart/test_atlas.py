@@ -34,10 +34,8 @@ def spiral(count: int = COUNT) -> tuple[np.ndarray, np.ndarray]:
 def test_a_sphere_is_its_oracle():
     points, areas = spiral()
     at = points[:: COUNT // 40]
-    light = 1.0 + points[:, 2] / BALL
-    found = surface_blur(points, areas, light, VARIANCES, WEIGHTS, at=at)
-    known = sphere_blur(BALL, at[:, 2] / BALL, VARIANCES, WEIGHTS)
-    np.testing.assert_allclose(found, known, atol=1e-5)
+    found = surface_blur(points, areas, 1.0 + points[:, 2] / BALL, VARIANCES, WEIGHTS, at=at)
+    np.testing.assert_allclose(found, sphere_blur(BALL, at[:, 2] / BALL, VARIANCES, WEIGHTS), atol=1e-5)
     # Negative control: distances along the surface, or light that is renormalised, are something else.
     wider = sphere_blur(BALL, at[:, 2] / BALL, 1.02 * VARIANCES, WEIGHTS)
     assert np.max(np.abs(found - wider)) > 1e-3
@@ -94,8 +92,7 @@ def test_the_share_of_the_screen():
     at = BALL * np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     share = screen_share(points, areas, points[:, 2] > 0, Kernel(VARIANCES[:1], np.ones(1)), at)
     np.testing.assert_allclose(share, [1.0, 0.5, 0.0], atol=0.01)
-    chosen = balance(0.0, 1.0, 2.0, share, 0.97)
-    np.testing.assert_array_equal(chosen, [1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(balance(0.0, 1.0, 2.0, share, 0.97), [1.0, 2.0, 2.0])
 
 
 POINTS, ONES = np.eye(3)[:2], [1.0, 1.0]

@@ -95,8 +95,7 @@ def test_blotches_are_the_same_each_time_and_have_no_seam():
 
 def points(low, high):
     """Of all the head's parts, those of a range of y [mm]."""
-    parts = (head.head(), head.ear(-1), head.ear(1), head.neck())
-    found = np.concatenate([part.position for part in parts])
+    found = np.concatenate([part.position for part in (head.head(), head.ear(-1), head.ear(1), head.neck())])
     return found[(found[:, 1] >= low) & (found[:, 1] <= high)]
 
 
@@ -113,8 +112,7 @@ def test_the_head_moves_as_one(pose):
     face = points(WHOLE, np.inf)
     chosen = np.random.default_rng(1).choice(len(face), (200, 4))
     a, b, c, d = np.moveaxis(face[chosen], 1, 0)
-    moved = scene.posed(face, pose)[chosen]
-    p, q, r, s = np.moveaxis(moved, 1, 0)
+    p, q, r, s = np.moveaxis(scene.posed(face, pose)[chosen], 1, 0)
     for first, second, third, fourth in ((a, b, p, q), (a, c, p, r), (b, d, q, s)):
         distance = np.linalg.norm(first - second, axis=1)
         np.testing.assert_allclose(np.linalg.norm(third - fourth, axis=1), distance, rtol=1e-10, atol=1e-9)
@@ -141,8 +139,7 @@ def test_where_a_pose_goes():
 @pytest.mark.parametrize("pose", scene.POSES)
 def test_a_posed_head_keeps_its_sides_out(pose):
     """`deformed` refuses a map that turns space inside out; triangles turn as their normals."""
-    request = scene.read("head.toml", content("pose", pose))
-    for part in scene.scene_of(request).parts:
+    for part in scene.scene_of(scene.read("head.toml", content("pose", pose))).parts:
         assert outward(part.mesh) > 0.98
 
 

@@ -55,8 +55,7 @@ def test_energy_between_planes(sidak):
     The flux that is absorbed below a plane is what crosses it, net; deep enough under the source the fluence falls as
     e^{-k t}, with k = 0.7104 for omega 0.8, the root of omega atanh(k) = k.
     """
-    planes = np.array([2.0, 3.0])
-    found = trace_beam(Isotropic(), planes, [1.0], 400_000, 3)
+    found = trace_beam(Isotropic(), np.array([2.0, 3.0]), [1.0], 400_000, 3)
     down, up = found.plane.at(0.8), found.upward.at(0.8)
     net = down.value - up.value
     error = np.hypot(down.standard_error, up.standard_error) / net
@@ -95,8 +94,7 @@ def test_backward_is_forward(sidak):
     At the surface of a half space in the sun, straight down, that is H(1) times the sun's irradiance (Chandrasekhar,
     Radiative Transfer, 1950).
     """
-    depth = 1e-6
-    found = trace_view(Isotropic(), [depth], photons=200_000, seed=4).at(0.8)
+    found = trace_view(Isotropic(), [1e-6], photons=200_000, seed=4).at(0.8)
     x, w = np.polynomial.legendre.leggauss(64)
     mu, weight = 0.5 * (x + 1), 0.5 * w
     h = np.ones_like(mu)
@@ -380,8 +378,7 @@ def test_a_seed_is_a_run_and_its_halves_err_apart(monkeypatch):
         assert np.mean(first != second) > 0.6  # some see the sky at once
     np.testing.assert_array_equal(*(rays_of_furnace(5, 4) for _ in range(2)))
     monkeypatch.setattr(paths, "TOGETHER", 8)
-    batches = rays_of_furnace(40, 0, way=[0.6, 0.0, -0.8])
-    assert np.unique(batches[..., 1].round(9)).size > 50
+    assert np.unique(rays_of_furnace(40, 0, way=[0.6, 0.0, -0.8])[..., 1].round(9)).size > 50
 
 
 def test_a_pixel_is_the_mean_over_its_area():

@@ -377,8 +377,7 @@ def test_error_over_samples():
             assert rms(by_prisms, count, bundle) < 1.3 * prisms[i]
         assert rms(by_prisms, 16, bundle) < 0.2 * rms(by_lines, 16, bundle)
     # Lines and prisms have one limit.
-    at = VIEWS[0]
-    assert by_lines(OVERHEAD, at, SHARP, 1 << 17) == pytest.approx(truths(OVERHEAD, SHARP)[0], rel=2e-5)
+    assert by_lines(OVERHEAD, VIEWS[0], SHARP, 1 << 17) == pytest.approx(truths(OVERHEAD, SHARP)[0], rel=2e-5)
 
 
 @pytest.mark.slow

@@ -263,8 +263,7 @@ def test_water_that_lets_next_to_nothing_through_in_one_colour(context, few_dire
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (-1.0, 2.0, 0.7), (0.0, -3.0, -5.0), (0.01, 0.0, 1.0)])
 def test_axes(direction):
     """Right-handed, half a picture's sides at a distance of 1; up is up, right is level."""
-    camera = toward((1.0, 2.0, -2.0), direction, 1.2)
-    right, up, forward = axes(camera, (30, 20))
+    right, up, forward = axes(toward((1.0, 2.0, -2.0), direction, 1.2), (30, 20))
     np.testing.assert_allclose(np.linalg.norm(forward), 1.0, rtol=1e-12)
     np.testing.assert_allclose(forward, np.array(direction) / np.linalg.norm(direction), rtol=1e-12)
     np.testing.assert_allclose([np.linalg.norm(right), np.linalg.norm(up)], [0.9, 0.6], rtol=1e-12)

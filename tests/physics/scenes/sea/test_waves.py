@@ -68,8 +68,7 @@ def test_bounds_and_the_steepest_and_most_curved_place():
 
 def test_refraction_is_snell_and_fresnel():
     """Angles to the surface's own normal, by another way: sines of angles between vectors."""
-    rng = np.random.default_rng(5)
-    zx, zy = rng.normal(0.0, 0.3, (2, 500))
+    zx, zy = np.random.default_rng(5).normal(0.0, 0.3, (2, 500))
     tilt, n = 0.6, 1.34
     x, y, flux = refracted(tilt, (zx, zy), n)
     ray = np.stack([x, y, -np.ones_like(x)], axis=-1) / np.sqrt(1.0 + x**2 + y**2)[:, None]
@@ -104,8 +103,7 @@ def test_what_no_waves_are():
 
 def lit_floor(steep, count=2000, seed=0):
     """A floor, origins above it and rays of a sun at 63 degrees below waves, of which the flattest has this S."""
-    rng = np.random.default_rng(seed)
-    place = rng.uniform(0.0, TILE, (count, 2))
+    place = np.random.default_rng(seed).uniform(0.0, TILE, (count, 2))
     x, y, _ = refracted(np.radians(63.0), random_sea(0.15, TILE, seed).slope(*place.T), 1.34)
     ray = np.column_stack([x, y, -np.ones(count)]) / np.sqrt(1.0 + x**2 + y**2)[:, None]
     floor = random_floor(1.0, TILE, DEPTH, seed + 1)

@@ -138,8 +138,7 @@ def test_a_record_is_read_as_the_laws_that_were_written(asked, file, tmp_path, t
         np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
     assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
     assert len({one.constants()["w"] for one in found.laws}) == 3
-    again = recorded(stacks.fit(of, RUN), tmp_path / "again")
-    assert again.read_bytes() == path.read_bytes()
+    assert recorded(stacks.fit(of, RUN), tmp_path / "again").read_bytes() == path.read_bytes()
 
 
 def test_grey_layers_are_fitted_once_and_starts_are_those_of_their_colours(asked, file, tmp_path):

@@ -116,8 +116,7 @@ def test_what_the_paper_promises_is_judged_of_its_constants_alone():
     valid = bounds.valid_profile(laws[0], FITS)
     assert (str(valid.alpha), str(valid.xi)) == ("[1e-06, 1]", "[0, 1]")
     assert str(bounds.valid_map(maps[0], FITS)[0]) == "[0, 1]"
-    whole = catalogue.find("liang-whole", FITS)
-    assert str(bounds.valid_profile(whole, FITS).xi) == "[0.01, 1]"
+    assert str(bounds.valid_profile(catalogue.find("liang-whole", FITS), FITS).xi) == "[0.01, 1]"
     fitted, _ = bounds.valid_map(catalogue.find("albedo-liang", FITS), FITS)
     assert (fitted.low, fitted.high) == pytest.approx((0.05, 0.9), abs=1e-4)
     inverse = next(one for one in catalogue.sampled_laws(FITS) if one.label == "liang-inverse-as-published")
