@@ -50,6 +50,13 @@ def recorded(work, out, say=silent):
         return next(written([work], out, workers, say)).path
 
 
+def functions(text):
+    """The functions of a Python text, by name."""
+    names: dict = {}
+    exec(text, names)
+    return names
+
+
 @pytest.fixture(scope="session")
 def sidak():
     """|z| that the largest of m independent normal deviates exceeds with probability 1e-3."""

@@ -21,7 +21,7 @@ from profilefit.scenes.sea import beam_share
 from profilefit.scenes.sea.scene import read
 from profilefit.shader.check.chosen import INDICES, scope
 from profilefit.shader.law_file import export
-from tests.fixtures import EXAMPLES
+from tests.fixtures import EXAMPLES, functions
 
 FITS = catalogue.fits_folder()
 
@@ -189,13 +189,12 @@ def test_light_in_water_and_cones_of_fur(command):
     """By their names, by a name of one's own, and the blur of a scene's file."""
     assert "def sea_segment_integral(" in command("export", "sea-segment", "--lang", "python")[1]
     told = json.loads(command("export", SEA, "--lang", "json")[1])
-    made: dict = {}
-    exec(command("export", SEA, "--lang", "python", "--name", "fog")[1], made)
+    made = functions(command("export", SEA, "--lang", "python", "--name", "fog")[1])
     assert made["fog_sigma4"](2.0) == pytest.approx(told["numbers"]["blue"]["sigma"][3])
     world = read(SEA, read_toml(SEA)).world
     exact = beam_share(world.omega[1], world.c[1] * told["depth"], world.c[1] * 0.1, world.lobes)
     assert made["fog_share"](0.1, 1.0) == pytest.approx(exact, abs=0.01)
-    exec(command("export", "fur", "--lang", "python", "--name", "hair")[1], made)
+    made = functions(command("export", "fur", "--lang", "python", "--name", "hair")[1])
     assert made["hair_shadow"](0.5, 10.0) == pytest.approx(fur.shadow(0.5, 10.0, np.pi / 4))
 
 

@@ -12,6 +12,7 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.kinds import stack as stacks
 from profilefit.shader.law_file import LANGUAGES
+from tests.fixtures import functions
 from tests.unit.recipes.stack.test_record import STACK, made
 from tests.unit.recipes.stack.test_sum_record import made_sums
 
@@ -39,13 +40,6 @@ def mine(command, heart):
     assert command("regenerate", heart, "--out", "mine", "--quiet")[0] == 0
 
 
-def twin(text):
-    """The functions of a Python text."""
-    names: dict = {}
-    exec(text, names)
-    return names
-
-
 def test_a_stack_becomes_a_record_and_that_a_text(command, done, heart):
     told = json.loads(done("regenerate", heart, "--out", "mine", "--json", "--quiet"))
     assert list(told) == ["stacks/heart", "gaussians/heart"]
@@ -53,7 +47,7 @@ def test_a_stack_becomes_a_record_and_that_a_text(command, done, heart):
     law = stacks.load(Path("mine/stacks/heart.json")).laws[1]
     text = done("export", "heart", "--lang", "python", "--fits", "mine", said="profilefit: records of 'mine'\n")
     assert command("export", "mine/stacks/heart.json", "--lang", "python") == (0, text, "")
-    names, r = twin(text), np.geomspace(0.01, 10.0, 30)
+    names, r = functions(text), np.geomspace(0.01, 10.0, 30)
     np.testing.assert_allclose(names["heart_profile"](r, 1.0, 0.2), law.profile(r, 0.2), rtol=1e-10)
     assert names["heart_total"](1.0, 0.2) == pytest.approx(float(law.total(0.2)), rel=1e-10)
     assert names["heart_once_radiance"](1.0, 0.2, 0.5, 0.5, 0.0) > 0
@@ -198,6 +192,6 @@ def test_a_grey_stack_is_fitted(command, done):
     known = sums.content["constants"]["diffuse.6.v1"]
     assert [key for key in kinds if known[key] is None] == ["statistical_error"]
     law = stacks.load(path).laws[0]
-    names = twin(command("export", str(path), "--lang", "python")[1])
+    names = functions(command("export", str(path), "--lang", "python")[1])
     r = np.geomspace(0.01, 3.0, 30)
     np.testing.assert_allclose(names["veil_profile"](r, 2.0, 0.3), law.profile(r, 0.3), rtol=1e-10)

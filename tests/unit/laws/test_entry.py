@@ -25,7 +25,7 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.recipes.targets import require_known, starting_law
 from profilefit.shader import emit
-from tests.fixtures import refused
+from tests.fixtures import functions, refused
 
 CLASSES = {**{f"map {name}": kind for name, kind in laws.map_classes().items()}, **laws.profile_classes()}
 TEXTS = fits_folder().parent / "profilefit" / "shader" / "glsl"
@@ -181,8 +181,7 @@ def test_a_law_is_added_by_one_line_of_the_table(monkeypatch, tmp_path):
     assert "toy" in profilefit.names()
     law = profilefit.load("toy", folder=tmp_path)
     assert law.constants() == pytest.approx(found.constants, rel=1e-11)
-    names = {}
-    exec(emit.law_text(law, "python"), names)
+    names = functions(emit.law_text(law, "python"))
     assert names["toy_profile"](0.5, 0.8, 1.0) == pytest.approx(law.profile(0.5, 0.8), rel=1e-9)
     assert names["toy_sample"](0.3, 0.8, 1.0) == pytest.approx(law.sampler.sample(0.3, 0.8), rel=1e-9)
 

@@ -12,7 +12,7 @@ from profilefit.errors import InputError
 from profilefit.laws.gaussians import law_class
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
-from tests.unit.shader.test_other_texts import functions
+from tests.fixtures import functions
 
 BURLEY = profilefit.load("burley", "published")
 OTHER_MAP = replace(BURLEY, albedo=catalogue.albedo_law("chiang", "published"))

@@ -19,7 +19,8 @@ from profilefit.recipes.catalogue import find
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.law_file import LANGUAGES, TARGETS, commented, export
-from tests.unit.shader.test_other_texts import EXPORTERS, functions
+from tests.fixtures import functions
+from tests.unit.shader.test_other_texts import EXPORTERS
 
 FITS = catalogue.fits_folder()
 HAZARD, DIFFUSE = find("hazard", FITS), find("hazard-diffuse", FITS)

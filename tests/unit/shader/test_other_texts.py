@@ -20,7 +20,7 @@ from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.phase_text import phase_text
 from profilefit.shader.phase_text import source as phase_source
 from profilefit.studies.stability.cells import RoundedText
-from tests.fixtures import refused
+from tests.fixtures import functions, refused
 
 DRAW = """#version 330
 {text}
@@ -36,12 +36,6 @@ void main() {{
 def on_opengl(context, text, calls):
     """Calls of a text's functions with four arguments, q; they make four results, `found`."""
     return _Pass(context, "text", DRAW.format(text=text, calls=calls), "f4")
-
-
-def functions(text):
-    names: dict = {}
-    exec(text, names)
-    return names
 
 
 RECORD = named("petzold")

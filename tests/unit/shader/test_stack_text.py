@@ -14,8 +14,8 @@ from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.shader_law import PROFILE, _Pass
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
-from tests.fixtures import refused, slow
-from tests.unit.shader.test_other_texts import functions, on_opengl
+from tests.fixtures import functions, refused, slow
+from tests.unit.shader.test_other_texts import on_opengl
 
 NAMES = StackLaw.constant_names()
 # Of each channel alpha and mfp of its layers, and near what fits of heart muscle and of skin give for its interfaces.

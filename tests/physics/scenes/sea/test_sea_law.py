@@ -16,7 +16,7 @@ from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_pris
 from profilefit.scenes.sea.law import beam_share, segment_between, segment_integral, water_gaussians, water_mtf
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.shader.emit import read_text, translated
-from tests.fixtures import slow
+from tests.fixtures import functions, slow
 from tests.unit.scenes.scenes import refusals, refused
 
 ONE = ((1.0, 0.924),)
@@ -260,9 +260,7 @@ def test_in_float32(arguments):
     found = segment_integral(*arguments)
     assert found.dtype == np.float32
     assert worst(found, exactly(*arguments)) < 1e-7
-    made = {}
-    exec(compile(translated(TEXT, "python"), "segment.py", "exec"), made)
-    by_text = made["segment_integral"](*arguments)
+    by_text = functions(translated(TEXT, "python"))["segment_integral"](*arguments)
     assert by_text.dtype == np.float32
     assert worst(by_text, exactly(*arguments)) < 7e-7
     # Negative control: as it stands.
