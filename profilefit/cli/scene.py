@@ -46,7 +46,6 @@ def scene(
     from mcml_sim.files.version import __version__
     from mcml_sim.files.whole_file import require_writable, write_together
     from mcml_sim.runs.progress import working
-    from profilefit.report import scene_report as report
     from profilefit.shader.context import opened, renderer
 
     known = ", ".join(SCENES)
@@ -59,6 +58,8 @@ def scene(
     name = content.get("scene")
     if not isinstance(name, str) or name not in SCENES:
         raise InputError(f"{file}: scene must be one of {known}, got {'nothing' if name is None else repr(name)}")
+    from profilefit.report import scene_report as report  # late: it loads what draws
+
     home = import_module(SCENES[name][0])
     request = home.read(file, content)
     stem = out / Path(file).stem

@@ -1,4 +1,4 @@
-"""Measures of a law's distance from exact light: one name and one definition each, used everywhere.
+"""Measures of a law's distance from exact light: one name each; those of maps are defined in `AlbedoQuality`.
 
 Records, tables, figures, shader checks and exported texts take names and words from here.
 

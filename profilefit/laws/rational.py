@@ -23,7 +23,7 @@ INDICES, COSINES = Range(1.3, 1.5, open_low=True), Range(0.0, 0.95, open_low=Tru
 STEPS = 6  # of Newton's method in the inverse, which starts right to a hundredth, a tenth where g > .9
 COUNTS = {"c": 5, "d": 6, "f": 2}  # constants of each at g = 0, coefficients of powers of q
 TEXT = Text("refracting_rational", (), prefix="rational")
-ENTRY = Entry("rational", "rational map", is_map=True, records=("albedo-rational",), own=True, text=TEXT)
+ENTRY = Entry("rational", "rational map", is_map=True, records=("albedo-rational",), own=True, text=TEXT)  # of each map
 
 
 class Rational(Normalisation):

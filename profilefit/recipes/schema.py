@@ -119,10 +119,8 @@ TOLD: Fields = {
 # A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
 BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
 HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "g", "rel", "ks", "largest", "delta_A")
-OF_MAP = {
-    **dict.fromkeys(("delta_A", "delta_alpha", "largest_s"), NUMBER),
-    **{"monotone": FLAG, "at_one": NUMBER, "fold": NUMBER},
-}
+IN_MAP = "delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold"
+OF_MAP = dict.fromkeys(IN_MAP, NUMBER) | {"monotone": FLAG}
 SETS = ("published", "corrected", "regenerated")
 QUANTITY = FieldType(
     "radius or reflectance", lambda value: isinstance(value, str) and value in ("radius", "reflectance")

@@ -1,4 +1,4 @@
-"""Signature of a phase function, the one of this shelf; and the two that tissue optics takes without more."""
+"""Base class of phase functions; Henyey and Greenstein's, and isotropic scattering."""
 
 from __future__ import annotations
 

@@ -22,10 +22,10 @@ from profilefit.scenes import SCENES
 from profilefit.scenes.fur import scene as fur_scene
 from profilefit.scenes.fur.chart import over_layers, wide_patch
 from profilefit.scenes.fur.ways import WAYS
+from profilefit.scenes.sea import scene as sea_scene
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices
 from profilefit.scenes.sea.haze import KINDS
-from profilefit.scenes.sea.scene import SeaRender, reference_render
 from profilefit.scenes.sea.truth import caustic_photons, misfit
 from profilefit.scenes.sea.waves import Waves, random_sea
 from profilefit.scenes.stage.judge import ChartPoint
@@ -70,7 +70,7 @@ FUR, QUICK_FUR = FurSizes(), FurSizes((0.0, 45.0, 75.0), (8, 16, 48), 96, 3)
 def measure_sea(sizes: SeaSizes = SEA, track: Track = silent) -> TradeoffPart:
     """Return the example's view, caustic maps before and beyond the first fold, and shafts."""
     with opened() as context:
-        with reference_render(context, example("sea"), sizes.paths) as found:
+        with sea_scene.reference_render(context, example("sea"), sizes.paths) as found:
             drawn = (view(found, sizes), *maps(context, sizes, track))
         notes = (f"drawn by {renderer(context)}",)
     return TradeoffPart("sea", "Under the sea", (*drawn, shafts(sizes)), notes)
@@ -103,7 +103,7 @@ def _points(panel: str, found: Iterable[ChartPoint], fact: str) -> tuple[Point, 
     )
 
 
-def view(render: SeaRender, sizes: SeaSizes = SEA) -> Panel:
+def view(render: sea_scene.SeaRender, sizes: SeaSizes = SEA) -> Panel:
     """Return a picture by each law of the water's light, over pieces of a ray."""
     found = [one for kind in KINDS for one in render.points(kind, sizes.samples, sizes.turns)]
     points, title = _points("view", found, "pieces"), "examples/sea.toml, pieces of a ray"

@@ -192,7 +192,7 @@ def test_a_sixth_kind_is_regenerated_reported_exported_and_completed(command, mo
 
 
 def test_an_exported_law_is_found_without_a_walk_through_other_kinds():
-    """Files of the packages whose functions run, in a process that has them imported; 22 before there was a shelf."""
+    """Files of the packages whose functions run, in a process that has them imported; one is of measures."""
     export_subject("hazard")
     entered = set()
 
