@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,8 +24,10 @@ from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import trimmed_radius
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.laws.surface import surface_of
 
+Law = TypeVar("Law", bound=Constants)
 NEAREST = 0.01
 ENERGY_WITHIN = 0.995
 RADII = 400
@@ -104,17 +107,26 @@ class Quality:
     largest: Floats
 
 
-def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
-    """Measure a law against the exact profile of its own setting at each (reduced) albedo in `alpha` (m,)."""
+def profile_quality(law: ProfileLaw, alpha: ArrayLike, setting: Setting | None = None) -> Quality:
+    """Measure a law against the exact profile of a setting at each (reduced) albedo in `alpha` (m,).
+
+    setting  one that the law spans; its own by default
+    """
     albedos = np.atleast_1d(np.asarray(alpha, float))
-    outer = _outer(tuple(albedos), law.setting)
-    truths = [_truth(*pair, law.setting) for pair in zip(albedos.tolist(), outer, strict=True)]
+    law, setting = _under(law, setting)
+    outer = _outer(tuple(albedos), setting)
+    truths = [_truth(*pair, setting) for pair in zip(albedos.tolist(), outer, strict=True)]
     own, mfp = np.array([_medium(one, law.setting) for one in albedos.tolist()]).T[:, :, None]
     # All albedos in one call of each method.
     profile, even = (law.profile(np.stack(r), own, mfp) for r in ([t.r for t in truths], [t.even for t in truths]))
     cdf = law.cdf(np.stack([t.far for t in truths]), own, mfp)
     rows = [_measures(*row) for row in zip(truths, profile, even, cdf, strict=True)]
     return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def _under(law: Law, setting: Setting | None) -> tuple[Law, Setting]:
+    """Return the law under a setting that it spans, in reduced albedos: its compiled programs serve all of these."""
+    return (law, law.setting) if setting is None else (law.in_reduced().under(surface_of(setting)), setting)
 
 
 def r_squared(data: Floats, law: Floats) -> float:
@@ -193,9 +205,13 @@ class AlbedoQuality:
     fold: float
 
 
-def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
-    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances."""
-    law, setting = law.in_reduced(), law.setting
+def albedo_quality(law: AlbedoLaw, setting: Setting | None = None) -> AlbedoQuality:
+    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances.
+
+    setting  one that the map spans; its own by default
+    """
+    law, setting = _under(law, setting)
+    law = law.in_reduced()
     s = (np.arange(1000) + 0.5) / 1000
     alpha = 1.0 - s**2
     truth = np.asarray(exact.reflectance(unreduced(alpha, setting.g), setting=setting))

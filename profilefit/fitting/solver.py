@@ -222,6 +222,24 @@ def differences(
     return at
 
 
+def with_curvature(values: Floats, jacobian: Floats, hessian: Floats) -> tuple[Floats, Floats]:
+    """Return residuals (p + 1,) and a Jacobian with the same sum of squares and slope, whose J'J is the Hessian (p, p).
+
+    Where residuals stay large, J'J alone lacks their curvature, and steps creep. The given ones are returned where the
+    Hessian is not positive, or promises to gain more than there is.
+    """
+    scale = np.sqrt(np.abs(np.diag(hessian)))
+    try:
+        root = np.linalg.cholesky(hessian / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        return values, jacobian
+    top = np.linalg.solve(root, jacobian.T @ values / scale)
+    rest = _squares(values) - _squares(top)
+    if not rest >= 0:
+        return values, jacobian
+    return np.append(top, np.sqrt(rest)), np.vstack([root.T * scale, np.zeros(scale.size)])
+
+
 def solve(
     at: Linearised,
     start: Floats,

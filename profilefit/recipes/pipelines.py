@@ -134,7 +134,7 @@ def by_index(law: Any, settings: Sequence[Setting]) -> dict[str, list[float]]:
     The radius is within 99.5 % of the energy.
     """
     alpha = albedo_values(QUALITY_ALBEDOS)
-    each = [profile_quality(law.at(setting), alpha) for setting in settings]
+    each = [profile_quality(law, alpha, setting) for setting in settings]
     worst = {name: [float(np.max(getattr(one, name))) for one in each] for name in ("rel", "ks", "largest")}
     return {**places(settings), **worst}
 

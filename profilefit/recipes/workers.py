@@ -8,6 +8,7 @@ Warnings of a job are issued again in the process that asked for it.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -104,6 +105,7 @@ def _begin(watched: Connection, shares: SimpleQueue[list[int]]) -> None:
     if share := shares.get():
         with suppress(OSError):  # a sandbox may forbid it; then all share all cores
             os.sched_setaffinity(0, share)
+    gc.set_threshold(100_000)  # JAX makes objects by the million, few in cycles: collecting takes a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
 

@@ -21,7 +21,7 @@ def quality(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
     laws = {**printed_laws(recipe, run), "regenerated": law}
     found: dict[str, Any] = {name: albedo_quality(one) for name, one in laws.items()}
     if recipe.indices:
-        off = [albedo_quality(law.at(setting)).delta_A for setting in judged(recipe)]
+        off = [albedo_quality(law, setting).delta_A for setting in judged(recipe)]
         found["by_index"] = {**places(judged(recipe)), "delta_A": off}
     return found
 

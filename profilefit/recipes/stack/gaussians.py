@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
 from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance, scaled_inverse
-from profilefit.fitting.solver import Solution, solve
+from profilefit.fitting.solver import Solution, solve, with_curvature
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes.schema import ERRORS
@@ -31,7 +32,7 @@ ALONE = 8  # starts of one Gaussian
 OFFSET = 299  # of the seed of traced light
 # Of the row by which non-negative least squares makes weights sum to one: the optimum that follows does so to rounding.
 TO_ONE = 1e3
-SEARCH_WORTH = 1e-8  # as `worth` in `solve`, for the starts. `joint` goes on from the best of them
+SEARCH_WORTH = 1e-5  # as `worth` in `solve`, for the starts. `joint` goes on from the best of them
 TURNS = 10  # of weights that are held at 0 and variances that move, and of fits that go on; three do
 # Neighbouring rings that a refit of the jackknife leaves out together, of some ten to each Gaussian: their residuals
 # are alike, and all of a Gaussian's rings would take the Gaussian along.
@@ -175,37 +176,37 @@ def refitted(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
 
 
 def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: Floats) -> Solution:
-    """Return the optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
+    """Return the optimum from a start. Few Gaussians leave large residuals, whose curvature counts."""
 
-    def at(parameters: Floats) -> tuple[Floats, Floats]:
+    def at(parameters: Floats) -> tuple[Floats, Floats, Floats]:
         constants = offset + slopes @ parameters
         count = constants.size // (len(lights) + 1)
-        weights = constants[count:].reshape(len(lights), count)
-        values, jacobian = _off(np.exp(constants[:count]), weights, lights)
-        return values, jacobian @ slopes
+        variances, weights = np.exp(constants[:count]), constants[count:].reshape(len(lights), count)
+        values, jacobian = _off(variances, weights, lights)
+        return values, jacobian @ slopes, curvature(variances, weights, slopes, lights)
 
     for _ in range(TURNS):
-        best = solve(at, start)
+        best = solve(lambda parameters: with_curvature(*at(parameters)), start)
         if best.converged:
             break
         start = best.parameters
-    return best
+    values, jacobian, _ = at(best.parameters)
+    return replace(best, residuals=values, jacobian=jacobian)
 
 
-def curvature(sums: JointSum, lights: Sequence[SumLight]) -> Floats:
-    """Return the Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
-    variances, count = sums.variances, sums.variances.size
-    values, jacobian = _off(variances, sums.weights, lights)
+def curvature(variances: Floats, weights: Floats, slopes: Floats, lights: Sequence[SumLight]) -> Floats:
+    """Return the Hessian (p, p) of half the sum of squares, the curvature of the residuals included."""
+    count = variances.size
+    values, jacobian = _off(variances, weights, lights)
     whole, levels = jacobian.T @ jacobian, np.arange(count)
     residuals = np.split(values, np.cumsum([light.energy.size for light in lights])[:-1])
-    for number, (own, light, off) in enumerate(zip(sums.weights, lights, residuals, strict=True)):
+    for number, (own, light, off) in enumerate(zip(weights, lights, residuals, strict=True)):
         pull = off * light.weight * light.whole / light.energy
         _, bent, more = (pull @ part for part in _shares(light.edges, variances))
         places = levels + count * (1 + number)
         whole[levels, levels] += more * own
         whole[levels, places] += bent
         whole[places, levels] += bent
-    slopes = sums.slopes
     curved: Floats = slopes.T @ whole @ slopes
     return curved
 
@@ -382,7 +383,7 @@ def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     weight = np.concatenate([light.weight for light in lights])
     # With r = w (m / e - 1): the slope J^T r moves by -J^T (w + 2 r) d ln e.
     slope = found.best.jacobian * (weight + 2.0 * found.best.residuals)[:, None]
-    raw = scaled_inverse(curvature(found, lights)) @ slope.T
+    raw = scaled_inverse(curvature(found.variances, found.weights, found.slopes, lights)) @ slope.T
     parts = np.split(raw, np.cumsum([light.energy.size for light in lights])[:-1], axis=1)
     # Those are of what a sum is fitted to, e / A, not of e.
     each = zip(parts, lights, strict=True)

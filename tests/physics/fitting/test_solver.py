@@ -220,3 +220,21 @@ def test_the_optimum_is_that_of_a_trust_region(residual, start, bounds):
     assert found.converged
     assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
     np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
+
+
+def test_with_the_curvature_of_residuals_that_stay_large_steps_are_newton_s():
+    """Residuals x^2 + c: their own curvature is all that the Hessian has at the optimum, x = 0."""
+    start, offsets = np.array([0.3, -0.2]), np.array([1.0, 30.0])
+
+    def at(x):
+        return x**2 + offsets, np.diag(2.0 * x), np.diag(6.0 * x**2 + 2.0 * offsets)
+
+    (plain, slope, hessian), (values, jacobian) = at(start), solver.with_curvature(*at(start))
+    assert values @ values == pytest.approx(plain @ plain, rel=1e-14)
+    np.testing.assert_allclose(jacobian.T @ values, slope.T @ plain, rtol=1e-12)
+    np.testing.assert_allclose(jacobian.T @ jacobian, hessian, rtol=1e-12, atol=1e-12)
+    assert solver.with_curvature(plain, slope, -hessian)[0] is plain  # a maximum
+    bent, creeping = solve(lambda x: solver.with_curvature(*at(x)), start), solve(lambda x: at(x)[:2], start)
+    assert bent.converged
+    assert bent.steps < 10 < creeping.steps
+    np.testing.assert_allclose(bent.parameters, 0.0, atol=1e-6)  # beyond, the sum does not see them
