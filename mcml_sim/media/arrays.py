@@ -60,6 +60,14 @@ def require(holds: object, name: str, accepted: str, value: object) -> None:
         raise InputError(f"{name} must be {accepted}, got {shown(value)}")
 
 
+def as_number(text: str) -> float:
+    """Return the number that a text says, NaN where it says none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def require_index(name: str, value: object) -> None:
     """Raise InputError unless that is a refractive index."""
     require(is_number(value) and math.isfinite(value) and value > 0, name, "a refractive index > 0", value)

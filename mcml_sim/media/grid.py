@@ -155,8 +155,7 @@ def _checked_edges(axis: str, values: ArrayLike) -> Floats:
 
 def require_resolved(grid: Grid) -> None:
     """Raise InputError unless `grid` is one, whose bins hold many float32 places each."""
-    if not isinstance(grid, Grid):
-        raise InputError(f"grid must be a mcml_sim.Grid, got {grid!r}")
+    require(isinstance(grid, Grid), "grid", "a mcml_sim.Grid", grid)
     for across, number in (("depths", grid.depths), ("angles", grid.angles)):
         if grid.rings * number > MAX_CELLS:
             raise InputError(f"grid must have at most {MAX_CELLS} bins, got {grid.rings} annuli x {number} {across}")

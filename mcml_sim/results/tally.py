@@ -277,8 +277,7 @@ class Tally:
 
 def require_quantity(name: str, grid: Grid) -> None:
     """Raise InputError unless a grid resolves the quantity of that name."""
-    if name not in quantities(grid):
-        raise InputError(f"quantity must be one of {', '.join(quantities(grid))}, got {name!r}")
+    require(name in quantities(grid), "quantity", f"one of {', '.join(quantities(grid))}", name)
 
 
 @dataclass(frozen=True, eq=False)

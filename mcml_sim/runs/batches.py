@@ -15,7 +15,7 @@ from typing import Generic, cast
 from rich.progress import Progress, TaskID
 
 from mcml_sim.errors import ClusterError, InputError, Notice
-from mcml_sim.media.arrays import checked_workers
+from mcml_sim.media.arrays import checked_workers, require
 from mcml_sim.runs.progress import bar
 from mcml_sim.runs.store import RESUMES, R, Store, cpu_class, maker
 
@@ -219,8 +219,7 @@ def _dask() -> ModuleType:
 
 def _require_scheduler(dask: ModuleType, address: str) -> None:
     """Ask who is there, since a dask Client waits forever for a port that accepts and then is silent."""
-    if not isinstance(address, str):
-        raise InputError(f"scheduler must be an address like tcp://host:8786, got {address!r}")
+    require(isinstance(address, str), "scheduler", "an address like tcp://host:8786", address)
 
     async def greet() -> dict[str, object]:
         security = dask.Security().get_connection_args("client")

@@ -315,7 +315,6 @@ def _oblique(text: str, unit: str) -> Oblique:
 
 def _known(option: str, text: str) -> Known:
     """Return a number > 0, with or without an error."""
-    from mcml_sim.media.arrays import shown
     from profilefit.measured import Known
     from profilefit.measured.data import LARGEST, SMALLEST
 
@@ -326,15 +325,14 @@ def _known(option: str, text: str) -> Known:
         free = "free, " if option == "--scale" else ""
         raise refused(option, f"a number > 0, {free}or a number with its error such as 1.0+-0.02", text)
     if not SMALLEST <= value <= LARGEST or error > LARGEST:
-        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {shown(text)}")
+        raise refused(option, f"between {SMALLEST:g} and {LARGEST:g}", text)
     return Known(value, error)
 
 
 def _number(option: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
+    from mcml_sim.media.arrays import as_number
+
+    number = as_number(text)
     if not math.isfinite(number):
         raise refused(option, "a number", text)
     return number

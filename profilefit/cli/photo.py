@@ -149,8 +149,7 @@ def _known(option: str, text: str, lengths: bool = False) -> Known:
     """Return a value and its error, 0.18+-0.005; of lengths, in mm, where fwhm: may stand before."""
     from profilefit.cli.fit import WITH_ERROR
     from profilefit.measured import Known
-    from profilefit.measured.data import length
-    from profilefit.measured.instrument import BY_FWHM, FWHM
+    from profilefit.measured.data import BY_FWHM, FWHM, length
 
     is_fwhm = lengths and text.strip().lower().startswith(FWHM)
     match = WITH_ERROR.fullmatch(text.strip()[len(FWHM) if is_fwhm else 0 :])

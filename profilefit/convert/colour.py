@@ -19,8 +19,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.arrays import Floats, checked_numbers
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import Floats, checked_numbers, require_all
 from profilefit.laws import published
 from profilefit.laws.printed_maps import Chiang, VanDeHulst
 
@@ -103,9 +102,7 @@ def checked(name: str, values: ArrayLike, low: float, high: float) -> Floats:
     """Return the numbers as an array; InputError of one that is not in [low, high]."""
     accepted = f"in [{low:g}, {high:.9g}]" if high < LARGEST else f">= {low:g} and finite"
     numbers = checked_numbers(name, values, f"numbers {accepted}")
-    outside = ~((numbers >= low) & (numbers <= high))
-    if np.any(outside):
-        raise InputError(f"{name} must be {accepted}, got {numbers[outside].flat[0]:g}")
+    require_all(name, numbers, (numbers >= low) & (numbers <= high), accepted)
     return numbers
 
 

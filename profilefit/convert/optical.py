@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from profilefit.convert.colour import LARGEST, checked, reflectance_of
 from profilefit.convert.engine import TYPED_LENGTHS
 from profilefit.convert.lengths import QUANTITIES, Length
@@ -52,8 +52,7 @@ class Optical:
         """Return the medium of these absorption and reduced scattering coefficients [1/length], >= 0 and not both 0."""
         absorption, scattering = _checked({"mu_a": mu_a, "mu_s": mu_s})
         both = absorption + scattering
-        if not np.all(both > 0):
-            raise InputError("mu_a + mu_s must be > 0: there is no medium, got 0")
+        require(np.all(both > 0), "mu_a + mu_s", "> 0: there is no medium", 0)
         return cls(scattering / both, 1.0 / both, g)
 
     @property
@@ -81,8 +80,7 @@ class Optical:
 
 
 def _named(name: str) -> Length:
-    if name not in BY_NAME:
-        raise InputError(f"length must be one of {', '.join(BY_NAME)}, got {name!r}")
+    require(name in BY_NAME, "length", f"one of {', '.join(BY_NAME)}", name)
     return BY_NAME[name]
 
 
@@ -90,8 +88,7 @@ def _checked(named: dict[str, ArrayLike]) -> list[Floats]:
     """Return arrays of one shape, by name: alpha is at most 1, and a length is not 0."""
     numbers = [checked(name, values, 0.0, 1.0 if name == "alpha" else LARGEST) for name, values in named.items()]
     for name, values in zip(named, numbers, strict=True):
-        if name in BY_NAME and np.any(values == 0.0):
-            raise InputError(f"{name} must be > 0 and finite, got 0")
+        require(name not in BY_NAME or np.all(values != 0.0), name, "> 0 and finite", 0)
     try:
         return [np.array(values) for values in np.broadcast_arrays(*numbers)]
     except ValueError:

@@ -35,7 +35,7 @@ from scipy.stats import norm
 from mcml_sim.errors import InputError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
 from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, likeliest, matern
@@ -416,8 +416,7 @@ def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN)
 
 def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     """Return R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
-    if known.is_map or known.objective in QUANTILES:
-        raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
+    require(not (known.is_map or known.objective in QUANTILES), "objective", "of a fit to profiles", known.objective)
     here, radii = AtAlbedo.of(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
     value = np.asarray(known.reduced.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)

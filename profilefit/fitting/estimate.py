@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import reduced, unreduced
-from mcml_sim.media.arrays import Floats, require_own_process
+from mcml_sim.media.arrays import Floats, require, require_own_process
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.fitting.solver import Solution, least_squares, solve_batch
@@ -301,8 +301,7 @@ def fit(
     """
     require_own_process()
     target = objective or ("albedo" if isinstance(law, AlbedoLaw) else "energy")
-    if target not in OBJECTIVES:
-        raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, got {target!r}")
+    require(target in OBJECTIVES, "objective", f"one of {', '.join(OBJECTIVES)}", target)
     if law.setting != profiles.setting:
         raise SettingError(f"the law belongs to {law.setting}, the profiles to {profiles.setting}: they do not mix")
     names = tuple(free) if free is not None else law.seen_by(target)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim import exact
 from mcml_sim.errors import InputError
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results.orders import Orders
@@ -176,8 +176,7 @@ class Profiles:
 
 def _albedos(alpha: ArrayLike) -> Floats:
     values = np.atleast_1d(np.asarray(alpha, float))
-    if values.ndim != 1 or not np.all((values > 0) & (values <= 1)):
-        raise InputError(f"alpha must be a list of albedos in (0, 1], got {alpha!r}")
+    require(values.ndim == 1 and np.all((values > 0) & (values <= 1)), "alpha", "a list of albedos in (0, 1]", alpha)
     return values
 
 

@@ -30,8 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting, exact
 from mcml_sim.exact.compiled import filter_jit
-from mcml_sim.media.arrays import Floats, require
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import Floats, require, require_all
 from profilefit.laws.base import ProfileLaw, Sampler
 
 SEARCHLIGHT = Setting()
@@ -111,8 +110,7 @@ def sampler_quality(
     edge    distance of the straight edge beyond which there is light [mfp], > 0
     """
     albedos = np.atleast_1d(np.asarray(alpha, float))
-    if not np.all((albedos > 0) & (albedos <= 1)):
-        raise InputError(f"alpha must be in (0, 1], got {albedos[~((albedos > 0) & (albedos <= 1))][0]:g}")
+    require_all("alpha", albedos, (albedos > 0) & (albedos <= 1), "in (0, 1]")
     require(np.isfinite(edge) and edge > 0, "edge", "a distance > 0", edge)
     light = target or LawTarget(sampler.law)
     rows = [_at(sampler, float(value), light, edge) for value in albedos]

@@ -22,10 +22,9 @@ import numpy as np
 from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.errors import InputError
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
-from mcml_sim.media.arrays import Floats, checked_numbers, require_one_shape, require_own_process
+from mcml_sim.media.arrays import Floats, checked_numbers, require_all, require_one_shape, require_own_process
 from mcml_sim.media.setting import Setting
 from profilefit.laws.surface import RefractingSurface
 
@@ -199,9 +198,8 @@ def _checked(name: str, value: Any) -> np.ndarray:
     require_own_process()
     numbers = checked_numbers(name, value, "a number or an array of numbers")
     low, high = span = RANGES.get(name, (-np.inf, np.inf))
-    outside = ~((numbers >= low) & (numbers <= high))
-    if name in RANGES and np.any(outside):
-        raise InputError(f"{name} must be {ACCEPTED[span]}, got {numbers[outside].flat[0]:g}")
+    if name in RANGES:
+        require_all(name, numbers, (numbers >= low) & (numbers <= high), ACCEPTED[span])
     return numbers
 
 

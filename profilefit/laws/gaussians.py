@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import require
 from profilefit.laws.base import CLAMPS, Entry, Normalisation, ProfileLaw, Sampler, Text
 
 MOST, DEFAULT = 8, 6
@@ -202,8 +202,8 @@ class MediumGaussians(GaussianSum):
 
 def law_class(count: int = DEFAULT) -> type[Gaussians]:
     """Return the class of sums of `count` Gaussians, 1 to 8; InputError otherwise."""
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
-        raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
+    is_count = isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MOST
+    require(is_count, "count", f"a number of Gaussians in 1 ... {MOST}", count)
     return _law_class(count)
 
 

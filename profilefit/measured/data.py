@@ -1,4 +1,4 @@
-"""A measured profile: reflectance at radii or averaged over annuli, with its errors and source; what a fit accepts.
+"""A measured profile: reflectance at radii or averaged over annuli, with its errors and source; what a table may state.
 
 Standard errors from few replicates are moderated: each row's variance is shrunk towards the trend of all rows. The
 standard deviation of three replicates is known to a factor of two, and a fit that uses it gives most weight to the rows
@@ -12,19 +12,23 @@ of what is fitted: `widening` is Meier's factor (Biometrics 9, 1953; Kenward and
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
 
-from mcml_sim.media.arrays import Floats, shown
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Layer, Medium
+from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError
+from profilefit.recipes.declared import Declared, OneOf, Range, Refused, words
 
 # The judgement of a misfit decomposes matrices of rows by rows: seconds at this many, minutes at four times as many.
 MOST_ROWS = 500
@@ -52,6 +56,119 @@ PER_AREA = re.compile(
     r"1?\s*/\s*\(?\s*(?P<over>[^\W\d_]+)\s*(?:(?:\^|\*\*)?\s*2|²)\s*\)?"
     r"|(?P<power>[^\W\d_]+)\s*(?:(?:\^|\*\*)?\s*\(?[-−]2\)?|⁻²)"
 )
+KNOWN_UNITS = ", ".join(UNITS)
+FWHM, TOPHAT = "fwhm:", "tophat:"
+BY_FWHM = 1.0 / math.sqrt(2.0 * math.log(2.0))  # 1/e^2 radius of a Gaussian beam over its full width at half maximum
+REPLICATE = re.compile(r"value[_ ]?\d+")
+HEADER = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
+
+
+def _ends(text: str) -> Range:
+    """Return both ends of a range LOW:HIGH, or a number as both; ValueError of any other text."""
+    low, *rest = (float(part) for part in text.split(":"))
+    if len(rest) > 1 or not low <= (high := rest[0] if rest else low):
+        raise ValueError
+    return low, high
+
+
+def _size(text: str, info: ValidationInfo) -> float:
+    """Return the length of a text such as 1.2mm in the unit of the data, the context; ValueError of any other text."""
+    match, unit = NUMBER.fullmatch(text.strip()), str(info.context or "")
+    if match is None or not float(match[1]) > 0 or (match[2] and match[2] not in UNITS):
+        raise ValueError
+    if match[2] and not unit:
+        raise Refused("without a unit where the data has none (`unit` gives it one)", text)
+    value = float(match[1]) * (factor(match[2], unit) if match[2] and match[2] != unit else 1.0)
+    if not SMALLEST <= value <= LARGEST:
+        raise Refused(f"between {SMALLEST:g} and {LARGEST:g} {unit or 'in size'}", text)
+    return value
+
+
+def _beam(text: str, info: ValidationInfo) -> Beam:
+    """Return `TOPHAT` and a radius, "" and a 1/e^2 radius or both ends of its range, or the name of a file and none."""
+    text = text.strip()
+    kind = next((one for one in (FWHM, TOPHAT) if text.lower().startswith(one)), "")
+    width = text[len(kind) :]
+    ends = width.split(":") if width.count(":") == 1 and kind != TOPHAT else [width]
+    if len(ends) == 1 and text.lower().endswith((".csv", ".tsv", ".txt")):
+        return text, ()
+    sizes = tuple(_size(end, info) * (BY_FWHM if kind == FWHM else 1.0) for end in ends)
+    if len(sizes) > 1 and not sizes[0] < sizes[1]:
+        raise Refused("a range that rises, such as 0.3mm:0.7mm", text)
+    return kind.removeprefix(FWHM), sizes
+
+
+Beam = tuple[Any, tuple[float, ...]]  # names of files may have bytes that are no text, which `str` refuses
+Index = Annotated[float, Field(gt=0.0)]
+Cosine = Annotated[float, Field(gt=-1.0, lt=1.0)]
+Unit = Annotated[str, OneOf(*UNITS)]
+OfLength = Annotated[str, OneOf("", *UNITS), words(f"in {KNOWN_UNITS} or without a unit")]
+
+
+class Facts(Declared):
+    """Facts that options and comments of a table state; comments in lower case, and with spaces for _ and -."""
+
+    light: Annotated[str, OneOf(*ILLUMINATIONS), words(spellings="light, lighting, illumination, incident light")] = ""
+    n: Annotated[tuple[Index, Index], BeforeValidator(_ends), words(
+        "a refractive index > 0, or a range such as 1.33:1.45",
+        spellings="n, refractive index, refractive index n, index of refraction, refraction index, ior",
+    )] = (1.0, 1.0)  # fmt: skip
+    g: Annotated[tuple[Cosine, Cosine], BeforeValidator(_ends), words(
+        "a mean cosine in (-1, 1), or a range such as 0.7:0.95",
+        spellings="g, anisotropy, anisotropy g, anisotropy factor, anisotropy factor g, mean cosine, asymmetry",
+    )] = (0.0, 0.0)  # fmt: skip
+    beam: Annotated[Beam, BeforeValidator(_beam), words(
+        "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or a range of it (0.3mm:0.7mm), fwhm:0.6mm, its "
+        f"full width at half maximum, tophat:0.5mm, a radius, or a .csv file (units: {KNOWN_UNITS})",
+        spellings="beam, beam radius, spot radius, 1/e^2 radius, 1/e2 radius, 1/e² radius", unit="that of r or its own",
+    )] = ("", ())  # fmt: skip
+    fibre: Annotated[float, BeforeValidator(_size), words(
+        f"a length > 0 such as 1.2mm (units: {KNOWN_UNITS})", unit="that of r or its own",
+        spellings="fibre, fibre radius, fibre core radius, fiber, fiber radius, fiber core radius, core radius",
+    )] = 0.0  # fmt: skip
+    unit: Annotated[Unit, words(spellings="unit, units, unit of r, units of r, unit of length, length unit")] = ""
+
+
+class ProfileColumns(Declared):
+    """Columns of a profile's table: the unit of each, "" for none; headers name them in any case."""
+
+    r: Annotated[OfLength, words(
+        cells="a radius > 0, since the profile is infinite at 0", spellings="r, rho, ρ, radius, distance",
+    )] = ""  # fmt: skip
+    r_in: Annotated[OfLength, words(cells="a radius >= 0", spellings="r_in")] = ""
+    r_out: Annotated[OfLength, words(cells="more than r_in", spellings="r_out")] = ""
+    value: Annotated[str, words(
+        "light per area such as [1/mm^2], or `scaled` for any other measure",
+        cells="reflected light per area and per incident light", spellings="value, reflectance, rd, r_d",
+    )] = ""  # fmt: skip
+    sigma: Annotated[str, words(
+        "in the unit of value or without a unit", cells="a standard error > 0",
+        spellings="sigma, σ, error, standard_error, standard error",
+    )] = ""  # fmt: skip
+    replicates: Annotated[dict[str, str], words(
+        "in one unit", cells=f"{FEWEST} or more in place of value and sigma", spellings="value1, value2, value3",
+    )]  # fmt: skip
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuse a header that lacks a column, or has one too many, or an error in another unit than its value."""
+        given, count = self.model_fields_set, len(self.replicates)
+        faults = (
+            (("r_in" in given) != ("r_out" in given), "one of r_in and r_out without the other"),
+            (("r" in given) == ("r_in" in given), "both r and r_in" if "r" in given else "no column r"),
+            (count > 0 and ("value" in given or "sigma" in given), "replicates beside value or sigma"),
+            (0 < count < FEWEST, f"{count} replicates: fewer than {FEWEST} give no useful standard error"),
+            (not count and "value" not in given, "no column value"),
+            (not count and "sigma" not in given, "no column sigma: a fit needs the standard errors of its data"),
+        )
+        if missing := next((words for is_fault, words in faults if is_fault), ""):
+            raise InputError(f"expected a header of {HEADER}, got {missing}")
+        (first, own), *others = (self.replicates or {"value": self.value, "sigma": self.sigma}).items()
+        for name, unit in others:
+            areas = area_unit(unit or own), area_unit(own)  # one measure may be spelled in several ways
+            if unit not in ("", own) and (None in areas or UNITS[str(areas[0])] != UNITS[str(areas[1])]):
+                raise InputError(f"column {name}: expected the unit of {first}, [{own}], or none, got [{unit}]")
+        return self
 
 
 @dataclass(frozen=True)
@@ -238,18 +355,9 @@ def widening(freedom: Floats, free: int) -> float:
     return 1.0 + 4.0 * (1.0 - free / freedom.size) * float(np.mean(1.0 / (freedom - 1.0)))
 
 
-def length(name: str, text: str, unit: str, accepted: str = "a length > 0 such as 1.2mm") -> float:
+def length(name: str, text: str, unit: str) -> float:
     """Return a length > 0 such as 1.2mm, in `unit`; a bare number is in `unit` already. InputError names `name`."""
-    match = NUMBER.fullmatch(text.strip())
-    if match is None or not float(match[1]) > 0 or (match[2] and match[2] not in UNITS):
-        raise InputError(f"{name} must be {accepted} (units: {', '.join(UNITS)}), got {shown(text)}")
-    if match[2] and not unit:
-        where = "where the data has none (`unit` gives it one)"
-        raise InputError(f"{name} must be without a unit {where}, got {shown(text)}")
-    value = float(match[1]) * (factor(match[2], unit) if match[2] and match[2] != unit else 1.0)
-    if not SMALLEST <= value <= LARGEST:
-        raise InputError(f"{name} must lie between {SMALLEST:g} and {LARGEST:g} {unit or 'in size'}, got {shown(text)}")
-    return value
+    return float(Facts.parsed("fibre", text, name, unit))  # a fact that is any length
 
 
 def factor(source: str, target: str) -> float:

@@ -26,9 +26,9 @@ import numpy as np
 from scipy.special import i0e
 
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, as_number
 from profilefit.errors import InputError
-from profilefit.measured.data import length
+from profilefit.measured.data import TOPHAT, Facts
 
 Nodes = tuple[Floats, Floats]
 PANEL = np.polynomial.legendre.leggauss(6)
@@ -39,12 +39,6 @@ OCTAVES = 10  # of a measured beam's radii, down from its last, as panels
 STEEP, STEEPEST = 0.05, 8  # change over its brightest in a straight piece that is a panel, too; as many of these
 AROUND = np.polynomial.legendre.leggauss(8)  # of a circle, in each panel
 LEAST = 1e-12  # of a beam's radius, from a point to a circle about it
-FWHM, TOPHAT = "fwhm:", "tophat:"
-BY_FWHM = 1.0 / math.sqrt(2.0 * math.log(2.0))  # 1/e^2 radius of a Gaussian beam over its full width at half maximum
-ACCEPTED = (
-    "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or a range of it (0.3mm:0.7mm), fwhm:0.6mm, its full "
-    "width at half maximum, tophat:0.5mm, a radius, or a .csv file"
-)
 MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
 CELLS = re.compile(r"[\s,;]+")
 RING = np.polynomial.legendre.leggauss(16)
@@ -143,19 +137,9 @@ Irradiance = Gaussian | TopHat | Profiled
 
 
 def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
-    """Return the beam of a text, one of `ACCEPTED` but a range, in the `unit` of r; a file may lie in `folder`."""
-    if text.lower().endswith((".csv", ".tsv", ".txt")):
-        return _read(folder / text)
-    if text.lower().startswith(TOPHAT):
-        return TopHat(length(option, text[len(TOPHAT) :], unit, ACCEPTED))
-    return gaussian(option, text, unit)
-
-
-def gaussian(option: str, text: str, unit: str) -> Gaussian:
-    """Return the Gaussian beam of a 1/e^2 radius, 0.5mm, or of a full width at half maximum, fwhm:0.6mm."""
-    if text.lower().startswith(FWHM):
-        return Gaussian(BY_FWHM * length(option, text[len(FWHM) :], unit, ACCEPTED))
-    return Gaussian(length(option, text, unit, ACCEPTED))
+    """Return the beam of a text, of a range its middle, in the `unit` of r; a file may lie in `folder`."""
+    kind, sizes = Facts.parsed("beam", text, option, unit)
+    return TopHat(*sizes) if kind == TOPHAT else Gaussian(sum(sizes) / len(sizes)) if sizes else _read(folder / kind)
 
 
 def _read(path: Path) -> Profiled:
@@ -167,10 +151,7 @@ def _read(path: Path) -> Profiled:
     lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
     rows: list[list[float]] = []
     for number, (at, line) in enumerate((at, line) for at, line in lines if line):
-        try:
-            numbers = [float(cell) for cell in CELLS.split(line)]
-        except ValueError:
-            numbers = [math.nan]
+        numbers = [as_number(cell) for cell in CELLS.split(line)]
         if number == 0 and any(math.isnan(one) for one in numbers):
             continue
         if len(numbers) != 2 or not all(math.isfinite(one) and one >= 0 for one in numbers):

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 
 from mcml_sim import exact
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
@@ -131,11 +131,9 @@ def _setting(data: Measured, medium: Medium, premises: Premises) -> Setting:
         raise InputError(f"{of}{name} must be one {what} where layers are fitted, got a range")
     own = Setting(premises.setting.illumination, medium.layers[0].n / medium.n_above)
     for name, value in (("n", own.n), ("g", own.g)):
-        if name in data.stated and not math.isclose(got := getattr(premises.setting, name), value):
-            raise InputError(
-                f"{data.source}:{data.stated[name].line}: {name} must be {value:g} or left out, as of the layers that "
-                f"are fitted, got {got:g}"
-            )
+        got, accepted = getattr(premises.setting, name), f"{value:g} or left out, as of the layers that are fitted"
+        if name in data.stated:
+            require(math.isclose(got, value), f"{data.source}:{data.stated[name].line}: {name}", accepted, got)
     return own
 
 

@@ -23,9 +23,8 @@ from numpy.polynomial.legendre import leggauss, legvander
 from scipy import special
 from scipy.optimize import brentq
 
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
-from profilefit.errors import InputError
 from profilefit.fitting import solver
 from profilefit.fitting.misfit import likelihood
 from profilefit.fitting.solver import Solution, best_apart, differences
@@ -126,8 +125,7 @@ class FitSpec:
 def held_albedo(law: Light, name: str, value: float) -> float:
     """Return the albedo at which `alpha` or `A` is `value`; InputError where the law has none."""
     if name == "alpha":
-        if not LEAST <= value <= MOST:
-            raise InputError(f"held alpha must be a single-scattering albedo in (0, 1), got {value:g}")
+        require(LEAST <= value <= MOST, "held alpha", "a single-scattering albedo in (0, 1)", value)
         return value
 
     def total(alpha: float) -> float:
@@ -135,10 +133,8 @@ def held_albedo(law: Light, name: str, value: float) -> float:
             return float(law.total(jnp.float64(alpha)))
 
     low, high = (total(end) for end in (LEAST, MOST))
-    if not low <= value <= high:
-        raise InputError(
-            f"held A must be a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface, got {value:g}"
-        )
+    accepted = f"a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface"
+    require(low <= value <= high, "held A", accepted, value)
     return float(brentq(lambda alpha: total(alpha) - value, LEAST, MOST, xtol=1e-14))
 
 

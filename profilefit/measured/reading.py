@@ -5,10 +5,9 @@
     r_in, r_out, value, sigma            averages over annuli
 
 Cells are separated by tabs, else semicolons, else commas, else spaces, by what the header has. Units stand in brackets,
-in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment; a line such as # n = 1.4 states a fact
-(light, n, g, beam, fibre or unit, or a name of `FACTS`), and a note names what else comments state. The value's unit,
-if it is not the one of r, is converted; [a.u.] or any other word needs an unknown scale. Numbers have decimal points: a
-comma may part thousands as well, so it is an error and no guess.
+in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment; a line such as # n = 1.4 states one of
+`Facts`, and a note names what else comments state. The value's unit, if it is not the one of r, is converted; [a.u.] or
+any other word needs an unknown scale. Numbers have decimal points: a comma is an error, since it may part thousands.
 
 Text files of Dia-Stron's translucency meter TLS850 have record, pixel and value in a row, 512 pixels a record. Records
 go red, green, blue, red, ...; those of one colour are replicates. Pixels are along a line of 20 mm that begins at the
@@ -25,7 +24,6 @@ photons would leave out the absence of light: neighbours are merged until each h
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import hashlib
 import math
@@ -37,8 +35,8 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.arrays import require
+from mcml_sim.files.whole_file import read_whole, text_of
+from mcml_sim.media.arrays import as_number, require
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally
 from mcml_sim.results.mci import quoted
@@ -46,11 +44,15 @@ from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.measured.data import (
     FEWEST,
+    HEADER,
+    REPLICATE,
     UNITS,
     Fact,
+    Facts,
     Floats,
     Measured,
     ModeratedVariance,
+    ProfileColumns,
     area_unit,
     factor,
     moderated_variances,
@@ -66,29 +68,14 @@ HEADING = re.compile(
 )
 WORD = re.compile(r"[^\s\[\](]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?|\S")  # of a header between spaces, with its unit
 LONGEST_HEADING = 100  # characters
-# Accepted names of the columns.
-NAMES = {
-    **dict.fromkeys(("r", "rho", "ρ", "radius", "distance"), "r"),
-    **dict.fromkeys(("value", "reflectance", "rd", "r_d"), "value"),
-    **dict.fromkeys(("sigma", "σ", "error", "standard_error", "standard error"), "sigma"),
-    **{name: name for name in ("r_in", "r_out")},
-}
-REPLICATE = re.compile(r"value[_ ]?\d+")
+COLUMNS = {key: one for key, one in ProfileColumns.model_json_schema()["properties"].items() if key != "replicates"}
+NAMES = {spelling: name for name, column in COLUMNS.items() for spelling in column["spellings"].split(", ")}
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-# Accepted names of facts, in lower case and with spaces for _ and -.
-FACTS = {
-    "light": ("light", "lighting", "illumination", "incident light"),
-    "n": ("n", "refractive index", "refractive index n", "index of refraction", "refraction index", "ior"),
-    "g": ("g", "anisotropy", "anisotropy g", "anisotropy factor", "anisotropy factor g", "mean cosine", "asymmetry"),
-    "beam": ("beam", "beam radius", "spot radius", "1/e^2 radius", "1/e2 radius", "1/e² radius"),
-    "fibre": ("core radius", *(one + rest for one in ("fibre", "fiber") for rest in ("", " radius", " core radius"))),
-    "unit": ("unit", "units", "unit of r", "units of r", "unit of length", "length unit"),
-}
-FACT = {spelling: name for name, spellings in FACTS.items() for spelling in spellings}
+FACTS = Facts.model_json_schema()["properties"]
+FACT = {spelling: name for name, fact in FACTS.items() for spelling in fact["spellings"].split(", ")}
 BRACKETED = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
 LONGEST_NAME = 6  # words; more are a sentence
 MOST_SHOWN = 5  # statements that a note names
-ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
 ANGLES = ("angle", "theta", "scattering angle")  # columns of a phase function
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
 TLS_BYTES = 2**24  # of a TLS850's file
@@ -126,32 +113,29 @@ def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str 
     first = next((line for line in words.splitlines() if line.strip()), "")
     if [word for word in CELLS.split(first.strip(" \ufeff")) if word][:3] == ["record", "pixel", "value"]:
         return _read_tls(path, content, colour, scaled)
-    if colour is not None:
-        raise InputError(f"colour must be left out but for records of a TLS850, got {colour!r}")
+    require(colour is None, "colour", "left out but for records of a TLS850", colour)
     if kind not in SIMULATED:
         return _read_table(path, content, unit, scaled)
-    if unit not in (None, UNIT):
-        expected = f"{UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}"
-        raise InputError(f"unit must be {expected}, got {unit!r}")
+    require(unit in (None, UNIT), "unit", f"{UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}", unit)
     return SIMULATED[kind](path)
 
 
 def _read_table(path: Path, content: bytes, unit: str | None, scaled: bool) -> Measured:
     """Read a table from a file's first MAX_BYTES + 1 bytes or more."""
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
-    lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text = text_of(path, content, MAX_BYTES, "a profile")
+    if "\0" in text:
+        raise _bad(path, content[: content.index(0)].count(b"\n") + 1, "expected text in UTF-8", "the byte 0x00")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     table = _table(path, lines)
     stated, others = _stated(path, lines)
     named = stated.pop("unit", None)
     notes = _notes(others, named, unit)
-    unit = named.text if named is not None and unit is None else unit
+    unit, label = (named.text, f"{path}:{named.line}: unit") if named and unit is None else (unit, "unit")
     cells = [[_number(table, line, *each) for each in zip(table.units, row, strict=True)] for line, row in table.rows]
     numbers = dict(zip(table.units, np.array(cells).T, strict=True))
     inner, outer = _radii(table, numbers)
-    length = _length_unit(table, unit)
+    length = _length_unit(table, Facts.parsed("unit", unit, label) if unit else None)
     means, errors = _values(table, numbers)
-    _require_one_measure(table)
     times = _value_factor(table, length, scaled)
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), inner, outer, means.value * times, means.sigma * times,
@@ -187,17 +171,6 @@ class _Table:
 
 def _bad(path: Path, line: int, expected: str, got: object) -> InputError:
     return InputError(f"{path}:{line}: {expected}, got {got}")
-
-
-def _text(path: Path, content: bytes) -> str:
-    try:
-        text, wrong = content.decode("utf-8-sig"), content.find(b"\x00")
-    except UnicodeDecodeError as error:
-        text, wrong = "", error.start
-    if wrong >= 0:
-        line = content[:wrong].count(b"\n") + 1
-        raise _bad(path, line, "expected text in UTF-8", f"the byte {content[wrong]:#04x}")
-    return text
 
 
 def _stated(path: Path, lines: list[str]) -> tuple[dict[str, Fact], list[Fact]]:
@@ -242,7 +215,7 @@ def _table(path: Path, lines: list[str]) -> _Table:
     kept = [(at, line.partition("#")[0]) for at, line in enumerate(lines, start=1)]
     kept = [(at, line) for at, line in kept if line.strip()]
     if not kept:
-        raise InputError(f"{path}: expected a header and rows ({ACCEPTED}), got an empty file")
+        raise InputError(f"{path}: expected a header and rows ({HEADER}), got an empty file")
     at, first = kept[0]
     delimiter = next((one for one in DELIMITERS if one in first.strip()), ",")
     heads = tuple(WORD.findall(first)) if delimiter == " " else _split(path, at, first, delimiter)
@@ -276,11 +249,11 @@ def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
 
 
 def _header(path: Path, at: int, cells: tuple[str, ...]) -> dict[str, str]:
-    """Return the units of the columns by name."""
+    """Return the units of the columns by name, checked by `ProfileColumns`."""
     if len(cells) > MOST_COLUMNS:
         raise _bad(path, at, f"expected at most {MOST_COLUMNS} columns", len(cells))
     cells = tuple(" ".join(cell.split()) for cell in cells)
-    are_shown = [len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells]  # as they are, in messages
+    are_shown = (len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells)  # as they are, in messages
     matches = [HEADING.fullmatch(cell) if shown else None for cell, shown in zip(cells, are_shown, strict=True)]
     words = [match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True)]
     names = tuple(NAMES.get(word, word) for word in words)
@@ -289,26 +262,14 @@ def _header(path: Path, at: int, cells: tuple[str, ...]) -> dict[str, str]:
             raise _bad(path, at, "expected each column once", f"{quoted(name)} {names.count(name)} times")
         if name not in NAMES and not REPLICATE.fullmatch(name):
             hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
-            raise _bad(path, at, f"expected a header of {ACCEPTED}", f"the column {quoted(word)}{hint}")
-    if missing := _missing(names):
-        raise _bad(path, at, f"expected a header of {ACCEPTED}", missing)
+            raise _bad(path, at, f"expected a header of {HEADER}", f"the column {quoted(word)}{hint}")
     units = [next(filter(None, match.groups()[1:]), "").strip() if match else "" for match in matches]
     units = [unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit for unit in units]  # value / (1/mm^2)
-    return dict(zip(names, units, strict=True))
-
-
-def _missing(names: tuple[str, ...]) -> str:
-    """Return what a header lacks, or has too much of; "" if nothing."""
-    replicates = sum(1 for name in names if REPLICATE.fullmatch(name))
-    faults = (
-        (("r_in" in names) != ("r_out" in names), "one of r_in and r_out without the other"),
-        (("r" in names) == ("r_in" in names), "both r and r_in" if "r" in names else "no column r"),
-        (replicates > 0 and ("value" in names or "sigma" in names), "replicates beside value or sigma"),
-        (0 < replicates < FEWEST, f"{replicates} replicates: fewer than {FEWEST} give no useful standard error"),
-        (not replicates and "value" not in names, "no column value"),
-        (not replicates and "sigma" not in names, "no column sigma: a fit needs the standard errors of its data"),
-    )
-    return next((words for is_fault, words in faults if is_fault), "")
+    columns = dict(zip(names, units, strict=True))
+    replicates = {name: unit for name, unit in columns.items() if name not in COLUMNS}
+    others = {name: columns[name] for name in columns.keys() - replicates}
+    ProfileColumns.of(f"{path}:{at}", {**others, "replicates": replicates})
+    return columns
 
 
 def _number(table: _Table, line: int, name: str, cell: str) -> float:
@@ -317,19 +278,15 @@ def _number(table: _Table, line: int, name: str, cell: str) -> float:
     if DECIMAL_COMMA.fullmatch(cell):
         raise table.bad(line, name, "a decimal point, as in 0.5 for 0,5", f"the decimal comma {quoted(cell)}")
     expected = "a finite number"
-    with contextlib.suppress(ValueError):
-        if math.isfinite(float(cell)) and "_" not in cell:
-            expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
+    if math.isfinite(as_number(cell)) and "_" not in cell:
+        expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
     if not cell and REPLICATE.fullmatch(name):
         expected += ", since every row has all replicates"
     raise table.bad(line, name, expected, quoted(cell))
 
 
 def _is_number(cell: str) -> bool:
-    try:
-        size = abs(float(cell))
-    except ValueError:
-        return False
+    size = abs(as_number(cell))
     return (size == 0 or SMALLEST <= size <= LARGEST) and "_" not in cell
 
 
@@ -339,10 +296,9 @@ def _radii(table: _Table, numbers: dict[str, Floats]) -> tuple[Floats, Floats]:
     inner, outer = numbers[first], numbers[last]
     for i, (line, _) in enumerate(table.rows):
         if inner[i] < 0 or (inner[i] == 0 and not table.rings):
-            least = ">= 0" if table.rings else "> 0, since the profile is infinite at 0"
-            raise table.bad(line, first, f"a radius {least}", f"{inner[i]:g}")
+            raise table.bad(line, first, COLUMNS[first]["cells"], f"{inner[i]:g}")
         if outer[i] <= inner[i] and table.rings:
-            raise table.bad(line, last, f"more than r_in {inner[i]:g}", f"{outer[i]:g}")
+            raise table.bad(line, last, f"{COLUMNS[last]['cells']} {inner[i]:g}", f"{outer[i]:g}")
         if i and (inner[i] < outer[i - 1] or (inner[i] == outer[i - 1] and not table.rings)):
             before = f"{outer[i - 1]:g}"
             expected = f"at least the r_out {before} before" if table.rings else f"r to rise above {before}"
@@ -367,32 +323,17 @@ def _values(table: _Table, numbers: dict[str, Floats]) -> tuple[ModeratedVarianc
             expected = f"replicates that differ, here or in {FEWEST} other rows, to know their standard error"
             raise table.bad(line, replicates[0], expected, "the same value in all")
         if not one > 0:
-            raise table.bad(line, "sigma", "a standard error > 0", f"{one:g}")
+            raise table.bad(line, "sigma", COLUMNS["sigma"]["cells"], f"{one:g}")
     return means, errors
 
 
 def _length_unit(table: _Table, unit: str | None) -> str:
     names = ("r_in", "r_out") if table.rings else ("r",)
     written = {table.units[name] for name in names} - {""}
-    for one in written:
-        if one not in UNITS:
-            raise table.bad(table.line, names[0], f"a unit of {', '.join(UNITS)}", quoted(one))
     units = written | ({unit} if unit else set())
     if len({UNITS.get(one) for one in units}) > 1:
         raise table.bad(table.line, names[0], "one unit, here and in `unit`", ", ".join(sorted(units)))
-    require(not unit or unit in UNITS, "unit", f"a unit of length ({', '.join(UNITS)})", unit)
     return next(iter(written), unit or "")
-
-
-def _require_one_measure(table: _Table) -> None:
-    """InputError where an error, or another replicate, has a unit that is not the first value's."""
-    first, *others = table.replicates or ("value", "sigma")
-    own = table.units[first]
-    for name in others:
-        unit = table.units[name] or own
-        areas = area_unit(unit), area_unit(own)  # one measure may be spelled in several ways
-        if unit != own and (None in areas or UNITS[str(areas[0])] != UNITS[str(areas[1])]):
-            raise table.bad(table.line, name, f"the unit of {first}, [{own}], or none", f"[{table.units[name]}]")
 
 
 def _value_factor(table: _Table, length: str, scaled: bool) -> float:
@@ -403,8 +344,7 @@ def _value_factor(table: _Table, length: str, scaled: bool) -> float:
     if not text or (scaled and (unit is None or not length)):
         return 1.0
     if unit is None:
-        expected = "light per area such as [1/mm^2], or `scaled` for any other measure"
-        raise table.bad(table.line, name, expected, f"[{text}]")
+        raise table.bad(table.line, name, COLUMNS["value"]["accepted"], f"[{text}]")
     if not length:
         raise table.bad(table.line, "r", f"a unit, as {name} has one ([{text}])", "none")
     return factor(unit, length) ** -2
@@ -412,8 +352,7 @@ def _value_factor(table: _Table, length: str, scaled: bool) -> float:
 
 def _read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
     """Read the records of one colour from a file's first TLS_BYTES + 1; InputError names the line of what is wrong."""
-    if colour not in CHANNELS:
-        raise InputError(f"{path}: `colour` must be one of {', '.join(CHANNELS)}, got {colour!r}")
+    require(colour in CHANNELS, f"{path}: `colour`", f"one of {', '.join(CHANNELS)}", colour)
     if not scaled:
         raise InputError(f"{path}: expected `scaled`, since the instrument's values are in a measure of its own")
     if len(content) > TLS_BYTES:

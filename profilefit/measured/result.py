@@ -233,8 +233,7 @@ def fit(
 
 def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
     if law == EXACT:
-        if constants != "regenerated":
-            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
+        require(constants == "regenerated", "constants", "left out where light is solved exactly", constants)
         return exact_light(setting)
     if law not in profile_classes() and not law.startswith("gaussians:"):
         raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")

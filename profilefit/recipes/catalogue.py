@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from mcml_sim.media.arrays import require
 from mcml_sim.media.setting import Setting
 from profilefit import laws
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
@@ -60,8 +61,7 @@ def albedo_law(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Folder | None = None
 ) -> AlbedoLaw:
     """Load a map between alpha and A by name; arguments as for `load`."""
-    if name not in laws.MAPS:
-        raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
+    require(name in laws.MAPS, "albedo law", f"one of {', '.join(laws.MAPS)}", name)
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
     values, where = _constants(kind, constants, setting, Records.of(folder or fits_folder()))
     return _made(laws.at(kind, where), values, constants, setting=where)
@@ -88,8 +88,7 @@ def _constants(
     kind: type[Constants], which: str, requested: Setting | None, records: Records
 ) -> tuple[dict[str, float], Setting]:
     """Return the constants of a law, and the setting that they belong to."""
-    if requested is not None and not isinstance(requested, Setting):
-        raise InputError(f"setting must be a mcml_sim.Setting, got {requested!r}")
+    require(requested is None or isinstance(requested, Setting), "setting", "a mcml_sim.Setting", requested)
     entry = kind.entry
     if which == REGENERATED or (which == "published" and not kind.constant_names()):
         if kind.constant_names() and not entry.records:

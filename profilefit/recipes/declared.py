@@ -98,9 +98,9 @@ class NumberRange:
         return {"accepted": self.words, "anyOf": [number, pair]}
 
 
-def words(accepted: str, **schema: Any) -> Any:
-    """Return an annotation that says in these words what a key accepts."""
-    return Field(json_schema_extra={"accepted": accepted, **schema})
+def words(accepted: str = "", **schema: Any) -> Any:
+    """Return an annotation that says in these words what a key accepts, and what else its JSON Schema has."""
+    return Field(json_schema_extra={"accepted": accepted, **schema} if accepted else schema)
 
 
 def printable(text: str) -> str:
@@ -143,6 +143,16 @@ class Declared(BaseModel):
             raise _refusal(cls, file, content, mistakes, error) from None
         read._file = file
         return read
+
+    @classmethod
+    def parsed(cls, key: str, value: object, label: str, context: object = None) -> Any:
+        """Return the value of a key alone, where the others have defaults; an InputError calls the key by its label."""
+        try:
+            return getattr(cls.model_validate({key: value}, context=context), key)
+        except ValidationError as mistakes:
+            cause = mistakes.errors()[0].get("ctx", {}).get("error")
+            told = getattr(cause, "accepted", "") or accepted(cls.model_json_schema()["properties"][key])
+            raise InputError(f"{label} must be {told}, got {shown(value)}") from None
 
     def changed(self, file: str | None = None, **values: Any) -> Self:
         """Return an unchecked copy with other values; of a table only some keys may be given, as in water={"n": 1.3}.

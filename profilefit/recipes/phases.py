@@ -17,16 +17,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+from pydantic import model_validator
 
-from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.arrays import Floats
+from mcml_sim.files.whole_file import read_whole, text_of
+from mcml_sim.media.arrays import Floats, as_number, require
 from mcml_sim.media.phase import Phase, Tabulated, as_table, from_table
 from mcml_sim.results.mci import quoted
 from profilefit.errors import InputError
@@ -34,21 +35,41 @@ from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
 from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
+from profilefit.recipes.declared import Declared, OneOf, Refused, words
 from profilefit.recipes.schema import ERRORS
 
 MAX_BYTES = 2**20
 MOST_ROWS, FEWEST_ROWS = 5000, 8
-DEGREES = ("", "deg", "degrees")
 # Of values, and of the factor that brings them to an integral of 1.
 UNITS = {"": "", "1/sr": "", "sr^-1": ""}
 UNITS |= {text: f"1/{unit}" for unit in ("m", "cm", "mm") for text in (f"1/({unit} sr)", f"{unit}^-1 sr^-1")}
-COLUMNS = {"angle": DEGREES, "value": (*UNITS,), "sigma": (*UNITS,)}
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 ACCEPTED = "angle [deg], value [1/sr] or [1/(m sr)] and, if known, sigma"
 LEAST_DEGREES = 7.0  # more than 2 pi: a table that ends before is one in radians
 WIDEST = 20.0  # [degrees] between rows; wider gaps are named
 MOST_SHARE = 1e3  # beyond which a rule estimates nothing
 SPAN = ("low", "high", "share", "rule", "other", "other_rule")
+
+
+class PhaseColumns(Declared):
+    """Columns of a phase function's table: the unit of each, "" for none; headers name them in any case."""
+
+    angle: Annotated[str, OneOf("", "deg", "degrees"), words(
+        "in deg, degrees or without a unit", cells="an angle in [0, 180] degrees that rises", spellings="angle",
+    )]  # fmt: skip
+    value: Annotated[str, OneOf(*UNITS), words(
+        f"in {', '.join(filter(None, UNITS))} or without a unit", cells="a value > 0", spellings="value",
+    )]  # fmt: skip
+    sigma: Annotated[str, words("in the unit of value or without a unit", cells="a sigma > 0", spellings="sigma")] = ""
+
+    @model_validator(mode="after")
+    def _of_one_unit(self) -> Self:
+        if self.sigma not in ("", self.value):
+            raise Refused(f"in the unit of value, {self.value or 'none'}, or without a unit", self.sigma, "sigma")
+        return self
+
+
+COLUMNS = PhaseColumns.model_json_schema()["properties"]
 
 
 @dataclass(frozen=True)
@@ -111,13 +132,7 @@ def read_phase(path: Path) -> PhaseData:
     InputError in one line, FILE:LINE: expected ..., got ...
     """
     content = read_whole(path, MAX_BYTES)
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: expected a phase function of at most {MAX_BYTES} bytes, got a longer file")
-    try:
-        lines = content.decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte {content[error.start]:#04x}") from None
+    lines = text_of(path, content, MAX_BYTES, "a phase function").splitlines()
     texts = {at: line.partition("#")[0].strip() for at, line in enumerate(lines, start=1)}
     (first, header), *rows = [(at, text) for at, text in texts.items() if text] or [(0, "")]
     if not header:
@@ -130,14 +145,15 @@ def read_phase(path: Path) -> PhaseData:
     degrees, values, sigma = column["angle"], column["value"], column.get("sigma")
     for (at, _), before, angle, value in zip(rows, [-1.0, *degrees[:-1]], degrees, values, strict=True):
         if not 0 <= angle <= 180 or angle <= before:
-            raise InputError(f"{path}:{at}: expected an angle in [0, 180] degrees that rises, got {angle:g}")
+            raise InputError(f"{path}:{at}: expected {COLUMNS['angle']['cells']}, got {angle:g}")
         if not value > 0:
-            raise InputError(f"{path}:{at}: expected a value > 0, got {value:g}")
+            raise InputError(f"{path}:{at}: expected {COLUMNS['value']['cells']}, got {value:g}")
     if degrees[-1] < LEAST_DEGREES:
         got = f"{degrees[-1]:g} at most: radians times 180 / pi"
         raise InputError(f"{path}: expected angles in degrees up to 180, got {got}")
     if sigma is not None and not np.all(sigma > 0):
-        raise InputError(f"{path}:{rows[int(np.argmin(sigma > 0))][0]}: expected a sigma > 0, got {sigma.min():g}")
+        at, wrong = rows[int(np.argmin(sigma > 0))][0], COLUMNS["sigma"]["cells"]
+        raise InputError(f"{path}:{at}: expected {wrong}, got {sigma.min():g}")
     angles = np.radians(degrees)
     with np.errstate(over="ignore", invalid="ignore"):
         pieces = Tabulated.through(angles, values)
@@ -178,7 +194,7 @@ def _spans(angles: Floats, values: Floats) -> list[dict[str, Any]]:
 
 
 def _header(path: Path, at: int, line: str) -> dict[str, str]:
-    """Units by the names of columns."""
+    """Return units by the names of columns, checked by `PhaseColumns`."""
     units: dict[str, str] = {}
     for cell in line.split(","):
         match = HEADING.fullmatch(cell.strip())
@@ -186,28 +202,20 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
         if match is None or name not in COLUMNS or name in units:
             raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {quoted(cell.strip())}")
         units[name] = " ".join((match["unit"] or "").split())
-        if units[name] not in COLUMNS[name]:
-            accepted = ", ".join(filter(None, COLUMNS[name]))
-            raise InputError(f"{path}:{at}: expected {name} in {accepted} or without a unit, got {quoted(units[name])}")
     if "angle" not in units or "value" not in units:
         raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {quoted(line)}")
-    if units.get("sigma") and units["sigma"] != units["value"]:
-        unit = f"[{units['value']}]" if units["value"] else "none"
-        raise InputError(f"{path}:{at}: expected sigma in the unit of value, {unit}, got [{units['sigma']}]")
+    PhaseColumns.of(f"{path}:{at}", units)
     return units
 
 
 def _row(path: Path, at: int, text: str, names: Collection[str]) -> list[float]:
     """Return the numbers of a row, one for each column."""
-    cells, numbers = text.split(","), []
+    cells = text.split(",")
+    numbers = [as_number(cell) for cell in cells]
     if len(cells) != len(names):
         raise InputError(f"{path}:{at}: expected {len(names)} cells, as the header has, got {len(cells)}")
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            numbers.append(float(cell))
-        except ValueError:
-            numbers.append(math.nan)
-        if not math.isfinite(numbers[-1]):
+    for name, cell, number in zip(names, cells, numbers, strict=True):
+        if not math.isfinite(number):
             raise InputError(f"{path}:{at}: column {name}: expected a finite number, got {quoted(cell.strip())}")
     return numbers
 
@@ -273,14 +281,12 @@ def fit_phase(
     angles  of the rows that count [degrees]; moments are those of the whole table;  seed  of random starts
     InputError on another name, more moments than the form has numbers, or fewer rows than twice those.
     """
-    if form not in FORMS:
-        raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
+    require(form in FORMS, "form", f"one of {', '.join(FORMS)}", form)
     own = FORMS[form]
     held = tuple(name for name in MOMENTS if name in hold)
     if unknown := [name for name in hold if name not in MOMENTS]:
         raise InputError(f"hold must be of {', '.join(MOMENTS)}, got {unknown[0]!r}")
-    if len(held) > own.free:
-        raise InputError(f"hold must be at most {own.free} of the moments for {form}, got {len(held)}")
+    require(len(held) <= own.free, "hold", f"at most {own.free} of the moments for {form}", len(held))
     moments = data.mean_cosine, data.backscattered
     data = data.off_axis
     used = data.within(*angles)

@@ -21,6 +21,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from mcml_sim.media.arrays import require
 from profilefit.errors import InputError
 from profilefit.laws import map_classes, profile_classes
 from profilefit.laws.base import AlbedoLaw, Constants, Normalisation, ProfileLaw, Text
@@ -74,11 +75,9 @@ def law_text(
     text = text_of(law, ProfileLaw)
     own, of_map = dict[str, str](), Numbers()
     if NORMALISED in text.parts:
-        albedo = getattr(law, "albedo", None)
-        if not isinstance(albedo, Normalisation):
-            raise InputError(
-                f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}"
-            )
+        albedo: Any = getattr(law, "albedo", None)
+        is_map = isinstance(albedo, Normalisation)
+        require(is_map, f"albedo of {type(law).__name__}", "a Rational map to become a shader", albedo)
         own, of_map = {NORMALISED: text_of(albedo).file}, _prefixed(albedo)
     files = [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
     files += map(read_text, text.ends)
@@ -161,8 +160,7 @@ def read_text(file: str) -> str:
 
 def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, remarks: Mapping[str, str]) -> str:
     """Fill texts, the first of which is `common`, with a prefix and its constants, in a language."""
-    if not PREFIX.fullmatch(name):
-        raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
+    require(PREFIX.fullmatch(name), "name", "letters, digits and single underscores, not of gl_ or PF_", name)
     common, *rest = texts
 
     def repeated(block: re.Match[str]) -> str:
@@ -180,8 +178,7 @@ def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: st
 
 def literal(value: float) -> str:
     """Return a number as every shading language reads it: with a point, without a suffix."""
-    if not math.isfinite(value):
-        raise InputError(f"constants of a shader must be finite, got {value!r}")
+    require(math.isfinite(value), "constants of a shader", "finite", value)
     if value != 0 and not 1e-4 <= abs(value) < 1e7:
         return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0")
     return np.format_float_positional(value, DIGITS, unique=True, fractional=False, trim="0")
@@ -217,8 +214,7 @@ CALLED = re.compile(rf"({NAME})\(")
 
 def translated(text: str, lang: str) -> str:
     """Translate the common text into one of `LANGUAGES`; InputError for another one, or a line that is not common."""
-    if lang not in LANGUAGES:
-        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    require(lang in LANGUAGES, "lang", f"one of {', '.join(LANGUAGES)}", lang)
     if lang == "glsl":
         return text
     if lang == "hlsl":

@@ -44,9 +44,8 @@ def from_table(table: object, deepest: int = DEEPEST) -> Phase:
     """Return the phase function of a table from `as_table`; InputError on anything else."""
     if not isinstance(table, Mapping):
         raise InputError(f"a phase function must be a table, got {shown(table)}")
-    kind = table.get("kind")
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(f"kind of a phase function must be one of {', '.join(KINDS)}, got {shown(kind)}")
+    kind: Any = table.get("kind")
+    require(isinstance(kind, str) and kind in KINDS, "kind of a phase function", f"one of {', '.join(KINDS)}", kind)
     if kind == "mixture" and deepest == 0:
         raise InputError(f"a mixture must hold mixtures of at most {DEEPEST} levels, got more")
     names = _arguments(KINDS[kind])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
@@ -151,8 +151,7 @@ def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]
 
 
 def _require_count(paths: Sequence[Path]) -> None:
-    if not 1 <= len(paths) <= MOST_SHOTS:
-        raise InputError(f"photographs must be 1 to {MOST_SHOTS} exposures of one bracket, got {len(paths)}")
+    require(1 <= len(paths) <= MOST_SHOTS, "photographs", f"1 to {MOST_SHOTS} exposures of one bracket", len(paths))
 
 
 def _kind(one: Exposure) -> tuple[str | None, ...]:

@@ -12,9 +12,8 @@ from scipy.optimize import nnls
 from scipy.special import expit, log_softmax
 
 from mcml_sim import Medium, exact
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import require_illumination
-from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
 from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance, scaled_inverse
 from profilefit.fitting.solver import Solution, solve, with_curvature
@@ -111,8 +110,8 @@ def shared_gaussians(
 
     Each x is in mean free paths of its own first layer.
     """
-    if isinstance(count, bool) or count not in range(1, MOST + 1):
-        raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
+    is_count = not isinstance(count, bool) and count in range(1, MOST + 1)
+    require(is_count, "count", f"a number of Gaussians in 1 ... {MOST}", count)
     require_illumination(illumination)
     lights = lights_of(media, illumination)
     found = joint(lights, count)

@@ -7,9 +7,11 @@ from importlib import import_module
 
 from pydantic.json_schema import models_json_schema
 
+from profilefit.measured.data import Facts, ProfileColumns
 from profilefit.measured.photo.setup import Setup
 from profilefit.recipes.declared import Declared, Table, accepted, resolved
 from profilefit.recipes.kinds.stack import StackRequest
+from profilefit.recipes.phases import PhaseColumns
 from profilefit.recipes.recipe import Recipe
 from profilefit.scenes import SCENES
 from profilefit.studies.choose.requirements import ChooseFile
@@ -55,6 +57,15 @@ def keys(model: type[Declared]) -> Iterator[Key]:
     yield from within("", whole)
 
 
+def data_rows() -> Iterator[str]:
+    """Yield a row for each fact and column of tables of data: name, accepted spellings, accepted values and unit."""
+    for of, model in (("fact", Facts), ("column", ProfileColumns), ("phase function's column", PhaseColumns)):
+        for name, schema in model.model_json_schema()["properties"].items():
+            spellings = ", ".join(map(code, schema["spellings"].split(", ")))
+            unit = accepted(schema) if "cells" in schema else schema.get("unit", "")
+            yield f"| {of} {code(name)} | {spellings} | {schema.get('cells', accepted(schema))} | {unit} |"
+
+
 def code(value: object) -> str:
     """Return a value as code, nothing for none."""
     return "" if value in (None, "") else f"`{value}`"
@@ -69,4 +80,5 @@ def page() -> str:
             rows = [row(code(table), code(key), words, code(default)) for table, key, words, default in keys(model)]
             title = f"## {kind.capitalize()}{f': {name}' * bool(name)}"
             parts.append("\n".join([title, "", "| table | key | accepted | default |", "|---|---|---|---|", *rows, ""]))
-    return "\n".join(parts)
+    head = "## Data\n\n| name | accepted spellings | accepted values | unit |\n|---|---|---|---|"
+    return "\n".join([*parts, head, *data_rows(), ""])

@@ -23,7 +23,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mcml_sim.media.arrays import Floats, require
+from mcml_sim.media.arrays import Floats, require, require_all
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.truth import Elements
@@ -180,8 +180,7 @@ def _require_charts(mesh: Mesh) -> None:
     count = len(mesh.position)
     if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):
         raise InputError(f"mesh must have a finite uv at each of {count} vertices, got an array of {mesh.uv.shape}")
-    if not np.all((mesh.uv >= 0) & (mesh.uv <= 1)):
-        raise InputError(f"uv must be in [0, 1], got {mesh.uv[~((mesh.uv >= 0) & (mesh.uv <= 1))][0]:g}")
+    require_all("uv", mesh.uv, (mesh.uv >= 0) & (mesh.uv <= 1), "in [0, 1]")
     flat = _areas(mesh)
     if not np.all(np.abs(flat) > 0):
         at = int(np.argmin(np.abs(flat)))

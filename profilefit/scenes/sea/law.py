@@ -231,8 +231,7 @@ def segment_between(begin: ArrayLike, end: ArrayLike, t1: ArrayLike) -> Any:
     """
     names = {"begin": begin, "end": end, "t1": t1}
     first, last, length = _checked(**names)
-    if np.any(np.isinf(length)):
-        raise InputError("t1 must be finite, got inf")
+    require(not np.any(np.isinf(length)), "t1", "finite", np.inf)
     return (length * np.exp(-np.minimum(first, last)) * _mean_decay(np.abs(first - last)))[()]
 
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media.arrays import Floats, checked_finite, checked_whole, is_number, require
+from mcml_sim.media.arrays import Floats, checked_finite, checked_whole, is_number, require, require_all
 from profilefit.errors import InputError
 from profilefit.scenes.sea.waves import STILL, Waves, checked_sun, refracted
 
@@ -93,10 +93,8 @@ class Rays:
                 raise InputError(f"x must span fewer than {MOST_SAMPLES} samples of spacing, got {count}")
             nodes = np.linspace(low - reach, high + reach, count)
             landing, stretch, _ = self.at(nodes)
-            if not np.all(np.isfinite(stretch)):
-                raise InputError(
-                    f"n must be one at which light enters everywhere, none is all reflected, got {self.n:g}"
-                )
+            accepted = "one at which light enters everywhere, none is all reflected"
+            require(np.all(np.isfinite(stretch)), "n", accepted, self.n)
             shadow = float(np.ptp(self._height(nodes)) * np.tan(self.tilt))  # of the highest crest
             farthest = float(np.max(np.abs(landing - nodes))) + abs(shadow) + 8.0 * self._step
             if farthest <= reach:
@@ -177,8 +175,7 @@ class Rays:
         except (TypeError, ValueError) as error:
             raise InputError(f"surface must be a function of an array of x [m], got {error}") from None
         z = np.broadcast_to(z, x.shape)
-        if not np.all(np.isfinite(z)):
-            raise InputError(f"surface must be finite, got {z[~np.isfinite(z)].flat[0]:g}")
+        require_all("surface", z, np.isfinite(z), "finite")
         if np.any(z <= -self.depth):
             raise InputError(f"depth must be below the deepest trough, {-z.min():g} m, got {self.depth:g}")
         return z

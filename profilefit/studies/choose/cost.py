@@ -23,7 +23,7 @@ from importlib import resources
 import moderngl
 import numpy as np
 
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import require
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.skin.chart import covering
 from profilefit.scenes.skin.passes import SeparableFilter
@@ -81,8 +81,7 @@ class Ratios:
         if option.kind == "nothing":
             return self.base
         key = _key(option)
-        if key not in self.each:
-            raise InputError(f"option must be one whose cost was measured ({', '.join(self.each)}), got {key!r}")
+        require(key in self.each, "option", f"one whose cost was measured ({', '.join(self.each)})", key)
         return self.base + option.count * (self.fixed[key] + self.each[key] * option.number)
 
 
@@ -104,8 +103,7 @@ def milliseconds(
     option: Option, ratios: Ratios, gpu: str = YARDSTICK, screen_share: float = 0.5, pixels: int = PUBLISHED_PIXELS
 ) -> Milliseconds:
     """Return a frame by an option."""
-    if gpu not in GPUS:
-        raise InputError(f"gpu must be one of {', '.join(GPUS)}, got {gpu!r}")
+    require(gpu in GPUS, "gpu", f"one of {', '.join(GPUS)}", gpu)
     slope, base = np.polyfit(COVERED, PUBLISHED["separable"], 1)
     whole = float(base + slope * screen_share) * pixels / PUBLISHED_PIXELS
     arithmetic, memory = (whole * old / new for old, new in zip(GPUS[YARDSTICK], GPUS[gpu], strict=True))

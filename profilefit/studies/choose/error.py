@@ -31,8 +31,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from mcml_sim import Setting
-from mcml_sim.media.arrays import Floats
-from profilefit.errors import InputError
+from mcml_sim.media.arrays import Floats, require
 from profilefit.fitting.sampling import LawTarget
 from profilefit.fitting.solver import differences, solve
 from profilefit.laws.base import ProfileLaw
@@ -119,8 +118,8 @@ class ReferenceLight:
     setting: Setting
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.setting.n <= REFRACTING.high:
-            raise InputError(f"index must be a refractive index in [1, {REFRACTING.high:g}], got {self.setting.n:g}")
+        n = self.setting.n
+        require(1.0 <= n <= REFRACTING.high, "index", f"a refractive index in [1, {REFRACTING.high:g}]", n)
 
     def alpha(self, reflectance: float) -> float:
         """Return the single-scattering albedo [-] of a reflectance A [-]."""

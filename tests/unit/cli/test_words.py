@@ -22,9 +22,10 @@ from profilefit.cli import options
 from profilefit.cli.options import in_options, records_folder
 from profilefit.cli.schema import FILES
 from profilefit.errors import InputError, OtherRecords
+from profilefit.measured.reading import FACT, NAMES
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import available, fits_folder
-from profilefit.report.tables.keys_table import models, schema_of
+from profilefit.report.tables.keys_table import models, page, schema_of
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.atlas import FUNCTIONS
 from profilefit.studies.tradeoff.parts import PARTS
@@ -260,3 +261,8 @@ def test_the_command_prints_it_or_names_the_kinds(done, refused, schemas):
     assert done("schema", "stack") == as_json(schemas["stack"].schema)
     said = "profilefit: KIND must be one of scene, stack, recipe, photo, got 'fog'\n"
     assert refused("schema fog", said) == said
+
+
+def test_the_page_of_keys_has_every_name_of_data():
+    rows = page().partition("## Data")[2]
+    assert [name for name in (*FACT, *NAMES, "value1") if f"`{name}`" not in rows] == []
