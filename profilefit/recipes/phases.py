@@ -34,7 +34,7 @@ from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
 from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS
 
 MAX_BYTES = 2**20
 MOST_ROWS, FEWEST_ROWS = 5000, 8
