@@ -166,6 +166,7 @@ DAMAGED = [
     # Lists that belong together are of one length.
     ("burley-whole", "quality/regenerated/rel/0", GONE, ".*rel must be as long as quality.alpha"),
     ("burley-whole", "covariance/model/0", GONE, r"\[covariance\] model must be a square matrix"),
+    ("burley-whole", "covariance", lambda own: {**own, "new": [[1.0]]}, r"\[covariance\] new must be a square matrix"),
     ("burley-whole", "covariance/names", lambda names: [*names, "zz"], ".*names must be of its constants, got 'zz'"),
     ("burley-whole", "derived/value/0", GONE, r"\[derived\] value must be as long as derived.alpha"),
     ("burley-whole", "quality/published/ks", GONE, r"\[quality.published\] ks must be there"),
