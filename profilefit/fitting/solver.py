@@ -233,7 +233,7 @@ def with_curvature(values: Floats, jacobian: Floats, hessian: Floats) -> tuple[F
         root = np.linalg.cholesky(hessian / np.outer(scale, scale))
     except np.linalg.LinAlgError:
         return values, jacobian
-    top = np.linalg.solve(root, jacobian.T @ values / scale)
+    top: Floats = np.linalg.solve(root, jacobian.T @ values / scale)
     rest = _squares(values) - _squares(top)
     if not rest >= 0:
         return values, jacobian

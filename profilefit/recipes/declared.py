@@ -1,4 +1,4 @@
-"""Files of users, declared as models: each key with its type, its range and its words in one place.
+"""Files of users and records, declared as models: each key with its type, its range and its words in one place.
 
 A mistake is one line: the file, the table and the key, what is accepted there, and what was got. What is accepted is
 said by the JSON Schema of the model, which editors and the tables of keys in the docs read, too.
@@ -6,7 +6,7 @@ said by the JSON Schema of the model, which editors and the tables of keys in th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import inf
 from typing import Annotated, Any, Self
@@ -22,6 +22,7 @@ from profilefit.errors import InputError
 Table = dict[str, Any]
 Range = tuple[float, float]
 LONGEST_TEXT = 60  # characters
+LONGEST_RECORDED = 1000  # characters of a text in a record or recipe; ours have 256
 LENGTHS = 1e-9, 1e9  # between which lengths have squares and ratios to compute with
 MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
 COUNTS = {2: "two", 3: "three"}
@@ -98,6 +99,26 @@ class NumberRange:
         return {"accepted": self.words, "anyOf": [number, pair]}
 
 
+class Keys:
+    """Keys of a table, each with its type or its own `Keys`, as an annotation of `Table`; there may be others, too.
+
+    optional  keys that may be absent, unless they are of `required`, too; "*" has the type of all others
+    """
+
+    def __init__(self, optional: Mapping[str, Any] = {}, /, **required: Any) -> None:
+        self.optional, self.required = optional, required
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        fields, others = {}, Table()
+        for key, kind in {**self.optional, **self.required}.items():
+            schema = handler.generate_schema(Annotated[Table, kind] if isinstance(kind, Keys) else kind)
+            fields[key] = core_schema.typed_dict_field(schema, required=key in self.required)
+        if "*" in fields:
+            others = {"extra_behavior": "allow", "extras_schema": fields.pop("*")["schema"]}
+        config = core_schema.CoreConfig(strict=True, allow_inf_nan=False)  # as of `Declared`, which is not passed on
+        return core_schema.typed_dict_schema(fields, config=config, **others)
+
+
 def words(accepted: str = "", **schema: Any) -> Any:
     """Return an annotation that says in these words what a key accepts, and what else its JSON Schema has."""
     return Field(json_schema_extra={"accepted": accepted, **schema} if accepted else schema)
@@ -108,6 +129,11 @@ def printable(text: str) -> str:
     if not text.isprintable():
         raise ValueError("control characters")
     return text
+
+
+def is_line(value: object) -> bool:
+    """Return whether a value is one line of printable text, without control characters or hidden ones."""
+    return isinstance(value, str) and len(value) <= LONGEST_RECORDED and value.isprintable()
 
 
 LISTED = Field(strict=False)  # annotates a tuple, which a file writes as a list
@@ -231,9 +257,10 @@ def _located(model: type[BaseModel], content: Any, place: tuple[Any, ...]) -> tu
     whole = model.model_json_schema()
     tables, key, schema, value = [], "", whole, content
     for part in place:
-        if part in schema.get("properties", {}):
+        inner = schema.get("properties", {}).get(part, schema.get("additionalProperties"))
+        if isinstance(inner, dict):
             tables += [key] * bool(key)
-            key, schema = str(part), schema["properties"][part]
+            key, schema = str(part), inner
             value = value.get(part) if isinstance(value, dict) else None
         elif isinstance(part, int) and isinstance(value, list):
             if "items" not in schema or part >= len(value) or not isinstance(value[part], dict):
@@ -250,7 +277,8 @@ def resolved(schema: Table, known: Table, is_table: bool) -> Table:
     kinds = schema.get("anyOf") or schema.get("oneOf")
     if (kinds and "accepted" not in schema) or (kinds and is_table):
         plain = [resolved(kind, known, is_table) for kind in kinds if kind.get("type") != "null"]
-        return next((kind for kind in plain if (kind.get("type") == "object") == is_table), plain[0])
+        other = schema if "accepted" in schema else plain[0]
+        return next((kind for kind in plain if (kind.get("type") == "object") == is_table), other)
     if isinstance(schema.get("items"), dict) and "$ref" in schema["items"]:
         return {**schema, "items": resolved(schema["items"], known, True)}
     return schema

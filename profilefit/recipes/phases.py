@@ -36,7 +36,7 @@ from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judge
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.declared import Declared, OneOf, Refused, words
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS
 
 MAX_BYTES = 2**20
 MOST_ROWS, FEWEST_ROWS = 5000, 8

@@ -13,9 +13,9 @@ from pydantic import AfterValidator, Field, model_validator
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, printable, words
+from profilefit.recipes.declared import LISTED, LONGEST_RECORDED, Declared, OneOf, Refused, is_line, printable, words
 from profilefit.recipes.folder import available, fits_folder
-from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line
+from profilefit.recipes.record import PIPELINES
 
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
@@ -33,8 +33,8 @@ MAX_LIMIT = 1e6  # a weight beyond this makes the rings round off beside it
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(ge=0.0, le=MAX_LIMIT)]
 Length = Annotated[float, Field(ge=MFP[0], le=MFP[1])]
-Words = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(printable)]  # it becomes comments in code
-Names = Annotated[tuple[Words, ...], LISTED, words(f"a list of texts of {LONGEST_TEXT} characters at most")]
+Words = Annotated[str, Field(max_length=LONGEST_RECORDED), AfterValidator(printable)]  # it becomes comments in code
+Names = Annotated[tuple[Words, ...], LISTED, words(f"a list of texts of {LONGEST_RECORDED} characters at most")]
 Numbers = Annotated[tuple[float, ...], LISTED, words("a list of finite numbers")]
 
 

@@ -9,22 +9,26 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import ConfigDict, Field, model_validator
 
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.text_file import plain as to_plain
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
+from mcml_sim.media.arrays import is_number, require, shown
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError, SettingError
-from profilefit.recipes import schema
+from profilefit.recipes.declared import LONGEST_RECORDED, Declared, Keys, OneOf, Refused, Table, is_line, words
 from profilefit.recipes.folder import available, fits_folder, is_file
 
 FORMAT = 2
@@ -36,8 +40,216 @@ DIGITS = 12
 CONVERGED = "converged"
 SEARCHLIGHT = Setting()
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
-Problem = Callable[[dict[str, Any]], str | None]  # in words, of a record's content
+DEEPEST = 12  # tables and lists within one another; ours have 6
+LINE = f"one line of printable text, of {LONGEST_RECORDED} characters at most"
+REFRACTING = "refracting"  # in the name of a record that holds for every index of a range
+FORWARD = "forward"  # and of one that holds for every mean cosine of a range, too
+SPANS = {"n": "indices", "g": "cosines"}  # a setting's numbers, and the ranges of them that a record may hold for
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
+
+# Fields of a record: everything that laws, shader sources, tables and pages take from one. It may come from anywhere,
+# its texts are shown on terminals and become comments in code, its numbers become constants. `str` and `float` have no
+# limits here, since `_require_safe` looks at every text and number of a record, at whatever key.
+ABSENT: Any = None  # in place of a key that may be absent, but not null
+TWO = Field(min_length=2, max_length=2)
+Count = Annotated[int, Field(ge=0, lt=2**63), words("a whole number")]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$"), words("64 hexadecimal digits")]
+Measure = Annotated[float | None, words("a number or null")]  # null where it is not finite
+Measures = Annotated[list[float | None], words("a list of numbers or nulls")]
+Numbers = Annotated[list[float], Field(min_length=1), words("a list of numbers")]
+Ratios = Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=1), words("a list of numbers > 0")]
+Pair = Annotated[list[float | None], TWO, words("a list of two numbers or nulls")]
+Span = Annotated[list[float], TWO, words("a list of two numbers")]
+Halves = Annotated[list[Span], words("a list of pairs of numbers")]
+Texts = Annotated[list[str], words("a list of texts")]
+Matrix = Annotated[list[Measures] | None, words("a square matrix of numbers, or null")]
+# A constant's errors in a record, and what tables and texts call them; older records have no second and third.
+ERRORS = {
+    "statistical_error": "photons",
+    "discretisation_error": "dr",
+    "model_error": "model",
+    "misfit_error": "misfit",
+    "jackknife_error": "jackknife",
+}
+OF_CONSTANT = dict.fromkeys(("published", *ERRORS), Measure)
+Constant = Annotated[Table, Keys(OF_CONSTANT, regenerated=float)]
+SOLVED = {"result": str, "condition_number": Measure}
+# A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
+BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
+HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "g", "rel", "ks", "largest", "delta_A")
+OF_MAP = {**dict.fromkeys(("delta_A", "delta_alpha", "largest_s", "at_one", "fold"), float), "monotone": bool}
+MEASURED = {**dict.fromkeys(BY_ALBEDO, Numbers), **dict.fromkeys(HALVED, Halves), **OF_MAP}
+PARTS = ("value", "statistical", "model")
+SETS = ("published", "corrected", "regenerated")
+QUALITY = {"alpha": Numbers, "by_index": Keys(dict.fromkeys(BY_INDEX, Numbers)), **dict.fromkeys(SETS, Keys(MEASURED))}
+
+
+class NamedRecord(Declared):
+    """Record of any pipeline: its law, and the setting that it belongs to. It may have keys that nobody declared."""
+
+    model_config = ConfigDict(extra="ignore")
+    law: str
+    pipeline: str
+    setting: Annotated[Table, Keys(dict.fromkeys(SPANS, Any))]
+    indices: Span = ABSENT
+    cosines: Span = ABSENT
+    data_digest: Digest = ABSENT
+
+    @model_validator(mode="after")
+    def _spanning(self) -> Self:
+        """Refuse an index or mean cosine of its own that its constants are not for."""
+        for name, span in SPANS.items():
+            own, (low, high) = self.setting.get(name), getattr(self, span) or (-math.inf, math.inf)
+            if is_number(own) and not low < own <= high:
+                raise Refused(f"in ({low:g}, {high:g}], as its {span} are", own, "setting", name)
+        return self
+
+
+class LawRecord(NamedRecord):
+    """Record that a law is made from."""
+
+    constants: dict[str, Constant]
+
+    def require_constants(self, names: Iterable[str]) -> None:
+        """Refuse a record that lacks one of these constants."""
+        if missing := next((name for name in names if name not in self.constants), None):
+            raise Refused("a table", None, "constants", missing)
+
+
+class WholeRecord(NamedRecord):
+    """Record with what a report shows of every pipeline."""
+
+    name: str
+    title: str
+    equations: str
+    note: str = ABSENT
+    preset: Annotated[str, OneOf("quick", "full")]
+    seed: Count
+    setting: Annotated[Table, Keys(illumination=str, n=float, g=float)]
+    truth: Annotated[Table, Keys({"kind": str, "photons": Count, "grid_digest": Digest})]
+    versions: dict[str, str] = ABSENT
+
+
+OF_FIT = {"free": bool, "intervals": dict[str, dict[str, Pair]]}
+FittedConstant = Annotated[Table, Keys({**OF_CONSTANT, **OF_FIT}, regenerated=float, published=Measure)]
+RINGS = Annotated[Table, Keys(dr=float, first=float, last=float, epsilon=float, count=Count, trim=str)]
+PROTOCOL = Keys(
+    {"rings": RINGS | None, "held": Texts, "indices": Numbers, "cosines": Numbers},
+    albedos=Keys(low=float, high=float, count=Count, spacing=str),
+    weighting=Keys(objective=str, energy_limit=float, source_limit=float, shares=float, last_share=float),
+)
+RESIDUALS = Keys(rms=Measure, largest=Measure, along_r=float, along_alpha=float, half_waves=float)
+Posterior = Annotated[Table, Keys(result=str, steps=Count, walkers=Count, tau=Measure, acceptance=float)]
+QUANTITY = Annotated[str, OneOf("radius", "reflectance")]
+DISCREPANCY = dict.fromkeys(("amplitude", "amplitude_error", "length_r", "length_s", "rms"), Measure)
+Checked = Annotated[Table, Keys(exact=Measure, photons=Measure, statistical_error=Measure, z=Measure)]
+CROSSCHECK = Keys(chi2=Measure, chance=Measure, rank=Count, photons=Count, result=str, constants=dict[str, Checked])
+Outcome = Annotated[Table, Keys(count=Count, cost_ratio=Measure, result=str, constants=Table)]
+STARTS = Keys(count=Count, others=Count, share_best=float, result=str, rule=str, outcomes=list[Outcome])
+
+
+def _require_length(table: Table, keys: Iterable[str], like: str, other: Sequence[Any], *place: str) -> None:
+    """Refuse a list of a table, which stands at a place in the record, that is not as long as another one."""
+    for key in keys:
+        if key in table and len(table[key]) != len(other):
+            raise Refused(f"as long as {like}, {len(other)}", len(table[key]), *place, key)
+
+
+class FitRecord(WholeRecord):
+    """Record of a recipe that fits a law or a map."""
+
+    constants: dict[str, FittedConstant]
+    protocol: Annotated[Table, PROTOCOL]
+    fit: Annotated[Table, Keys(**SOLVED, steps=Count, residuals=RESIDUALS)]
+    posterior: dict[str, Posterior]
+    quality: Annotated[Table, Keys(QUALITY, regenerated=Keys(MEASURED))]
+    covariance: Annotated[Table, Keys({"*": Matrix}, names=Texts)] = ABSENT
+    left_out: Annotated[Table, Keys(rings=Count, albedos=Count)] = ABSENT
+    derived: Annotated[Table, Keys(quantity=QUANTITY, alpha=Numbers, **dict.fromkeys(PARTS, Measures))] = ABSENT
+    discrepancy: Annotated[Table, Keys(**DISCREPANCY, result=str)] = ABSENT
+    crosscheck: Annotated[Table, CROSSCHECK] = ABSENT
+    starts: Annotated[Table, STARTS] = ABSENT
+
+    @model_validator(mode="after")
+    def _matching(self) -> Self:
+        """Refuse a list of the wrong length, a strange name, or a measure without its twin."""
+        covariance, derived, quality = self.covariance or {}, self.derived or {}, self.quality
+        names, by_index, alpha = covariance.get("names", ()), quality.get("by_index", {}), quality.get("alpha", ())
+        if strange := [name for name in names if name not in self.constants]:
+            raise Refused("of its constants", strange[0], "covariance", "names")
+        for kind, rows in covariance.items():
+            if kind != "names" and rows is not None and {len(rows), *map(len, rows)} != {len(names)}:
+                raise Refused(f"a square matrix of {len(names)} rows, as many as names", rows, "covariance", kind)
+        _require_length(derived, PARTS, "derived.alpha", derived.get("alpha", ()), "derived")
+        _require_length(by_index, BY_INDEX, "quality.by_index.n", by_index.get("n", ()), "quality", "by_index")
+        # What is measured of the regenerated law is measured of the printed ones beside it.
+        kept = [key for key in ("rel", "ks", "inversion_error") if key in quality["regenerated"]]
+        kept += OF_MAP if "delta_A" in quality["regenerated"] else ()
+        for name in (name for name in SETS if name in quality):
+            _require_length(quality[name], (*BY_ALBEDO, *HALVED), "quality.alpha", alpha, "quality", name)
+            if missing := [key for key in kept if key not in quality[name]]:
+                raise Refused("there, as others of its kind are", None, "quality", name, missing[0])
+        return self
+
+
+class AlbedoRecord(FitRecord):
+    """Record of a map between alpha and A."""
+
+    quality: Annotated[Table, Keys(QUALITY, regenerated=Keys(MEASURED, **OF_MAP))]
+
+
+class InverseRecord(FitRecord):
+    """Record of a sampler of radii."""
+
+    quality: Annotated[Table, Keys(QUALITY, alpha=Numbers, regenerated=Keys(MEASURED, inversion_error=Numbers))]
+
+
+class ProfileRecord(FitRecord):
+    """Record of a law of the profile."""
+
+    quality: Annotated[
+        Table, Keys(QUALITY, alpha=Numbers, regenerated=Keys(MEASURED, rel=Numbers, ks=Numbers, l1=Numbers))
+    ]
+
+
+Stage = Annotated[Table, Keys({"standard_error": dict[str, Measure]}, **SOLVED, constants=dict[str, float])]
+STAGES = {"per_albedo_failures": dict[str, Count], "length_exponents": dict[str, float]}
+
+
+class StagedRecord(ProfileRecord):
+    """Record of a law that is fitted in the stages of the paper."""
+
+    stages: Annotated[Table, Keys(STAGES, coefficient_laws=dict[str, Stage])]
+
+
+OF_READING = {
+    **dict.fromkeys(("equation", "verdict", "choices"), str),
+    **dict.fromkeys(("curve_distance", "constant_distance"), Measure),
+    **dict.fromkeys(("constants", "published"), dict[str, float]),
+}
+Reading = Annotated[Table, Keys({"evidence": str, "result": str}, **OF_READING)]
+OF_ROW = dict.fromkeys(("material", "model", "channel", "range_choice"), str)
+Row = Annotated[Table, Keys({**OF_ROW, "range_mm": float, "mse_over_printed": Ratios})]
+Half = Annotated[Table, Keys({"material": str, "model": str, "off": Measure})]
+
+
+class EvidenceRecord(WholeRecord):
+    """Record of comparisons with the paper."""
+
+    protocol: Annotated[Table, PROTOCOL] = ABSENT
+    readings: list[Reading]
+    table1: list[Row]
+    halves: list[Half] = ABSENT
+
+
+# Each pipeline: the objectives that its recipes can make small, and what its records hold.
+PIPELINES: dict[str, tuple[tuple[str, ...], type[NamedRecord]]] = {
+    "albedo": (("albedo", "reflectance", "relative_reflectance"), AlbedoRecord),
+    "profile": (("energy", "relative"), ProfileRecord),
+    "as-published": (("radial",), StagedRecord),
+    "inverse": (("radius", "relative_radius", "share"), InverseRecord),
+    "evidence": ((), EvidenceRecord),
+}
 
 
 def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
@@ -55,14 +267,55 @@ def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[s
     return path
 
 
-def read(path: Path, whole: bool = False) -> dict[str, Any]:
+def read(path: Path, whole: bool = False) -> Table:
     """Read a record; RecordError says which file and what is wrong with it.
 
     Its law, pipeline, setting and constants must be there: that is what a law is made from. A `whole` record holds
     everything that `profilefit report` shows.
     """
-    if not schema.is_line(path.stem):  # it is shown, and stands in exported texts
-        raise RecordError(f"{str(path)!r}: the name of a record must be {schema.TEXT.words}")
+    content = _parsed(path)
+    require_sound(content, path, whole)
+    return content
+
+
+def read_of(path: Path, pipeline: str, kind: str, model: type[NamedRecord]) -> Table:
+    """Read a record of one pipeline, `kind` in words, that holds what its model does; RecordError on any other."""
+    content = _parsed(path)
+    if content.get("pipeline") != pipeline:
+        require_sound(content, path)
+        raise RecordError(f"{path}: must be {kind}, got pipeline {content['pipeline']!r}")
+    with damage(path):
+        model.of(str(path), content)
+    return content
+
+
+def require_sound(content: Table, path: Path, whole: bool = False) -> None:
+    """Raise RecordError where a record lacks what `read` promises, or holds what is of another type."""
+    pipeline = content.get("pipeline")
+    model: type[NamedRecord] = NamedRecord if pipeline == "evidence" else LawRecord
+    with damage(path):
+        if whole and isinstance(pipeline, str):
+            require(pipeline in PIPELINES, "pipeline", f"one of {', '.join(PIPELINES)}", pipeline)
+            model = PIPELINES[pipeline][1]
+        model.of(str(path), content)
+
+
+@contextmanager
+def damage(path: Path) -> Iterator[None]:
+    """Raise what is wrong inside a record as RecordError."""
+    try:
+        yield
+    except RecordError:
+        raise
+    except (InputError, KeyError) as error:
+        text = f"{error} is missing" if isinstance(error, KeyError) else str(error).removeprefix(f"{path}: ")
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it") from None
+
+
+def _parsed(path: Path) -> Table:
+    """Return what a file says, in the words of today; RecordError where it is no record, or not safe to be shown."""
+    if not is_line(path.stem):  # it is shown, and stands in exported texts
+        raise RecordError(f"{str(path)!r}: the name of a record must be {LINE}")
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:
@@ -72,12 +325,27 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
     if not isinstance(content, dict) or content.get("format") not in (1, FORMAT):
-        found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
-        raise RecordError(f"{path}: is not a record of format 1 or {FORMAT}, got {found}")
-    if content["format"] == 1:
-        content = _of_format_1(content)
-    require_sound(content, path, whole)
+        got = shown(content.get("format") if isinstance(content, dict) else type(content).__name__)
+        raise RecordError(f"{path}: is not a record of format 1 or {FORMAT}, got {got}")
+    content = _of_format_1(content) if content["format"] == 1 else content
+    with damage(path):
+        _require_safe(content)
     return content
+
+
+def _require_safe(value: Any, place: str = "it", depth: int = 0) -> None:
+    """Refuse what no record may hold: text of several lines, no numbers, nests without end."""
+    if isinstance(value, dict | list):
+        require(depth < DEEPEST, place, f"nested no deeper than {DEEPEST} tables and lists", value)
+        for name, item in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(name, str):
+                require(is_line(name), f"keys in {place}", LINE, name)
+            if type(item) is not float or not math.isfinite(item):  # most of a record: its place is never shown
+                _require_safe(item, f"{place}.{name}".removeprefix("it."), depth + 1)
+    elif isinstance(value, str):
+        require(is_line(value), place, LINE, value)
+    elif value is not None and not isinstance(value, bool):
+        require(is_number(value) and math.isfinite(value), place, "a number of float64", value)
 
 
 def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
@@ -98,48 +366,12 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read_of(
-    path: Path, pipeline: str, words: str, shown: schema.Fields | None = None, problem: Problem | None = None
-) -> dict[str, Any]:
-    """Read a record of one pipeline, `words` what it is, which holds what is `shown`; RecordError on any other.
-
-    problem  what else is wrong with its content, in one line, or None
-    """
-    content = read(path)
-    if content["pipeline"] != pipeline:
-        raise RecordError(f"{path}: must be {words}, got pipeline {content['pipeline']!r}")
-    if text := schema.mistyped(content, shown or {}) or (problem(content) if problem else None):
-        raise damaged(path, text)
-    return content
-
-
-def damaged(path: Path, text: str) -> RecordError:
-    """Return the error of a record that is damaged, `text` what is wrong inside."""
-    return RecordError(f"{path}: is damaged: {text}; regenerate it")
-
-
 def named(name: str, folder: Path, pipeline: str) -> Path | None:
     """Return the record of a name in a folder, or the one at a path (.json) if it is of this pipeline; else None."""
     if name.endswith(".json"):
         path = Path(name)
         return path if is_file(path) and read(path)["pipeline"] == pipeline else None
     return available(folder).get(name)
-
-
-def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
-    """Raise RecordError where a record lacks what `read` promises, or holds what is of another type."""
-    if text := schema.problem(content, whole) or _outside(content):
-        raise damaged(path, text)
-
-
-def _outside(content: Mapping[str, Any]) -> str | None:
-    """Return, in one line, an index or mean cosine of its own that its constants are not for; else None."""
-    for name, span in SPANS.items():
-        own = content["setting"].get(name)
-        if span in content and schema.is_number(own) and not _within(content, span, own):
-            low, high = content[span]
-            return f"setting.{name} must be in ({low:g}, {high:g}], as its {span} are, got {own:g}"
-    return None
 
 
 def _within(content: Mapping[str, Any], span: str, value: float) -> bool:
@@ -153,11 +385,6 @@ def record_setting(content: Mapping[str, Any]) -> Setting:
         return Setting.of(content["setting"])
     except (KeyError, TypeError, InputError):
         raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
-
-
-REFRACTING = "refracting"  # in the name of a record that holds for every index of a range
-FORWARD = "forward"  # and of one that holds for every mean cosine of a range, too
-SPANS = {"n": "indices", "g": "cosines"}  # a setting's numbers, and the ranges of them that a record may hold for
 
 
 def covers(content: Mapping[str, Any], setting: Setting) -> bool:

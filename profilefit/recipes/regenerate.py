@@ -23,7 +23,6 @@ from profilefit.errors import RecordError
 from profilefit.recipes import kinds, recipe, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.run import RecipeRun, Step, written
-from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.workers import Workers
 
 Request = tuple[kinds.Kind, Any]
@@ -143,7 +142,7 @@ def stated_error(constant: Content) -> float:
     """
     if model := constant.get("model_error"):
         return float(model)
-    return max((float(constant.get(name) or 0.0) for name in ERRORS), default=0.0)
+    return max((float(constant.get(name) or 0.0) for name in record.ERRORS), default=0.0)
 
 
 def _of_readings(name: str, shipped: Content, made: Content) -> Reproduction:

@@ -20,7 +20,7 @@ from profilefit.fitting.quality import MEASURES
 from profilefit.laws.base import Constants
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.recipe import Albedos
-from profilefit.recipes.schema import ERRORS, SETS
+from profilefit.recipes.record import ERRORS, SETS
 from profilefit.recipes.targets import albedo_values
 
 Content = Mapping[str, Any]

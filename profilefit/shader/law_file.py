@@ -22,8 +22,7 @@ from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
 from profilefit.recipes.catalogue import LoadedLaw, not_found
 from profilefit.recipes.folder import known_folder
-from profilefit.recipes.record import Folder, Records
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS, Folder, Records
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")

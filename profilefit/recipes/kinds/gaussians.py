@@ -9,20 +9,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from mcml_sim import Medium
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import RecordError
+from profilefit.errors import InputError, RecordError
 from profilefit.laws.gaussians import DEFAULT, MOST, MediumGaussians
 from profilefit.materials import CHANNELS
-from profilefit.recipes import record, schema
+from profilefit.recipes import record
+from profilefit.recipes.declared import Keys, Refused, Table, words
 from profilefit.recipes.folder import SUMS
-from profilefit.recipes.kinds.stack import StackRequest, damage, header, recorded_stack, request
+from profilefit.recipes.kinds.stack import StackRequest, Thickness, header, recorded_stack, request
+from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, damage
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.file import LayerStack
@@ -45,20 +47,39 @@ TRACED_NOTE = (
 ARRAYS = ("edges", "energy", "weight", "noise", "ends")  # of a colour's light; the last A and what is inside [-]
 COUNTS = range(1, MOST + 1)
 MEASURED = ("rel", "rms", "ks", "alone")  # of red, green and blue
-OF_LIGHT: Fields = {
-    "reflectance share": NUMBERS,
-    "by_count": LIST,
-    **under("by_count.*", {"result": TEXT, "steps": COUNT, "condition_number": MEASURE, " ".join(MEASURED): NUMBERS}),
-}
-# What tables and pictures take from a record.
-SHOWN: Fields = {
-    **dict.fromkeys(("title", "equations", "note", "unit"), TEXT),
-    "layers": LIST,
-    "sums": TABLE,
-    "data_digest": DIGEST,
-    **{key: one for light in ILLUMINATIONS for key, one in under(f"sums.{light}", OF_LIGHT).items()},
-}
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
+EACH = Field(min_length=len(CHANNELS), max_length=len(CHANNELS))
+Colours = Annotated[list[float], EACH, words("a list of numbers, one a colour")]
+Shares = Annotated[list[Annotated[float, Field(gt=0, le=1)]], EACH, words("a list of numbers in (0, 1], one a colour")]
+Summed = Annotated[Table, Keys(**SOLVED, steps=Count, **dict.fromkeys(MEASURED, Colours))]
+SUMS_OF_LIGHT = Keys(reflectance=Shares, share=Colours, by_count=list[Summed])
+
+
+class ShownSums(LawRecord):
+    """Record with what tables and pictures take from sums of Gaussians."""
+
+    title: str
+    equations: str
+    note: str
+    unit: str
+    layers: list[Thickness]
+    sums: Annotated[Table, Keys(**dict.fromkeys(ILLUMINATIONS, SUMS_OF_LIGHT))]
+    data_digest: Digest
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuse a record without a sum of each number of Gaussians, or with constants that make no sum."""
+        for light, sums in self.sums.items():
+            if len(sums["by_count"]) != MOST:
+                raise Refused(f"{MOST}, one a number of Gaussians", len(sums["by_count"]), "sums", light, "by_count")
+            for count in COUNTS:
+                self.require_constants(f"{light}.{count}.{name}" for name in constant_names(count))
+                variances, *weights = _values(self.constants, light, count)
+                if not (variances[0] > 0 and np.all(np.diff(variances) > 0)):
+                    raise InputError(f"constants.{light}.{count}.v1 and on must rise from above 0")
+                if not all(np.all(own >= 0) and abs(np.sum(own) - 1) < ROUNDED for own in weights):
+                    raise InputError(f"constants.{light}.{count}: weights of a colour must be >= 0 and sum to 1")
+        return self
 
 
 @dataclass(frozen=True)
@@ -71,7 +92,7 @@ class SumRecord:
 
     def laws(self, illumination: str, count: int = DEFAULT) -> tuple[MediumGaussians, ...]:
         """Return the sums of red, green and blue, as `gaussians.shared_gaussians` fits them."""
-        variances, *weights = _values(self.content, illumination, count)
+        variances, *weights = _values(self.content["constants"], illumination, count)
         whole = self.content["sums"][illumination]["reflectance"]
         return tuple(
             gaussians.medium_sum(medium, illumination, one, variances, own)
@@ -131,7 +152,7 @@ def beside(stack: Path) -> Path | None:
 
 def load(path: Path) -> SumRecord:
     """Return a record; RecordError in one line on one that is damaged."""
-    content = record.read_of(path, PIPELINE, "a record of sums of Gaussians", SHOWN, _mismatched)
+    content = record.read_of(path, PIPELINE, "a record of sums of Gaussians", ShownSums)
     record.record_setting(content)
     with damage(path):
         return SumRecord(recorded_stack(str(path), content), content, path)
@@ -200,32 +221,7 @@ def _content(
     }
 
 
-def _values(content: Mapping[str, Any], illumination: str, count: int) -> np.ndarray:
+def _values(constants: Mapping[str, Any], illumination: str, count: int) -> np.ndarray:
     """Return (4, N): variances [unit^2], then weights of red, green and blue [-]."""
-    of = content["constants"]
-    values = [float(of[f"{illumination}.{count}.{name}"]["regenerated"]) for name in constant_names(count)]
+    values = [float(constants[f"{illumination}.{count}.{name}"]["regenerated"]) for name in constant_names(count)]
     return np.reshape(values, (1 + len(CHANNELS), count))
-
-
-def _mismatched(content: Mapping[str, Any]) -> str | None:
-    """Return which list must be as long as others, and which constants are missing or make no sum; else None."""
-    for light in ILLUMINATIONS:
-        one = content["sums"][light]
-        if len(one["by_count"]) != MOST:
-            return f"sums.{light}.by_count must be {MOST}, one a number of Gaussians, got {len(one['by_count'])}"
-        lists = {key: one[key] for key in ("reflectance", "share")}
-        lists |= {f"by_count.{i}.{key}": each[key] for i, each in enumerate(one["by_count"]) for key in MEASURED}
-        for key, values in lists.items():
-            if len(values) != len(CHANNELS):
-                return f"sums.{light}.{key} must be {len(CHANNELS)}, one a colour, got {len(values)}"
-        if not all(0 < value <= 1 for value in one["reflectance"]):
-            return f"sums.{light}.reflectance must be in (0, 1]"
-        for count in COUNTS:
-            if text := schema.missing_constant(content, (f"{light}.{count}.{name}" for name in constant_names(count))):
-                return text
-            variances, *weights = _values(content, light, count)
-            if not (variances[0] > 0 and np.all(np.diff(variances) > 0)):
-                return f"constants.{light}.{count}.v1 and on must rise from above 0"
-            if not all(np.all(own >= 0) and abs(np.sum(own) - 1) < ROUNDED for own in weights):
-                return f"constants.{light}.{count}: weights of a colour must be >= 0 and sum to 1"
-    return None

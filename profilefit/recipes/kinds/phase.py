@@ -6,20 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from mcml_sim import Setting
 from mcml_sim.media.arrays import shown
 from mcml_sim.media.phase import Phase
 from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, regression
-from profilefit.recipes import record, schema
+from profilefit.recipes import record
+from profilefit.recipes.declared import Keys, Table
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
 from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
+from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, Measures, Texts
 from profilefit.recipes.run import LAWS, RecipeRun, Work
-from profilefit.recipes.schema import COUNT, LIST, MEASURE, MEASURES, NUMBER, TEXT, TEXTS, Fields, under
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -34,21 +36,27 @@ FULL_SPHERE = 4 * np.pi  # [sr], the integral of values that are said relative t
 NEAR_ONE = 0.1
 SMALLEST = 1e-4  # share that is printed
 USUAL = RecipeRun("quick", SEED, Path(), None, None)  # of a table that is fitted without a record
-OF_FIT: Fields = {
-    **{"held": TEXTS, "result": TEXT, "steps": COUNT, "condition_number": MEASURE},
-    **{"rms mean_cosine backscattered second": NUMBER, "bands": MEASURES},
-}
-OF_DATA: Fields = {
-    **{"source": TEXT, "rows": COUNT, "integral mean_cosine backscattered second": NUMBER, "angles": MEASURES},
-    **{"unit?": TEXT, "spans?": LIST},  # of no older records
-}
-OF_FORM: Fields = {key: one for how in (FREE, HELD) for key, one in under(how, OF_FIT).items()}
-SHOWN: Fields = {
-    **dict.fromkeys(("title", "equations", "note", "data_digest"), TEXT),
-    **under("data", OF_DATA),
-    **under("data.spans?.*", {"low high share other": NUMBER, "rule other_rule": TEXT}),
-    **under("phases", {key: one for form in FORMS for key, one in under(form, OF_FORM).items()}),
-}
+MOMENT = dict.fromkeys(("mean_cosine", "backscattered", "second"), float)
+FITTED = Keys(**SOLVED, **MOMENT, steps=Count, held=Texts, rms=float, bands=Measures)
+Span = Annotated[Table, Keys(low=float, high=float, share=float, other=float, rule=str, other_rule=str)]
+NEWER = {"unit": str, "spans": list[Span]}  # of no older records
+
+
+class ShownPhases(LawRecord):
+    """Record with what `profilefit report` shows of phase functions."""
+
+    title: str
+    equations: str
+    note: str
+    data_digest: Digest
+    data: Annotated[Table, Keys(NEWER, **MOMENT, source=str, rows=Count, integral=float, angles=Measures)]
+    phases: Annotated[Table, Keys(**dict.fromkeys(FORMS, Keys(free=FITTED, held=FITTED)))]
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        each = ((form, how, name) for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
+        self.require_constants(map(".".join, each))
+        return self
 
 
 @dataclass(frozen=True)
@@ -69,10 +77,8 @@ class PhaseRecord:
         if how not in (HELD, FREE):
             raise InputError(f"moments must be {HELD} or {FREE}, got {how!r}")
         own = self.constants(form, how)
-        try:
+        with record.damage(self.path):
             return built(FORMS[form], np.array([own[name]["regenerated"] for name in FORMS[form].names]))
-        except InputError as error:
-            raise record.damaged(self.path, str(error)) from None
 
 
 def find(name: str, folder: Path) -> PhaseRecord | None:
@@ -119,9 +125,7 @@ def quality(fits: Sequence[PhaseFit]) -> dict[str, Any]:
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says; RecordError in one line on one that is damaged."""
-    names = (f"{form}.{how}.{name}" for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
-    missing = partial(schema.missing_constant, names=names)
-    return record.read_of(path, PIPELINE, "a record of phase functions", SHOWN, missing)
+    return record.read_of(path, PIPELINE, "a record of phase functions", ShownPhases)
 
 
 def load(path: Path) -> PhaseRecord:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -19,17 +18,17 @@ from pydantic import AfterValidator, model_validator
 
 from mcml_sim import Medium, Setting, exact
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.arrays import Floats
+from mcml_sim.media.arrays import Floats, is_number, require
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
-from profilefit.recipes import record, schema
-from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Table, Text, words
+from profilefit.recipes import record
+from profilefit.recipes.declared import LISTED, Declared, Keys, OneOf, Refused, Table, Text, is_line, words
 from profilefit.recipes.folder import STACKS, fits_folder, is_file
+from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, Measure, Numbers, WholeRecord, damage
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
-from profilefit.recipes.schema import COUNT, DIGEST, LIST, MEASURE, NUMBER, NUMBERS, TABLE, TEXT, Fields, under
 from profilefit.recipes.stack import fit as stacks
 from profilefit.recipes.stack.file import Layered, LayerStack, read_layers
 from profilefit.recipes.stack.fit import USUAL, TracedRings, Tracing
@@ -45,36 +44,7 @@ TRACED_NOTE = (
     "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
     "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
 )
-# What shader sources and pictures take from a record besides its laws, by dotted key; what a report shows, too.
-QUALITY: Fields = {
-    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), NUMBERS),
-    "quality.regenerated.delta_A": NUMBER,
-}
-USED: Fields = {
-    **dict.fromkeys(("unit", "equations", "note"), TEXT),
-    "layers": LIST,
-    **under("half_spaces", {" ".join(CHANNELS): LIST}),
-    **QUALITY,
-    "data_digest": DIGEST,
-}
-# Of each interface: its errors at thicknesses that were not fitted, and how its fit ended.
-BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")
-OF_INTERFACES: Fields = {
-    "quality fit starts": LIST,
-    **under("quality.*", {" ".join(BY_THICKNESS): NUMBERS}),
-    **under("fit.*", {"result": TEXT, "condition_number": MEASURE, "steps": COUNT}),
-    **under("starts.*", {"as_good count": COUNT}),
-}
-# What `profilefit report` shows of a stack.
-SHOWN: Fields = {
-    **schema.TOLD,
-    "unit": TEXT,
-    "layers": LIST,
-    **under("layers.*", {"name": TEXT, "thickness": MEASURE, "n g": NUMBER, "mu_a mu_s": NUMBERS}),
-    **dict.fromkeys(("quality", "quality.regenerated"), TABLE),
-    **QUALITY,
-    **under("interfaces", {key: one for name in CHANNELS for key, one in under(name, OF_INTERFACES).items()}),
-}
+BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")  # errors of an interface where none was fitted
 EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
 STARTS = f"lists of {', '.join(StackLaw.constant_names())}, one an interface: w in (0, 1), all but u > 0"
@@ -116,7 +86,7 @@ class StackRequest(Layered):
     @classmethod
     def of(cls, file: str, content: object, error: type[InputError] = InputError) -> Self:
         """Return the stack of a file's content; InputError as for any table, and on a file without a printable name."""
-        if not schema.is_line(Path(file).stem):
+        if not is_line(Path(file).stem):
             raise error(f"{file!r}: the name of a stack must be one printable line")
         return super().of(file, content, error)
 
@@ -141,6 +111,53 @@ class StackRequest(Layered):
                 raise Refused(STARTS, [list(row) for row in rows], "start", channel)
         if self.start is not None and any(layer.g for layer in self.layers):
             raise Refused("left out where a layer scatters forward", "a table", "start")
+        return self
+
+
+QUALITY = Keys(regenerated=Keys(rel=Numbers, ks=Numbers, delta_A=float))
+HalfSpaces = Annotated[list[Any], words("a list")]  # of what is compared with the laws of today
+Thickness = Annotated[Table, Keys({"thickness": Measure})]  # no image: a record is no reason to open another file
+
+
+class UsedStack(LawRecord):
+    """Record with what shader sources and pictures take from it besides its laws."""
+
+    unit: str
+    equations: str
+    note: str
+    layers: list[Thickness]
+    half_spaces: Annotated[Table, Keys(**dict.fromkeys(CHANNELS, HalfSpaces))]
+    quality: Annotated[Table, QUALITY]
+    data_digest: Digest
+
+
+ShownLayer = Annotated[Table, Keys(name=str, thickness=Measure, n=float, g=float, mu_a=Numbers, mu_s=Numbers)]
+OfThickness = Annotated[Table, Keys(**dict.fromkeys(BY_THICKNESS, Numbers))]
+Solved = Annotated[Table, Keys(**SOLVED, steps=Count)]
+Started = Annotated[Table, Keys(as_good=Count, count=Count)]
+INTERFACES = Keys(quality=list[OfThickness], fit=list[Solved], starts=list[Started])
+
+
+class ShownStack(WholeRecord, LawRecord):
+    """Record with what `profilefit report` shows of a stack."""
+
+    unit: str
+    layers: list[ShownLayer]
+    quality: Annotated[Table, QUALITY]
+    interfaces: Annotated[Table, Keys(**dict.fromkeys(CHANNELS, INTERFACES))]
+
+    @model_validator(mode="after")
+    def _matching(self) -> Self:
+        """Refuse a list that is not as long as others, and a record without a constant of its laws."""
+        count = len(self.layers) - 1
+        for channel, tables in self.interfaces.items():
+            for key, rows in tables.items():
+                if len(rows) != count:
+                    raise Refused(f"{count}, one an interface", len(rows), "interfaces", channel, key)
+            if any(len(set(map(len, row.values()))) > 1 for row in tables["quality"]):
+                raise Refused("tables of lists of one length", tables["quality"], "interfaces", channel, "quality")
+        places, names = interfaces({"layers": self.layers}), StackLaw.constant_names()
+        self.require_constants(f"{channel}.{number}.{name}" for channel, number in places for name in names)
         return self
 
 
@@ -215,7 +232,7 @@ def quality(interface: stacks.Interface, tracing: Tracing = USUAL) -> dict[str, 
 
 def read(path: Path) -> dict[str, Any]:
     """Return all that a record says, of which a report makes no law; RecordError on one that is damaged."""
-    return record.read_of(path, PIPELINE, "the record of a stack", SHOWN, _mismatched)
+    return record.read_of(path, PIPELINE, "the record of a stack", ShownStack)
 
 
 def load(path: Path) -> StackRecord:
@@ -251,30 +268,9 @@ def matching(of: StackRequest, folder: Path) -> StackRecord | None:
 
 def _opened(path: Path) -> tuple[dict[str, Any], LayerStack, Setting]:
     """Return what a record says, its layers and its setting; RecordError where it is damaged, or of no stack."""
-    content = record.read_of(path, PIPELINE, "the record of a stack")
+    content = record.read_of(path, PIPELINE, "the record of a stack", UsedStack)
     with damage(path):
-        for key, kind in USED.items():
-            value: Any = content
-            for name in key.split("."):
-                if not isinstance(value, Mapping):
-                    raise InputError(f"{key} must be {kind.words}, got nothing")
-                value = value[name]
-            if not kind.accepts(value):
-                raise InputError(f"{key} must be {kind.words}, got {schema.shown(value)}")
         return content, recorded_stack(str(path), content), record.record_setting(content)
-
-
-@contextmanager
-def damage(path: Path) -> Iterator[None]:
-    """Raise what is wrong inside a record as RecordError."""
-    try:
-        yield
-    except RecordError:
-        raise
-    except InputError as error:
-        raise record.damaged(path, str(error).removeprefix(f"{path}: ")) from None
-    except KeyError as error:
-        raise record.damaged(path, f"{error} is missing") from None
 
 
 def interfaces(content: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
@@ -284,13 +280,7 @@ def interfaces(content: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
 
 def recorded_stack(file: str, content: Mapping[str, Any]) -> LayerStack:
     """Return the layers of a record that has a list of them; InputError where no law fits them."""
-    layers = []
-    for layer in content["layers"]:
-        if not TABLE.accepts(layer):
-            raise InputError(f"layers must be tables, got {schema.shown(layer)}")
-        if not MEASURE.accepts(layer.get("thickness")):  # no image either: a record opens no other file
-            raise InputError(f"thickness must be {MEASURE.words}, got {schema.shown(layer['thickness'])}")
-        layers.append({key: value for key, value in layer.items() if value is not None})
+    layers = [{key: value for key, value in layer.items() if value is not None} for layer in content["layers"]]
     stack = read_layers(file, {"unit": content["unit"], "layers": layers})
     for medium in stack.media:
         stacks.require(medium)
@@ -402,9 +392,9 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
     They are the catalogue's current laws, which the record's constants must match. Where a layer scatters forward, all
     take the constants of the record instead. InputError where what is recorded is of another kind.
     """
-    for constants in recorded:
-        if not isinstance(constants, Mapping) or not all(map(schema.is_number, constants.values())):
-            raise InputError(f"half_spaces must be tables of numbers, got {schema.shown(constants)}")
+    for table in recorded:
+        holds = isinstance(table, dict) and all(map(is_number, table.values()))
+        require(holds, "half_spaces", "tables of numbers", table)
     if len(recorded) != len(medium.layers):
         raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
     if any(layer.g > 0 for layer in medium.layers):
@@ -434,17 +424,3 @@ def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequenc
     if not isinstance(law, StackLaw):
         raise RecordError(f"record {content.get('name')!r} is damaged: it has fewer than two layers")
     return law
-
-
-def _mismatched(content: Mapping[str, Any]) -> str | None:
-    """Return which list must be as long as others, or which constant is missing; None where all are right."""
-    count = len(content["layers"]) - 1
-    for channel in CHANNELS:
-        one = content["interfaces"][channel]
-        for key in ("quality", "fit", "starts"):
-            if len(one[key]) != count:
-                return f"interfaces.{channel}.{key} must be {count}, one an interface, got {len(one[key])}"
-        if any(len({len(each[name]) for name in BY_THICKNESS}) > 1 for each in one["quality"]):
-            return f"interfaces.{channel}.quality must have {', '.join(BY_THICKNESS)} of one length"
-    own = StackLaw.constant_names()
-    return schema.missing_constant(content, (f"{place}.{n}.{name}" for place, n in interfaces(content) for name in own))

@@ -19,7 +19,7 @@ from profilefit.fitting.estimate import JACKKNIFE_GROUPS, jackknife_error, judge
 from profilefit.fitting.solver import Solution, solve, with_curvature
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.materials import CHANNELS
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.fit import USUAL, Tracing
 

@@ -12,8 +12,9 @@ from typing import Any
 from rich.console import RenderableType
 
 from mcml_sim.files.text_file import read_json
+from mcml_sim.media.arrays import is_number, shown
 from profilefit.errors import InputError
-from profilefit.recipes.schema import is_line, is_number, shown
+from profilefit.recipes.declared import is_line
 from profilefit.report.tables.cells import row_table, significant
 from profilefit.report.tables.markdown import markdown_table
 

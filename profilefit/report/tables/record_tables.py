@@ -19,7 +19,6 @@ from mcml_sim.media.setting import Setting
 from profilefit.recipes import record
 from profilefit.recipes.checks import SAME_COST
 from profilefit.recipes.reproduction import NORMALIZED_DIFFUSION
-from profilefit.recipes.schema import ERRORS
 from profilefit.report import records
 from profilefit.report.records import SETS, Content, at_index, converged, largest_error
 from profilefit.report.tables import cells
@@ -381,7 +380,7 @@ def outcome(path: Path) -> dict[str, Any]:
     body: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
     if "fit" not in content:
         return {**body, "readings": len(content.get("readings", []))}
-    kept = ("published", "regenerated", *ERRORS)
+    kept = ("published", "regenerated", *record.ERRORS)
     constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
     return {**body, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 

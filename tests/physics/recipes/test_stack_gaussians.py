@@ -124,8 +124,8 @@ def test_derivatives_are_those_of_the_formula():
         values, jacobian = gaussians._off(found.variances, found.weights, lights)
         np.testing.assert_allclose(values, off(at), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(jacobian, jax.jit(jax.jacfwd(off))(at), rtol=1e-8, atol=1e-12)
-        whole = found.slopes.T @ bent @ found.slopes
-        np.testing.assert_allclose(gaussians.curvature(found.variances, found.weights, found.slopes, lights), whole, rtol=1e-8, atol=1e-12)
+        own = gaussians.curvature(found.variances, found.weights, found.slopes, lights)
+        np.testing.assert_allclose(own, found.slopes.T @ bent @ found.slopes, rtol=1e-8, atol=1e-12)
         parameters = np.array([-1.0, 0.5, 0.3, -0.7])
         level, weights, slopes = gaussians._of(parameters, 2)
         np.testing.assert_allclose(np.append(level, weights), unbounded(jnp.asarray(parameters)), rtol=1e-12)

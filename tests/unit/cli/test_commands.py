@@ -263,7 +263,7 @@ def test_a_damaged_record_is_one_line(refused):
     content = json.loads((FITS / "liang-whole.json").read_text())
     del content["fit"]
     Path("fits/liang-whole.json").write_text(json.dumps(content))
-    refused("report liang-whole", "fits/liang-whole.json: is damaged: fit must be a table, got nothing; regenerate it")
+    refused("report liang-whole", "fits/liang-whole.json: is damaged: table [fit] is missing; regenerate it")
 
 
 @pytest.mark.slow

@@ -19,8 +19,7 @@ from profilefit.recipes.declared import words as in_words
 from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.kinds import albedo_map, law
 from profilefit.recipes.recipe import find, read
-from profilefit.recipes.record import record_name, spanning_name
-from profilefit.recipes.schema import PIPELINES
+from profilefit.recipes.record import PIPELINES, record_name, spanning_name
 from profilefit.recipes.targets import require_known
 from tests.fixtures import refused
 

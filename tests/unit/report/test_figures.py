@@ -162,7 +162,7 @@ def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
             one.pop("regenerated")
 
     folder = folder_with(tmp_path, "burley-whole", edit=edit)
-    with pytest.raises(RecordError, match=r"is damaged: constants\.s0\.regenerated must be a number, got nothing"):
+    with pytest.raises(RecordError, match=r"is damaged: \[constants\.s0\] regenerated must be .*number, got nothing"):
         draw_all(folder, tmp_path / "out")
     shutil.copy(SHIPPED / "burley-whole.json", folder)
     (folder / "burley-whole.npz").unlink()

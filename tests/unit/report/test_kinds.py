@@ -13,7 +13,7 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
 from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.kinds.stack import interfaces, read
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
 from profilefit.report.figures.record_figures import OF_SUMS, plans, sum_caption, sums_of
 from profilefit.report.kinds import TABLES, published, stack_tables, sum_tables

@@ -182,14 +182,14 @@ DAMAGE = [
     ("constants/red.1.w", GONE, r"'red.1.w' is missing"),
     ("half_spaces/green/1/a00", lambda a: 1.001 * a, r"was fitted with other constants of its half spaces"),
     ("half_spaces/red/0/a00", GONE, r"was fitted with other constants .*"),
-    ("half_spaces", 3, r"half_spaces must be a table, got 3"),
-    ("half_spaces/red", "x", r"half_spaces.red must be a list, got \"x\""),
+    ("half_spaces", 3, r"half_spaces must be a table \[half_spaces\], got 3"),
+    ("half_spaces/red", "x", r"\[half_spaces\] red must be a list, got 'x'"),
     ("half_spaces/red/0", 1, r"half_spaces must be tables of numbers, got 1"),
     ("half_spaces/red/0/a00", [1.0], r"half_spaces must be tables of numbers, got \{"),
     ("half_spaces/red/0", GONE, r"half_spaces must be 2, one a layer, got 1"),
-    ("layers", GONE, r"'layers' is missing"),
-    ("layers", "x", r"layers must be a list, got \"x\""),
-    ("layers/0", 3, r"layers must be tables, got 3"),
+    ("layers", GONE, r"table \[\[layers\]\] is missing"),
+    ("layers", "x", r"layers must be tables \[\[layers\]\], got 'x'"),
+    ("layers/0", 3, r"layers must be tables \[\[layers\]\], got \[3, "),
     ("layers/1", GONE, r"the last layer must be infinitely thick, got 0.3"),
     ("layers/0", GONE, r"half_spaces must be 1, one a layer, got 2"),
     ("layers/1/thickness", 2.0, r"the last layer must be infinitely thick, got 2"),
@@ -199,29 +199,29 @@ DAMAGE = [
     ("layers/1/n", 1.5, r"layers must have one n for a law of a stack"),
     ("setting/n", 1.5, r"setting.n must be that of its layers, got 1.5"),
     # Whatever is at that place: a record is no reason to open another file.
-    ("layers/0/thickness", {"image": "thickness.png"}, r"thickness must be a number or null, got \{\"image\""),
-    ("note", GONE, r"'note' is missing"),
-    ("quality", GONE, r"'quality' is missing"),
-    ("quality/regenerated/rel", [], r"quality.regenerated.rel must be a list of numbers, got \[\]"),
-    ("quality/regenerated", 1, r"quality.regenerated.rel must be a list of numbers, got nothing"),
-    ("data_digest", GONE, r"'data_digest' is missing"),
+    ("layers/0/thickness", {"image": "thickness.png"}, r"thickness must be a number or null, got \{'image'"),
+    ("note", GONE, r"note must be a text, got nothing"),
+    ("quality", GONE, r"table \[quality\] is missing"),
+    ("quality/regenerated/rel", [], r"\[quality.regenerated\] rel must be a list of numbers, got \[\]"),
+    ("quality/regenerated", 1, r"\[quality\] regenerated must be a table \[.*\], got 1"),
+    ("data_digest", GONE, r"data_digest must be 64 hexadecimal digits, got nothing"),
     ("setting/illumination", "sun", r"it has no valid setting"),
 ]
 
 
 PROFILE = ("pipeline", "profile", r"must be the record of a stack, got pipeline 'profile'")
-EITHER = [PROFILE, ("unit", 3, r"unit must be one line of printable text, .*, got 3")]
+EITHER = [PROFILE, ("unit", 3, r"unit must be a text, got 3")]
 # What a report cannot show.
 NOT_SHOWN = [
-    ("interfaces", GONE, r"interfaces must be a table, got nothing"),
-    ("interfaces/green", GONE, r"interfaces.green must be a table, got nothing"),
-    ("interfaces/blue/quality/0/rel", GONE, r"interfaces.blue.quality.0.rel must be a list of numbers, got nothing"),
-    ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"blue.quality must have thickness, rel, ks, delta_A of one length"),
-    ("interfaces/red/fit/0", GONE, r"interfaces.red.fit must be 1, one an interface, got 0"),
-    ("interfaces/red/starts/0/count", 0.5, r"interfaces.red.starts.0.count must be a whole number, got 0.5"),
-    ("layers/1/mu_a", 1, r"layers.1.mu_a must be a list of numbers, got 1"),
-    ("constants/green.1.k0", GONE, r"constants.green.1.k0 must be a table, got nothing"),
-    ("quality/regenerated", GONE, r"quality.regenerated must be a table, got nothing"),
+    ("interfaces", GONE, r"table \[interfaces\] is missing"),
+    ("interfaces/green", GONE, r"table \[interfaces.green\] is missing"),
+    ("interfaces/blue/quality/0/rel", GONE, r"\[interfaces.blue.quality 1\] rel must be a list of numbers, got noth"),
+    ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"blue\] quality must be tables of lists of one length"),
+    ("interfaces/red/fit/0", GONE, r"\[interfaces.red\] fit must be 1, one an interface, got 0"),
+    ("interfaces/red/starts/0/count", 0.5, r"\[interfaces.red.starts 1\] count must be a whole number, got 0.5"),
+    ("layers/1/mu_a", 1, r"\[layers 2\] mu_a must be a list of numbers, got 1"),
+    ("constants/green.1.k0", GONE, r"\[constants\] green.1.k0 must be a table, got nothing"),
+    ("quality/regenerated", GONE, r"table \[quality.regenerated\] is missing"),
 ]
 
 
@@ -372,8 +372,8 @@ CAUSES = [
     (None, "{", r"is not a record: "),
     (None, "[]", r"is not a record of format 1 or 2, got 'list'"),
     PROFILE,
-    ("layers", GONE, r"'layers' is missing"),
-    ("layers/0", 3, r"layers must be tables, got 3"),
+    ("layers", GONE, r"table \[\[layers\]\] is missing"),
+    ("layers/0", 3, r"layers must be tables \[\[layers\]\], got \[3, "),
     ("setting/illumination", "sun", r"record 'heart' is damaged: it has no valid setting"),
 ]
 

@@ -13,7 +13,7 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS, fits_folder
 from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
-from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.record import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names
 from tests.fixtures import recorded
 from tests.unit.recipes.stack.test_record import GONE, RUN, SHIPPED, STACK, refused_record, spoil
@@ -76,17 +76,17 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
 
 DAMAGE = [
     ("pipeline", "stack", r"must be a record of sums of Gaussians, got pipeline 'stack'"),
-    ("sums", GONE, r"sums must be a table, got nothing"),
-    ("sums/diffuse", GONE, r"sums.diffuse must be a table, got nothing"),
-    ("sums/diffuse/by_count/7", GONE, r"sums.diffuse.by_count must be 8, one a number of Gaussians, got 7"),
-    ("sums/searchlight/by_count/3/rel", "x", r"sums.searchlight.by_count.3.rel must be a list of numbers, got \"x\""),
-    ("sums/searchlight/by_count/3/ks", [0.1, 0.2], r"sums.searchlight.by_count.3.ks must be 3, one a colour, got 2"),
-    ("sums/searchlight/reflectance", [0.5, 0.4, -0.3], r"sums.searchlight.reflectance must be in \(0, 1\]"),
-    ("constants/diffuse.6.green.w2", GONE, r"constants.diffuse.6.green.w2 must be a table, got nothing"),
+    ("sums", GONE, r"table \[sums\] is missing"),
+    ("sums/diffuse", GONE, r"table \[sums.diffuse\] is missing"),
+    ("sums/diffuse/by_count/7", GONE, r"\[sums.diffuse\] by_count must be 8, one a number of Gaussians, got 7"),
+    ("sums/searchlight/by_count/3/rel", "x", r"\[sums.*by_count 4\] rel must be a list of numbers, .*, got 'x'"),
+    ("sums/searchlight/by_count/3/ks", [0.1, 0.2], r"\[sums.*by_count 4\] ks must be .*, one a colour, got \[0.1, "),
+    ("sums/searchlight/reflectance", [0.5, 0.4, -0.3], r"\[sums.searchlight\] reflectance must be .* in \(0, 1\]"),
+    ("constants/diffuse.6.green.w2", GONE, r"\[constants\] diffuse.6.green.w2 must be a table, got nothing"),
     ("constants/diffuse.6.v2/regenerated", 1e-9, r"constants.diffuse.6.v1 and on must rise from above 0"),
     ("constants/diffuse.1.v1/regenerated", -1.0, r"constants.diffuse.1.v1 and on must rise from above 0"),
     ("constants/diffuse.6.red.w2/regenerated", 0.9, r"diffuse.6: weights of a colour must be >= 0 and sum to 1"),
-    ("layers", "x", r"layers must be a list, got \"x\""),
+    ("layers", "x", r"layers must be tables \[\[layers\]\], got 'x'"),
     ("layers/1/thickness", 2.0, r"the last layer must be infinitely thick, got 2"),
     ("setting/illumination", "sun", r"it has no valid setting"),
 ]
