@@ -40,8 +40,7 @@ from benchmarks import entering
 from benchmarks.entering import Entry
 from benchmarks.table import show
 from mcml_sim import Setting
-from mcml_sim.files.text_file import as_json
-from mcml_sim.files.whole_file import write_whole
+from mcml_sim.files.whole_file import as_json, write_whole
 from profilefit import convert
 from profilefit.convert.colour import wrenninge_alpha
 from profilefit.convert.engine import skin_alpha

@@ -26,8 +26,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from mcml_sim.cli.screen import show
-from mcml_sim.files.text_file import as_json
-from mcml_sim.files.whole_file import write_whole
+from mcml_sim.files.whole_file import as_json, write_whole
 from profilefit.recipes.evidence import measurement_origin, require_apart, stale
 from profilefit.report.tables.claims_table import EXACT, FILE, Claim, claim_tables, read_claims
 

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.table import show
-from mcml_sim.files.text_file import as_json
-from mcml_sim.files.whole_file import write_whole
+from mcml_sim.files.whole_file import as_json, write_whole
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import WAYS, FurTrial, LayerTechnique, error_of, trial
 from profilefit.studies.choose.scenes import RandomFur, cheapest

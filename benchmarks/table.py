@@ -11,8 +11,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from mcml_sim.files.text_file import as_json
-from mcml_sim.files.whole_file import write_whole
+from mcml_sim.files.whole_file import as_json, write_whole
 
 WIDTH = 160  # of what is not a terminal
 Rows = list[tuple[str | float, ...]]

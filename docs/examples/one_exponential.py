@@ -4,8 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from mcml_sim import Setting
-from profilefit.laws.base import Sampler
-from profilefit.laws.escape import EscapeLaw
+from profilefit.laws.base import EscapeLaw, Sampler
 from profilefit.laws.rational import Rational
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 from rich.measure import Measurement
 
-from mcml_sim.files.text_file import as_json as json_text
+from mcml_sim.files.whole_file import as_json as json_text
 from mcml_sim.files.whole_file import write_whole
 
 WIDEST = 1000  # columns that any table fits

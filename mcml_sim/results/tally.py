@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.files.npz import read_npz
-from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
+from mcml_sim.files.whole_file import checked_path, parse_json, read_whole, write_whole
 from mcml_sim.media.arrays import MAX_PHOTONS, Floats, checked_whole, is_number, require, scalar_or_array, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium, specular_reflectance

@@ -28,9 +28,8 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import ELSEWHERE, RESUMES, Notice, OutputError, StoreError
 from mcml_sim.files.npz import read_npz
-from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import UNFINISHED, reason_of, write_whole
+from mcml_sim.files.whole_file import UNFINISHED, parse_json, reason_of, write_whole
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].

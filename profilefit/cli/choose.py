@@ -55,7 +55,7 @@ def choose(
       profilefit choose examples/layers-head.toml
     """
     from mcml_sim.cli.screen import answer
-    from mcml_sim.files.text_file import read_toml
+    from mcml_sim.files.whole_file import read_toml
     from profilefit.errors import InputError
 
     content = read_toml(scene)

@@ -244,7 +244,7 @@ def _medium(file: Path, unit: str) -> Medium:
     """Return the stack of a file, in the data's unit of length."""
     from dataclasses import replace
 
-    from mcml_sim.files.text_file import read_toml
+    from mcml_sim.files.whole_file import read_toml
     from profilefit.measured.data import factor
     from profilefit.recipes.stack.file import read_layers
 

@@ -10,7 +10,7 @@ import typer
 
 from profilefit.cli.options import AsJson, Quiet, refused
 from profilefit.errors import InputError
-from profilefit.recipes.folder import shipped
+from profilefit.recipes.kinds import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")
@@ -41,10 +41,9 @@ def scene(
       profilefit scene examples/skin-head.toml --out pictures
     """
     from mcml_sim.cli.screen import notes, print_json, screen, typed
-    from mcml_sim.files.text_file import as_json as json_text
-    from mcml_sim.files.text_file import read_toml
     from mcml_sim.files.version import __version__
-    from mcml_sim.files.whole_file import require_writable, write_together
+    from mcml_sim.files.whole_file import as_json as json_text
+    from mcml_sim.files.whole_file import read_toml, require_writable, write_together
     from mcml_sim.runs.progress import working
     from profilefit.shader.context import opened, renderer
 

@@ -19,7 +19,7 @@ def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of th
       profilefit schema scene
       profilefit schema stack
     """
-    from mcml_sim.files.text_file import as_json
+    from mcml_sim.files.whole_file import as_json
     from profilefit.errors import InputError
 
     if kind not in FILES:

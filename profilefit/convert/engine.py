@@ -31,7 +31,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting
 from mcml_sim.exact.light import unreduced
-from mcml_sim.files.text_file import parse_toml
+from mcml_sim.files.whole_file import parse_toml
 from mcml_sim.media.arrays import Floats
 from profilefit.convert import lengths
 from profilefit.convert.colour import MAPS, mapped_colour, reflectance_of, reflectance_rough, wrenninge_colour

@@ -22,6 +22,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.exact import single_scattering
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
 from mcml_sim.media.arrays import Floats, checked_numbers, require_all, require_one_shape, require_own_process
@@ -386,6 +387,32 @@ class ProfileLaw(Constants):
         """Share of the reflected energy within radius r [-]. `r` and `mfp` in one unit; all broadcast."""
         by, length = self.similar(alpha, mfp)
         return self.scaled_cdf(r / length, by)
+
+
+class EscapeLaw(ProfileLaw):
+    """A law whose cdf tends to 1 by itself, scaled to A by `albedo`: R_d = A `scaled_density` / (2 pi x)."""
+
+    albedo: Normalisation = eqx.field(static=True)
+
+    @abc.abstractmethod
+    def scaled_density(self, x: Array, alpha: Array) -> Array:
+        """2 pi x R_d / A [1/mfp], finite at x = 0."""
+
+    def text_numbers(self) -> dict[str, float]:
+        """Return the strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
+        return {"source": single_scattering.source_strength(self.setting)}
+
+    def source_hazard(self, alpha) -> Array:
+        """lambda_0 = lim 2 pi x R_d / A at x = 0 [1/mfp]: light scattered once, exact, over A."""
+        return single_scattering.source_strength(self.setting) * self.albedo.albedo_over_reflectance(alpha)
+
+    def scaled_profile(self, x: Array, alpha: Array) -> Array:
+        near = jnp.maximum(x, jnp.finfo(jnp.result_type(x, float)).tiny)
+        value = self.reflected(alpha) * self.scaled_density(near, alpha) / (2.0 * jnp.pi * near)
+        return jnp.where((x > 0) | (alpha == 0), value, jnp.inf)
+
+    def source_strength(self, alpha: Array) -> Array:
+        return single_scattering.source_strength(self.setting) * alpha
 
 
 class Sampler(eqx.Module):

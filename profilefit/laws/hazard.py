@@ -15,8 +15,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from profilefit.laws.base import CLAMPS, Entry, Sampler, Text
-from profilefit.laws.escape import EscapeLaw, decay_rate
+from profilefit.laws.base import CLAMPS, Entry, EscapeLaw, Sampler, Text
+from profilefit.laws.surface import decay_rate
 
 NEAREST = 1e-25  # x [mfp] that stands for 0: every quotient stays finite, x ln x is 0
 FARTHEST = 1e8  # x [mfp]: no light is left, and x^4 is finite in float32

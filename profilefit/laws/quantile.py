@@ -12,9 +12,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from profilefit.laws.base import CLAMPS, Entry, Range, Sampler, Text, evaluated
-from profilefit.laws.escape import EscapeLaw, decay_rate
+from profilefit.laws.base import CLAMPS, Entry, EscapeLaw, Range, Sampler, Text, evaluated
 from profilefit.laws.liang import QUANTILES
+from profilefit.laws.surface import decay_rate
 
 # The scales of t of the two fractions in M: of the grid 2, 2.5, 3 and 0.3, 0.5, 0.7, 1 those of the least error that
 # serve both lights.

@@ -10,7 +10,7 @@ from jax import Array
 
 from profilefit.errors import InputError
 from profilefit.laws.base import CLOSED, Constants, ProfileLaw, evaluated
-from profilefit.laws.escape import decay_rate
+from profilefit.laws.surface import decay_rate
 
 THICKEST = 1e6  # mean free paths that stand for an infinite first layer
 LEAST_DECAY = 1e-4  # over l: where nothing is absorbed A tends to A_1 all the same, within 1e-4

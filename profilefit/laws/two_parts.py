@@ -14,11 +14,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.exact.light import reduced, unreduced
-from profilefit.laws.base import CLAMPS, CLOSED, Entry, ProfileLaw, Sampler, Text
-from profilefit.laws.escape import EscapeLaw, decay_rate
+from profilefit.laws.base import CLAMPS, CLOSED, Entry, EscapeLaw, ProfileLaw, Sampler, Text
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
 from profilefit.laws.rational import COSINES, INDICES, REFRACTING, FoldedRational
-from profilefit.laws.surface import Number, RefractingSurface, surface_of
+from profilefit.laws.surface import Number, RefractingSurface, decay_rate, surface_of
 
 ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there
 LEAST_W = 1e-3  # of -w [1/mfp]: h must be positive

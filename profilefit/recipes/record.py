@@ -22,14 +22,13 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from mcml_sim.files.npz import read_npz
-from mcml_sim.files.text_file import MOST_JSON, parse_json
-from mcml_sim.files.text_file import plain as to_plain
-from mcml_sim.files.whole_file import read_whole, require_folder, write_together
+from mcml_sim.files.whole_file import MOST_JSON, parse_json, read_whole, require_folder, write_together
+from mcml_sim.files.whole_file import plain as to_plain
 from mcml_sim.media.arrays import is_number, require, shown
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.recipes.declared import LONGEST_RECORDED, Declared, Keys, OneOf, Refused, Table, is_line, words
-from profilefit.recipes.folder import available, fits_folder, is_file
+from profilefit.recipes.kinds import available, fits_folder, is_file
 
 FORMAT = 2
 # What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.
@@ -443,7 +442,7 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """Return `text_file.plain` with the digits of a record; None for what is not finite."""
+    """Return `whole_file.plain` with the digits of a record; None for what is not finite."""
     return to_plain(value, DIGITS)
 
 

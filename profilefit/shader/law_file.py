@@ -21,7 +21,7 @@ from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
 from profilefit.recipes.catalogue import LoadedLaw, not_found
-from profilefit.recipes.folder import known_folder
+from profilefit.recipes.kinds import known_folder
 from profilefit.recipes.record import ERRORS, Folder, Records
 from profilefit.shader import emit
 
@@ -226,7 +226,7 @@ def _provenance(source: _Source) -> list[str]:
         lines.append(f"and every mean cosine g above {span[0]:g} up to {span[1]:g}")
     measured = content["quality"]["regenerated"] | content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
-    if worst := [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]:
+    if worst := [f"{one.words} at most {np.max(measured[one.name]):.2g}" for one in known]:
         lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
     if content.get("data_digest"):
         lines.append(f"sha256 of the data {content['data_digest']}")

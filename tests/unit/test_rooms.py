@@ -280,7 +280,7 @@ def test_files_are_declared_in_one_way():
     assert {"pydantic.BaseModel", "pydantic.ValidationError"} <= machine
     assert {name.removeprefix("pydantic.") for names in homes.values() for name in names} == FIELDS
     assert set(imports_of(ROOT, PACKAGES, "pydantic_core")) == {DECLARED}
-    assert set(imports_of(ROOT, PACKAGES, "tomllib")) == {"mcml_sim.files.text_file"}
+    assert set(imports_of(ROOT, PACKAGES, "tomllib")) == {"mcml_sim.files.whole_file"}
 
 
 def test_scipy_minimises_nothing():

@@ -16,8 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mcml_sim.exact.half_space import require_solved
-from mcml_sim.files.text_file import read_toml
-from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
+from mcml_sim.files.whole_file import ROOM, read_toml, read_whole, write_whole
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import AfterValidator, model_validator
 
 from mcml_sim import Medium, Setting, exact
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.arrays import Floats, is_number, require
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import DamagedRecord, InputError, RecordError
@@ -26,7 +26,7 @@ from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.declared import LISTED, Declared, Keys, OneOf, Refused, Table, Text, is_line, words
-from profilefit.recipes.folder import STACKS, fits_folder, is_file
+from profilefit.recipes.kinds import STACKS, fits_folder, is_file
 from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, Measure, Numbers, WholeRecord, damage
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.stack import fit as stacks

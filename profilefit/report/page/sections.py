@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from mcml_sim.files.text_file import MOST_JSON, parse_json
-from mcml_sim.files.whole_file import read_whole
+from mcml_sim.files.whole_file import MOST_JSON, parse_json, read_whole
 from profilefit.errors import InputError
 from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.recipes.evidence import digest, stale

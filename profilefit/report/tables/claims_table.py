@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import RenderableType
 
-from mcml_sim.files.text_file import read_json
+from mcml_sim.files.whole_file import read_json
 from mcml_sim.media.arrays import is_number, shown
 from profilefit.errors import InputError
 from profilefit.recipes.declared import is_line

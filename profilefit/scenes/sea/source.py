@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.scenes.sea.law import WaterGaussians, water_gaussians

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import ConfigDict, Field
 
 from mcml_sim import Setting
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.arrays import shown
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LENGTHS, LISTED, Declared, NumberRange, OneOf, Range, Table, Tolerance, words

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.files.text_file import as_json, read_json
-from mcml_sim.files.whole_file import write_whole
+from mcml_sim.files.whole_file import as_json, read_json, write_whole
 from profilefit.errors import InputError
 from profilefit.studies.tradeoff import fits, laws, samplers, scenes, truth
 from profilefit.studies.tradeoff.points import TradeoffPart

@@ -15,10 +15,9 @@ from mcml_sim.exact import single_scattering
 from mcml_sim.exact.light import reduced, unreduced
 from profilefit import SettingError, albedo_law, load, profile_quality
 from profilefit.laws import hazard
-from profilefit.laws.escape import NEAR_WHITE, decay_rate
 from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, cumulative, density, early_share, growth
 from profilefit.laws.rational import Rational, RefractingRational
-from profilefit.laws.surface import surfaces_of
+from profilefit.laws.surface import NEAR_WHITE, decay_rate, surfaces_of
 from profilefit.laws.two_parts import RefractingHazard, drawn
 from tests.fixtures import refused, slow
 

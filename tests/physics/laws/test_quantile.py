@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.laws.escape import decay_rate
 from profilefit.laws.quantile import FARTHEST, Quantile, depth, radius
+from profilefit.laws.surface import decay_rate
 from profilefit.recipes import catalogue
 
 # The searchlight's constants, rounded: tests of the form must not move with a record.

@@ -14,7 +14,7 @@ import pytest
 from matplotlib import image
 
 from mcml_sim import Setting
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
 from profilefit.shader import opened

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from profilefit.recipes import catalogue
 from profilefit.recipes.catalogue import find
 from profilefit.recipes.evidence import stale

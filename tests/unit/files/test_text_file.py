@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim.files import text_file
-from mcml_sim.files.text_file import MOST_LEVELS, MOST_TOML, as_json, parse_json, parse_toml, read_json, read_toml
+from mcml_sim.files import whole_file
+from mcml_sim.files.whole_file import MOST_LEVELS, MOST_TOML, as_json, parse_json, parse_toml, read_json, read_toml
 from tests.fixtures import refused
 
 
@@ -49,7 +49,7 @@ NO_JSON = {
     b'{"a": 1, "b": {"a": 2, "a": 3}}': "the key 'a' twice in one object",
     b'["\\ud800"]': "'utf-8' codec can't encode character",
     b'{"\\ud800": 1}': "'utf-8' codec can't encode character",
-    b" " * (text_file.MOST_JSON + 1): f"more than {text_file.MOST_JSON} bytes",
+    b" " * (whole_file.MOST_JSON + 1): f"more than {whole_file.MOST_JSON} bytes",
 }
 NO_TOML = {
     b"a = ": "Invalid value",
@@ -132,8 +132,8 @@ def test_every_kind_of_number_text_and_container():
 
 def test_no_digit_is_lost_unless_asked():
     value = 0.1 + 0.2
-    assert text_file.plain(value) == value
-    assert text_file.plain(value, 12) == 0.3
+    assert whole_file.plain(value) == value
+    assert whole_file.plain(value, 12) == 0.3
     assert json.loads(as_json(math.pi)) == math.pi
 
 

@@ -34,7 +34,7 @@ from unittest import mock
 import pytest
 
 from mcml_sim.errors import InputError, OutputError, StoreError
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from mcml_sim.results.mci import read_mci
 from mcml_sim.results.tally import read_results
 from profilefit.cli.report import report

@@ -16,12 +16,11 @@ import profilefit
 from mcml_sim import Setting
 from mcml_sim.runs.input_runs import Compiling
 from profilefit import laws
-from profilefit.laws.base import BLOCKS, Entry, Range, Sampler, Text, evaluated
-from profilefit.laws.escape import EscapeLaw
+from profilefit.laws.base import BLOCKS, Entry, EscapeLaw, Range, Sampler, Text, evaluated
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record
-from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.kinds import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.recipes.targets import require_known, starting_law
 from profilefit.shader import emit

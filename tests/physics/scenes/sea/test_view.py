@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import read_toml
 from profilefit.scenes.sea import passes as views
 from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze
