@@ -26,7 +26,8 @@ from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
 from benchmarks.heart_fit import GRID, Errors, SplitLight, errors, fitted
 from benchmarks.table import show
 from mcml_sim.files.whole_file import read_toml
-from profilefit.recipes.kinds import shipped, stack
+from profilefit.recipes.folder import shipped
+from profilefit.recipes.kinds import stack
 from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.heart import chart, scene
 from profilefit.scenes.heart.law import Kernel, crossover_of

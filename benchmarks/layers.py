@@ -26,7 +26,7 @@ from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.medium import fresnel
 from profilefit.materials import CHANNELS
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.half_space import one_half_space

@@ -27,7 +27,7 @@ from mcml_sim import Medium
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import STACKS, fits_folder
+from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds.stack import StackRecord, load
 from profilefit.shader.check.law_cost import Cost, TimedText, text_costs, timed_text
 from profilefit.shader.check.shader_law import PROFILE, _Pass

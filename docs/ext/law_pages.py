@@ -18,7 +18,7 @@ from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import EVERYWHERE, AlbedoLaw, Entry, Text
 from profilefit.recipes.catalogue import LoadedLaw, albedo_laws, all_profiles
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SPANS, Folder, Records, record_name, record_setting
 from profilefit.report.figures.canvas import only
 from profilefit.report.figures.record_figures import Plan, quality_figure

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from profilefit.errors import OutputError
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 
 OUT = Path("examples")
 

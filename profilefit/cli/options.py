@@ -16,7 +16,7 @@ import typer
 from profilefit.errors import InputError, OtherRecords
 from profilefit.laws import PROFILES
 from profilefit.recipes import kinds
-from profilefit.recipes.kinds import EVIDENCE, fits_folder, known_folder
+from profilefit.recipes.folder import EVIDENCE, fits_folder, known_folder
 
 Fits = Annotated[
     Path | None, typer.Option(help="Folder of the records: ./fits if it has any, which is said, else the ones shipped.")

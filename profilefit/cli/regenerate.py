@@ -11,7 +11,7 @@ import typer
 
 from profilefit.cli import options
 from profilefit.errors import InputError
-from profilefit.recipes.kinds import LOCAL, fits_folder
+from profilefit.recipes.folder import LOCAL, fits_folder
 
 PHOTON_STORE = ".photons"
 SEED = 1

@@ -10,7 +10,7 @@ import typer
 
 from profilefit.cli.options import AsJson, Quiet, refused
 from profilefit.errors import InputError
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")

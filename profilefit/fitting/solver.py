@@ -235,7 +235,7 @@ def with_curvature(values: Floats, jacobian: Floats, hessian: Floats) -> tuple[F
         root = np.linalg.cholesky(hessian / np.outer(scale, scale))
     except np.linalg.LinAlgError:
         return values, jacobian
-    top: Floats = np.linalg.solve(root, jacobian.T @ values / scale)
+    top = np.asarray(np.linalg.solve(root, jacobian.T @ values / scale), float)
     rest = _squares(values) - _squares(top)
     if not rest >= 0:
         return values, jacobian

@@ -302,9 +302,12 @@ class Normalisation(AlbedoLaw):
     """A map that profile laws are scaled to their reflectance with."""
 
     @property
-    @abc.abstractmethod
     def entered(self) -> float:
-        """The share of the light that enters [-], which a white half space gives back."""
+        """The share of the light that enters [-], which a white half space gives back: all where nothing refracts."""
+        return 1.0
+
+    def text_numbers(self) -> dict[str, float]:
+        return {"entered": self.entered}
 
     @property
     def reflectances(self) -> Range:

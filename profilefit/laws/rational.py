@@ -39,13 +39,6 @@ class Rational(Normalisation):
     # The limits hold for any start, and this one gives A within 0.1.
     entry = replace(ENTRY, start={"b": 0.5, "c": 2.0, "d": 1.0}, text=Text("rational", ()))
 
-    @property
-    def entered(self) -> float:
-        return 1.0
-
-    def text_numbers(self) -> dict[str, float]:
-        return {"entered": self.entered}
-
     @evaluated
     def reflectance(self, alpha) -> Array:
         s = jnp.sqrt(1.0 - alpha)

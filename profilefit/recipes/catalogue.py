@@ -16,7 +16,7 @@ from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, Entry, Normalisation, ProfileLaw
 from profilefit.laws.rational import Rational
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import SEARCHLIGHT, Folder, Records, covers, record_setting
 
 Law = TypeVar("Law", bound=Constants)

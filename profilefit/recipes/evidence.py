@@ -18,7 +18,7 @@ from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import require_folder
 from profilefit.errors import InputError
 from profilefit.recipes import record
-from profilefit.recipes.kinds import LOCAL
+from profilefit.recipes.folder import LOCAL
 
 
 def measurement_origin(command: str, folder: Path) -> dict[str, Any]:

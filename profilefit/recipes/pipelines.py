@@ -25,7 +25,7 @@ from profilefit.laws.base import Constants
 from profilefit.recipes import recipe as recipe_file
 from profilefit.recipes import record
 from profilefit.recipes.checks import OWN_IS_BEATEN, crosscheck, discretisation_error, random_starts
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import Albedos, Recipe
 from profilefit.recipes.run import COMPARISONS, LAWS, MAPS, RecipeRun, RecordContent, Work
 from profilefit.recipes.targets import albedo_values, free, law_class, require_known, starting_law, truth_of

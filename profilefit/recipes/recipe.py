@@ -14,7 +14,7 @@ from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.recipes.declared import LISTED, LONGEST_RECORDED, Declared, OneOf, Refused, is_line, printable, words
-from profilefit.recipes.kinds import available, fits_folder
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.record import PIPELINES
 
 SEARCHLIGHT = Setting()

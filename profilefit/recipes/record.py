@@ -28,7 +28,7 @@ from mcml_sim.media.arrays import is_number, require, shown
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.recipes.declared import LONGEST_RECORDED, Declared, Keys, OneOf, Refused, Table, is_line, words
-from profilefit.recipes.kinds import available, fits_folder, is_file
+from profilefit.recipes.folder import available, fits_folder, is_file
 
 FORMAT = 2
 # What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.

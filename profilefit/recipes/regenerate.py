@@ -21,7 +21,7 @@ from scipy.stats import norm
 from mcml_sim.runs.progress import tracked
 from profilefit.errors import RecordError
 from profilefit.recipes import kinds, recipe, record
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.run import RecipeRun, Step, written
 from profilefit.recipes.workers import Workers
 

@@ -18,7 +18,8 @@ from profilefit.laws.phases import FORMS
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import PHASES, STACKS, Kind, gaussians, phase, stack
+from profilefit.recipes.folder import PHASES, STACKS
+from profilefit.recipes.kinds import Kind, gaussians, phase, stack
 from profilefit.recipes.phases import BANDS
 from profilefit.recipes.pipelines import read
 from profilefit.recipes.stack.gaussians import constant_names, quality

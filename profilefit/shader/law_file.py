@@ -21,7 +21,7 @@ from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
 from profilefit.recipes.catalogue import LoadedLaw, not_found
-from profilefit.recipes.kinds import known_folder
+from profilefit.recipes.folder import known_folder
 from profilefit.recipes.record import ERRORS, Folder, Records
 from profilefit.shader import emit
 

@@ -19,7 +19,8 @@ import profilefit
 from mcml_sim.cli.app import app as mcml_sim_cli
 from profilefit import cli
 from profilefit.recipes import catalogue, recipe
-from profilefit.recipes.kinds import STACKS, stack
+from profilefit.recipes.folder import STACKS
+from profilefit.recipes.kinds import stack
 from profilefit.shader.law_file import export
 from profilefit.shader.stack_text import export_stack
 from tests.site.test_wheel import run

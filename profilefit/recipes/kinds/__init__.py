@@ -8,21 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from importlib import import_module, resources
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from profilefit.errors import InputError, RecordError
 from profilefit.laws import MAPS, PROFILES
+from profilefit.recipes.folder import LOCAL, PHASES, STACKS, SUMS, available, fits_folder, known_folder
 
 if TYPE_CHECKING:
     from profilefit.recipes.run import RecipeRun, Work
-
-LOCAL = Path("fits")
-STACKS = "stacks"  # inside a folder of records: the folder of those of stacks
-SUMS = "gaussians"  # of their sums of Gaussians
-PHASES = "phases"  # of phase functions
-EVIDENCE = Path("evidence")  # what was measured with records: shader check, failures, times
 
 
 class KindModule(Protocol):
@@ -160,33 +155,3 @@ def _no_record(name: str, known: Mapping[Kind, Mapping[str, Path]], folder: Path
 def no_records(folder: Path) -> RecordError:
     """Return the error for a folder without records."""
     return RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
-
-
-def fits_folder() -> Path:
-    """Return the folder of recipes and records that came with this installation."""
-    return shipped("fits")
-
-
-def known_folder(requested: Path | None = None) -> Path:
-    """Return the folder requested, there or not, else ./fits where it has records of laws, else the shipped one."""
-    return requested or (LOCAL if available(LOCAL) else fits_folder())
-
-
-def available(folder: Path, ending: str = "json") -> dict[str, Path]:
-    """Return the records of a folder by name, in order, or files of another ending."""
-    return {path.stem: path for path in sorted(folder.glob(f"*.{ending}"))}
-
-
-def shipped(name: str) -> Path:
-    """Return a folder that came with this installation: in the wheel, or beside the package in a checkout."""
-    package = Path(str(resources.files("profilefit"))).resolve()
-    inside = package / name
-    return inside if inside.is_dir() else package.parent / name
-
-
-def is_file(path: Path) -> bool:
-    """Return whether there is such a file; none has a name that is too long for the system."""
-    try:
-        return path.is_file()
-    except OSError:
-        return False

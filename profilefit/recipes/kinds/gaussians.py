@@ -21,7 +21,7 @@ from profilefit.laws.gaussians import DEFAULT, MOST, MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.declared import Keys, Refused, Table, words
-from profilefit.recipes.kinds import SUMS
+from profilefit.recipes.folder import SUMS
 from profilefit.recipes.kinds.stack import StackRequest, Thickness, header, recorded_stack, request
 from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, damage
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work

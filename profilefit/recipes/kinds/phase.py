@@ -18,7 +18,7 @@ from profilefit.errors import InputError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record
 from profilefit.recipes.declared import Keys, Table
-from profilefit.recipes.kinds import LOCAL, PHASES, fits_folder, is_file
+from profilefit.recipes.folder import LOCAL, PHASES, fits_folder, is_file
 from profilefit.recipes.phases import ALL_ANGLES, MOMENTS, SEED, PhaseData, PhaseFit, built, fit_phase, read_phase
 from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, Measures, Texts
 from profilefit.recipes.run import LAWS, RecipeRun, Work

@@ -26,7 +26,7 @@ from profilefit.laws.two_parts import ForwardHalfSpace
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.declared import LISTED, Declared, Keys, OneOf, Refused, Table, Text, is_line, words
-from profilefit.recipes.kinds import STACKS, fits_folder, is_file
+from profilefit.recipes.folder import STACKS, fits_folder, is_file
 from profilefit.recipes.record import SOLVED, Count, Digest, LawRecord, Measure, Numbers, WholeRecord, damage
 from profilefit.recipes.run import LAWS, RecipeRun, RecordContent, Work
 from profilefit.recipes.stack import fit as stacks

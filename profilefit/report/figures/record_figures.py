@@ -30,7 +30,8 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import SUMS, gaussians
+from profilefit.recipes.folder import SUMS
+from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.workers import Workers
 from profilefit.report.figures import canvas as pen
 from profilefit.report.figures import paper_figures as paper

@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import SettingError
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes.catalogue import LoadedLaw, find
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.report.figures.fit_figures import RINGS, SPOT
 from profilefit.report.page.document import document
 from profilefit.report.page.markup import command, details, element, markup, paragraph

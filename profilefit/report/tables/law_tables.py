@@ -21,7 +21,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import MEASURES, OF_MAP, AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.recipes.catalogue import LoadedLaw, Names, albedo_laws, profile_laws, sampled_laws
-from profilefit.recipes.kinds import EVIDENCE
+from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record import Folder, Records
 from profilefit.recipes.targets import albedo_values

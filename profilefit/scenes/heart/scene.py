@@ -18,7 +18,8 @@ from mcml_sim.media.medium import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
 from profilefit.recipes.declared import Declared, OneOf, Refused, Tolerance
-from profilefit.recipes.kinds import LOCAL, fits_folder, gaussians
+from profilefit.recipes.folder import LOCAL, fits_folder
+from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.gaussians import SumLight, dense, joint, lights_of

@@ -17,7 +17,7 @@ from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.recipes.declared import OneOf, Refused, Tolerance, words
-from profilefit.recipes.kinds import LOCAL, fits_folder
+from profilefit.recipes.folder import LOCAL, fits_folder
 from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.file import ThicknessMap

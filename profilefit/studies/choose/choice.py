@@ -12,7 +12,7 @@ from mcml_sim import Setting
 from profilefit.laws import profile_classes
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds

@@ -16,7 +16,7 @@ from profilefit.errors import RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
-from profilefit.recipes.kinds import STACKS, available
+from profilefit.recipes.folder import STACKS, available
 from profilefit.recipes.kinds.stack import load
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE

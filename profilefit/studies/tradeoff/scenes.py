@@ -17,7 +17,7 @@ import numpy as np
 
 from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.phase import HenyeyGreenstein
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 from profilefit.scenes.fur import scene as fur_scene
 from profilefit.scenes.fur.chart import over_layers, wide_patch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim.files.whole_file import read_toml
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.scenes.fur import scene as fur
 from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, error_of, trial

@@ -10,7 +10,7 @@ from profilefit.fitting.discrepancy import AtAlbedo, LawWithErrors, Quantity, di
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records, plain
 from tests.fixtures import refused
 

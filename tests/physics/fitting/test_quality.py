@@ -18,7 +18,7 @@ from profilefit.fitting.quality import (
 )
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.printed_maps import LiangAlbedo
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 
 ALPHAS = [0.3, 0.9]

@@ -10,8 +10,8 @@ import pytest
 
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.laws.phases import FORMS, backscattered, haltrin
+from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import phase as record
-from profilefit.recipes.kinds import shipped
 from profilefit.recipes.phases import MOMENTS, fit_phase, read_phase
 from tests.fixtures import recorded, refused, slow
 from tests.unit.recipes.stack.test_record import GONE, RUN, refused_record, spoil

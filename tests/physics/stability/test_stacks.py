@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.studies.stability import stacks
 from profilefit.studies.stability.cells import EXTENDED, Verdict, regions_of
 from profilefit.studies.stability.stacks import CDF, FLOAT64, MODEL, ONCE, PDF, PROFILE, SAMPLE, TEXT32, TOTAL

@@ -19,7 +19,7 @@ from mcml_sim import Setting
 from mcml_sim.cli.screen import typed
 from profilefit.errors import InputError, OutputError
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.report.figures.canvas import canvas, save
 from tests.fixtures import EXAMPLES
 from tests.unit.cli.conftest import interrupted

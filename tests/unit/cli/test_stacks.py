@@ -8,7 +8,8 @@ import pytest
 
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import fits_folder, gaussians
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.kinds import stack as stacks
 from profilefit.shader.law_file import LANGUAGES
 from tests.fixtures import functions

@@ -9,7 +9,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import digest, stale
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.studies.stability.cells import ADVICE
 from profilefit.studies.tradeoff.parts import is_comparable, keep, read
 from tests.fixtures import EXAMPLES

@@ -24,7 +24,7 @@ from profilefit.cli.schema import FILES
 from profilefit.errors import InputError, OtherRecords
 from profilefit.measured.reading import FACT, NAMES
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.kinds import available, fits_folder
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.report.tables.keys_table import models, page, schema_of
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.atlas import FUNCTIONS

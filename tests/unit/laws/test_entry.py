@@ -20,7 +20,7 @@ from profilefit.laws.base import BLOCKS, Entry, EscapeLaw, Range, Sampler, Text,
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 from profilefit.recipes import catalogue, recipe, record
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records
 from profilefit.recipes.targets import require_known, starting_law
 from profilefit.shader import emit

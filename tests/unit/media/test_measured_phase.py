@@ -8,7 +8,7 @@ import pytest
 
 from mcml_sim import Layer, Medium, Setting, SettingError, exact
 from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Isotropic, Mixture, Tabulated, as_table, from_table
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.recipes.phases import read_phase
 from tests.fixtures import refused
 

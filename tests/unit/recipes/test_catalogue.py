@@ -12,7 +12,7 @@ from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
 from profilefit.laws.published import constants as constants_of
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.catalogue import albedo_laws, find, profile_laws, sampled_laws
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import Records, record_name
 from tests.fixtures import refused
 

@@ -13,7 +13,8 @@ from mcml_sim import Layer, Medium
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import RecordError
 from profilefit.recipes import kinds
-from profilefit.recipes.kinds import KINDS, Kind, KindModule, fits_folder, gaussians, phase, records_of, stack
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.kinds import KINDS, Kind, KindModule, gaussians, phase, records_of, stack
 from profilefit.recipes.regenerate import requests_of
 from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.stack import fit as stacks

@@ -16,7 +16,8 @@ from profilefit.fitting.estimate import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
 from profilefit.recipes.declared import LISTED, Declared, NumberRange, Refused, Shares, Text, at
 from profilefit.recipes.declared import words as in_words
-from profilefit.recipes.kinds import albedo_map, available, fits_folder, law
+from profilefit.recipes.folder import available, fits_folder
+from profilefit.recipes.kinds import albedo_map, law
 from profilefit.recipes.recipe import find, read
 from profilefit.recipes.record import PIPELINES, record_name, spanning_name
 from profilefit.recipes.targets import require_known

@@ -14,7 +14,7 @@ from mcml_sim import __version__
 from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import record
 from profilefit.recipes.evidence import digest, measurement_origin, processor, require_apart, stale
-from profilefit.recipes.kinds import fits_folder
+from profilefit.recipes.folder import fits_folder
 from tests.fixtures import refused
 from tests.unit.recipes.stack.test_record import GONE, spoil
 

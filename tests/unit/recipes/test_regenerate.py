@@ -19,7 +19,8 @@ import pytest
 from mcml_sim import Setting
 from profilefit.errors import RecipeError
 from profilefit.recipes import recipe
-from profilefit.recipes.kinds import KINDS, albedo_map, fits_folder, law
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.kinds import KINDS, albedo_map, law
 from profilefit.recipes.regenerate import compared, regenerate, reproduction, requests_of, stated_error
 from profilefit.recipes.run import PHOTONS, REFRACTED_PHOTONS, RecipeRun
 from profilefit.recipes.workers import Workers, cores

@@ -11,7 +11,7 @@ import pytest
 
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import STACKS, SUMS, fits_folder
+from profilefit.recipes.folder import STACKS, SUMS, fits_folder
 from profilefit.recipes.kinds.stack import interfaces, read
 from profilefit.recipes.record import ERRORS
 from profilefit.recipes.stack.gaussians import constant_names

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import heart
 from mcml_sim.files.whole_file import read_toml
-from profilefit.recipes.kinds import shipped
+from profilefit.recipes.folder import shipped
 from profilefit.scenes.heart import chart, scene
 from tests.fixtures import slow
 from tests.unit.scenes.scenes import changed, mistaken, refused

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from mcml_sim.files.whole_file import read_toml
-from profilefit.recipes.kinds import fits_folder, shipped
+from profilefit.recipes.folder import fits_folder, shipped
 from profilefit.recipes.stack import fit
 from profilefit.scenes.layers import scene
 from profilefit.scenes.stage import head

@@ -18,7 +18,7 @@ from mcml_sim import Layer, Medium
 from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, SOURCE
-from profilefit.recipes.kinds import available, fits_folder
+from profilefit.recipes.folder import available, fits_folder
 from profilefit.recipes.stack.file import LARGEST_FILE, LayerStack, LayerTable, read_layers
 
 STACK = """\

@@ -17,7 +17,7 @@ from profilefit.errors import DamagedRecord, InputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.kinds import STACKS, fits_folder
+from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.kinds import stack as stacks
 from profilefit.recipes.kinds.stack import find, load, matching, read, request
 from profilefit.recipes.regenerate import requests_of

@@ -10,7 +10,7 @@ from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, RecordError
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
-from profilefit.recipes.kinds import SUMS, fits_folder
+from profilefit.recipes.folder import SUMS, fits_folder
 from profilefit.recipes.kinds import gaussians as sums
 from profilefit.recipes.kinds.gaussians import COUNTS, find, load, request
 from profilefit.recipes.record import ERRORS
