@@ -1,4 +1,4 @@
-"""docs/laws/keys.md: the keys of every file that users write, from the models that check them."""
+"""docs/laws/keys.md: the keys, columns and facts of every file that users write, from the models that check them."""
 
 from pathlib import Path
 

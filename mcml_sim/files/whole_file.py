@@ -85,14 +85,15 @@ def read_whole(path: str | os.PathLike[str], most: int, expected: str = "a file 
 
 
 def text_of(path: str | os.PathLike[str], content: bytes, most: int, expected: str) -> str:
-    """Return the text of a file's bytes; InputError of more than `most`, and of the line that is not in UTF-8."""
+    """Return the text of a file's bytes; InputError on more than `most`, and on a line that is not UTF-8."""
     if len(content) > most:
         raise InputError(f"{path}: expected {expected} of at most {most} bytes, got a longer file")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte {content[error.start]:#04x}") from None
+        line = error.object[: error.start].count(b"\n") + 1  # its object has no byte order mark
+        got = f"the byte {error.object[error.start]:#04x}"
+        raise InputError(f"{path}:{line}: expected text in UTF-8, got {got}") from None
 
 
 def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = True) -> None:

@@ -125,7 +125,7 @@ def profile_quality(law: ProfileLaw, alpha: ArrayLike, setting: Setting | None =
 
 
 def _under(law: Law, setting: Setting | None) -> tuple[Law, Setting]:
-    """Return the law under a setting that it spans, in reduced albedos: its compiled programs serve all of these."""
+    """Return the law under a setting that it spans, in reduced albedos: one compiled program serves all settings."""
     return (law, law.setting) if setting is None else (law.in_reduced().under(surface_of(setting)), setting)
 
 

@@ -228,7 +228,7 @@ def with_curvature(values: Floats, jacobian: Floats, hessian: Floats) -> tuple[F
     Where residuals stay large, J'J alone lacks their curvature, and steps creep. The given ones are returned where the
     Hessian is not positive, or promises to gain more than there is.
     """
-    if not np.all(np.diag(hessian) > 0):
+    if not (np.all(np.isfinite(hessian)) and np.all(np.diag(hessian) > 0)):
         return values, jacobian
     scale = np.sqrt(np.diag(hessian))
     try:

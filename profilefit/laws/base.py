@@ -303,7 +303,8 @@ class Normalisation(AlbedoLaw):
 
     @property
     def entered(self) -> float:
-        """The share of the light that enters [-], which a white half space gives back: all where nothing refracts."""
+        """The share of the light that enters [-], which a white half space gives back."""
+        assert self.setting.n == 1.0, "a map under a refracting interface says it itself"
         return 1.0
 
     def text_numbers(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Closed forms of a semi-infinite medium under a refracting interface: numbers of the light, the index and g.
+"""Closed forms of a semi-infinite medium: numbers of the light, the index and g of its interface, and its decay rate.
 
 A fit to several media gives arrays of them, one number for each profile; a law of one has floats.
 """

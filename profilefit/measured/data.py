@@ -106,7 +106,10 @@ OfLength = Annotated[str, OneOf("", *UNITS), words(f"in {KNOWN_UNITS} or without
 
 
 class Facts(Declared):
-    """Facts that options and comments of a table state; comments in lower case, and with spaces for _ and -."""
+    """Facts that options and comments of a table state, read by `parsed`, whose context is the unit of r.
+
+    Names in comments are compared in lower case, with spaces for _ and -.
+    """
 
     light: Annotated[str, OneOf(*ILLUMINATIONS), words(spellings="light, lighting, illumination, incident light")] = ""
     n: Annotated[tuple[Index, Index], BeforeValidator(_ends), words(

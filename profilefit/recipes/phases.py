@@ -64,12 +64,14 @@ class PhaseColumns(Declared):
 
     @model_validator(mode="after")
     def _of_one_unit(self) -> Self:
+        """Refuse errors in another unit than that of the values."""
         if self.sigma not in ("", self.value):
             raise Refused(f"in the unit of value, {self.value or 'none'}, or without a unit", self.sigma, "sigma")
         return self
 
 
 COLUMNS = PhaseColumns.model_json_schema()["properties"]
+NAMES = {spelling: name for name, column in COLUMNS.items() for spelling in column["spellings"].split(", ")}
 
 
 @dataclass(frozen=True)
@@ -127,10 +129,7 @@ class PhaseData:
 
 
 def read_phase(path: Path) -> PhaseData:
-    """Read the table of a phase function.
-
-    InputError in one line, FILE:LINE: expected ..., got ...
-    """
+    """Read the table of a phase function; InputError in one line names file, line, and what is accepted."""
     content = read_whole(path, MAX_BYTES)
     lines = text_of(path, content, MAX_BYTES, "a phase function").splitlines()
     texts = {at: line.partition("#")[0].strip() for at, line in enumerate(lines, start=1)}
@@ -198,8 +197,8 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
     units: dict[str, str] = {}
     for cell in line.split(","):
         match = HEADING.fullmatch(cell.strip())
-        name = match["name"].strip().lower() if match else ""
-        if match is None or name not in COLUMNS or name in units:
+        name = NAMES.get(match["name"].strip().lower(), "") if match else ""
+        if match is None or not name or name in units:
             raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {quoted(cell.strip())}")
         units[name] = " ".join((match["unit"] or "").split())
     if "angle" not in units or "value" not in units:

@@ -332,15 +332,15 @@ def _parsed(path: Path) -> Table:
     return content
 
 
-def _require_safe(value: Any, place: str = "it", depth: int = 0) -> None:
-    """Refuse what no record may hold: text of several lines, no numbers, nests without end."""
+def _require_safe(value: Any, place: str = "", depth: int = 0) -> None:
+    """Refuse text that is no printable line, numbers beyond float64, and tables that nest too deep."""
     if isinstance(value, dict | list):
-        require(depth < DEEPEST, place, f"nested no deeper than {DEEPEST} tables and lists", value)
+        require(depth < DEEPEST, place or "it", f"nested no deeper than {DEEPEST} tables and lists", value)
         for name, item in value.items() if isinstance(value, dict) else enumerate(value):
             if isinstance(name, str):
-                require(is_line(name), f"keys in {place}", LINE, name)
+                require(is_line(name), f"keys in {place or 'it'}", LINE, name)
             if type(item) is not float or not math.isfinite(item):  # most of a record: its place is never shown
-                _require_safe(item, f"{place}.{name}".removeprefix("it."), depth + 1)
+                _require_safe(item, f"{place}.{name}".removeprefix("."), depth + 1)
     elif isinstance(value, str):
         require(is_line(value), place, LINE, value)
     elif value is not None and not isinstance(value, bool):

@@ -49,8 +49,10 @@ COUNTS = range(1, MOST + 1)
 MEASURED = ("rel", "rms", "ks", "alone")  # of red, green and blue
 ROUNDED = 1e-10  # of a sum of weights of twelve digits
 EACH = Field(min_length=len(CHANNELS), max_length=len(CHANNELS))
-Colours = Annotated[list[float], EACH, words("a list of numbers, one a colour")]
-Shares = Annotated[list[Annotated[float, Field(gt=0, le=1)]], EACH, words("a list of numbers in (0, 1], one a colour")]
+Colours = Annotated[list[float], EACH, words("a list of 3 numbers, one a colour")]
+Shares = Annotated[
+    list[Annotated[float, Field(gt=0, le=1)]], EACH, words("a list of 3 numbers in (0, 1], one a colour")
+]
 Summed = Annotated[Table, Keys(**SOLVED, steps=Count, **dict.fromkeys(MEASURED, Colours))]
 SUMS_OF_LIGHT = Keys(reflectance=Shares, share=Colours, by_count=list[Summed])
 

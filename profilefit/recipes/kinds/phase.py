@@ -54,6 +54,7 @@ class ShownPhases(LawRecord):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        """Refuse a record that lacks a constant of a form."""
         each = ((form, how, name) for form in FORMS for how in (FREE, HELD) for name in FORMS[form].names)
         self.require_constants(map(".".join, each))
         return self

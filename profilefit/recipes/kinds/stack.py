@@ -154,8 +154,9 @@ class ShownStack(WholeRecord, LawRecord):
             for key, rows in tables.items():
                 if len(rows) != count:
                     raise Refused(f"{count}, one an interface", len(rows), "interfaces", channel, key)
-            if any(len(set(map(len, row.values()))) > 1 for row in tables["quality"]):
-                raise Refused("tables of lists of one length", tables["quality"], "interfaces", channel, "quality")
+            for number, row in enumerate(tables["quality"]):
+                if len(set(map(len, row.values()))) > 1:
+                    raise Refused("lists of one length", row, "interfaces", channel, "quality", number)
         places, names = interfaces({"layers": self.layers}), StackLaw.constant_names()
         self.require_constants(f"{channel}.{number}.{name}" for channel, number in places for name in names)
         return self

@@ -180,9 +180,7 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
     def at(parameters: Floats) -> tuple[Floats, Floats, Floats]:
         constants = offset + slopes @ parameters
         count = constants.size // (len(lights) + 1)
-        variances, weights = np.exp(constants[:count]), constants[count:].reshape(len(lights), count)
-        values, jacobian = _off(variances, weights, lights)
-        return values, jacobian @ slopes, curvature(variances, weights, slopes, lights)
+        return expanded(np.exp(constants[:count]), constants[count:].reshape(len(lights), count), slopes, lights)
 
     for _ in range(TURNS):
         best = solve(lambda parameters: with_curvature(*at(parameters)), start)
@@ -193,8 +191,10 @@ def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: 
     return replace(best, residuals=values, jacobian=jacobian)
 
 
-def curvature(variances: Floats, weights: Floats, slopes: Floats, lights: Sequence[SumLight]) -> Floats:
-    """Return the Hessian (p, p) of half the sum of squares, the curvature of the residuals included."""
+def expanded(
+    variances: Floats, weights: Floats, slopes: Floats, lights: Sequence[SumLight]
+) -> tuple[Floats, Floats, Floats]:
+    """Return residuals (n,), their Jacobian (n, p), and the Hessian (p, p) of half their sum of squares, all of it."""
     count = variances.size
     values, jacobian = _off(variances, weights, lights)
     whole, levels = jacobian.T @ jacobian, np.arange(count)
@@ -206,8 +206,7 @@ def curvature(variances: Floats, weights: Floats, slopes: Floats, lights: Sequen
         whole[levels, levels] += more * own
         whole[levels, places] += bent
         whole[places, levels] += bent
-    curved: Floats = slopes.T @ whole @ slopes
-    return curved
+    return values, jacobian @ slopes, slopes.T @ whole @ slopes
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
@@ -382,7 +381,7 @@ def _gain(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     weight = np.concatenate([light.weight for light in lights])
     # With r = w (m / e - 1): the slope J^T r moves by -J^T (w + 2 r) d ln e.
     slope = found.best.jacobian * (weight + 2.0 * found.best.residuals)[:, None]
-    raw = scaled_inverse(curvature(found.variances, found.weights, found.slopes, lights)) @ slope.T
+    raw = scaled_inverse(expanded(found.variances, found.weights, found.slopes, lights)[2]) @ slope.T
     parts = np.split(raw, np.cumsum([light.energy.size for light in lights])[:-1], axis=1)
     # Those are of what a sum is fitted to, e / A, not of e.
     each = zip(parts, lights, strict=True)

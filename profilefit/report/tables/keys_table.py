@@ -1,4 +1,4 @@
-"""Files that users write: their models, JSON Schema, and a page of their keys."""
+"""Files that users write: their models, JSON Schema, and a page of their keys, columns and facts."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 Key = tuple[str, str, str, object]
 HEAD = """# Keys of every file
 
-What each file of `profilefit` may say, from the models that check it; `profilefit schema KIND` prints them as JSON
-Schema, by which editors complete and check keys.
+What each file of `profilefit` may say, from the models that check it. `profilefit schema KIND` prints those of TOML
+files as JSON Schema, by which editors complete and check keys. Tables of data have columns, and facts in comments.
 """
 
 

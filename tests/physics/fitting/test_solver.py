@@ -233,7 +233,7 @@ def test_with_the_curvature_of_residuals_that_stay_large_steps_are_newton_s():
     assert values @ values == pytest.approx(plain @ plain, rel=1e-14)
     np.testing.assert_allclose(jacobian.T @ values, slope.T @ plain, rtol=1e-12)
     np.testing.assert_allclose(jacobian.T @ jacobian, hessian, rtol=1e-12, atol=1e-12)
-    for other in (-hessian, 0.0 * hessian, np.array([[1.0, 2.0], [2.0, 1.0]])):  # no minimum
+    for other in (-hessian, 0.0 * hessian, np.full((2, 2), np.inf), 1.0 - 0.5 * np.eye(2), 1e-9 * hessian):
         assert solver.with_curvature(plain, slope, other)[0] is plain
     bent, creeping = solve(lambda x: solver.with_curvature(*at(x)), start), solve(lambda x: at(x)[:2], start)
     assert bent.converged

@@ -13,7 +13,7 @@ import pytest
 from mcml_sim import Grid, Setting, exact, simulate_orders
 from mcml_sim.exact import single_scattering
 from mcml_sim.exact.light import reduced, unreduced
-from profilefit import SettingError, albedo_law, load, profile_quality
+from profilefit import SettingError, albedo_law, albedo_quality, load, profile_quality
 from profilefit.laws import hazard
 from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, cumulative, density, early_share, growth
 from profilefit.laws.rational import Rational, RefractingRational
@@ -272,6 +272,18 @@ def test_near_exact_light_with_g_at_other_indices(light, n):
         found = profile_quality(load("hazard", setting=Setting(light, n, g)), REDUCED[::2])
         assert np.max(found.rel) < 0.025
         assert np.max(found.ks) < 0.006
+
+
+def test_a_law_is_judged_at_any_setting_that_it_spans():
+    for here, there in (
+        (Setting("diffuse", 1.4, 0.8), Setting("diffuse", 1.33, 0.5)),
+        (Setting(n=1.4), Setting(n=1.2)),
+    ):
+        law = load("hazard", setting=here)
+        found, alone = profile_quality(law, [0.9], there), profile_quality(law.at(there), [0.9])
+        np.testing.assert_allclose((found.rel, found.ks, found.l1), (alone.rel, alone.ks, alone.l1), rtol=1e-9)
+        whole, other = albedo_quality(law.albedo, there), albedo_quality(law.albedo.at(there))
+        assert whole.delta_A == pytest.approx(other.delta_A, rel=1e-9) != albedo_quality(law.albedo).delta_A
 
 
 @pytest.mark.parametrize("g", [0.8, *slow(0.5, 0.95)])

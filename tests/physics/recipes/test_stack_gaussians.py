@@ -124,7 +124,7 @@ def test_derivatives_are_those_of_the_formula():
         values, jacobian = gaussians._off(found.variances, found.weights, lights)
         np.testing.assert_allclose(values, off(at), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(jacobian, jax.jit(jax.jacfwd(off))(at), rtol=1e-8, atol=1e-12)
-        own = gaussians.curvature(found.variances, found.weights, found.slopes, lights)
+        *_, own = gaussians.expanded(found.variances, found.weights, found.slopes, lights)
         np.testing.assert_allclose(own, found.slopes.T @ bent @ found.slopes, rtol=1e-8, atol=1e-12)
         parameters = np.array([-1.0, 0.5, 0.3, -0.7])
         level, weights, slopes = gaussians._of(parameters, 2)

@@ -195,6 +195,7 @@ BAD = {
     'r,value,sigma\n1,"2,3\n2,1,1\n3,1,1\n': r":2: expected cells between commas, got: unexpected end of data",
     b"\x89PNG\r\n\x1a\n\x00\x00": r":1: expected text in UTF-8, got the byte 0x89",
     b"r,value,sigma\n1,2\x00,3\n": r":2: expected text in UTF-8, got the byte 0x00",
+    b"\xef\xbb\xbfr,value,sigma\n1,2\xff,3\n": r":2: expected text in UTF-8, got the byte 0xff",
 }
 
 

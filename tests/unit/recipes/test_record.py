@@ -161,8 +161,13 @@ DAMAGED = [
     ("reproduction", "table1", ["skin"], r"table1 must be tables \[\[table1\]\], got \['skin'\]"),
     ("albedo-rational-diffuse", "crosscheck/chi2", "much", r"\[crosscheck\] chi2 must be a number or null, got 'much'"),
     ("albedo-rational-diffuse", "crosscheck/constants", {"b": 1.0}, r".*\.constants\] b must be a table .*, got 1\.0"),
-    ("albedo-rational-diffuse", "starts/share_best", None, r"\[starts\] share_best must be .* number, got nothing"),
-    ("albedo-rational-diffuse", "starts/outcomes", [{}], r"\[starts\.outcomes 1\] count must be .*, got nothing"),
+    ("albedo-rational-diffuse", "starts/share_best", None, r"\[starts\] share_best must be a.* number, got nothing"),
+    (
+        "albedo-rational-diffuse",
+        "starts/outcomes",
+        [{}],
+        r"\[starts\.outc.* 1\] count must be a whole number, got noth",
+    ),
     # Lists that belong together are of one length.
     ("burley-whole", "quality/regenerated/rel/0", GONE, ".*rel must be as long as quality.alpha"),
     ("burley-whole", "covariance/model/0", GONE, r"\[covariance\] model must be a square matrix"),
@@ -211,7 +216,10 @@ def test_text_that_is_no_printable_line_is_refused(spoilt, place, strange):
 
 UNSAFE = [
     ('"data_digest": "0"', "data_digest must be 64 hexadecimal digits, got '0'"),
-    ('"constants": {"s0": {"regenerated": "1; evil()"}}', r"\[constants\.s0\] regenerated must be .*, got '1; evil"),
+    (
+        '"constants": {"s0": {"regenerated": "1; evil()"}}',
+        r"\[constants\.s0\] regenerated must be a .*number, got '1; ev",
+    ),
     ('"constants": {"s0": {"regenerated": 1e400}}', r"is not a record: the number 1e400, beyond floating point"),
     ('"constants": {"s0": {"regenerated": 1, "model_error": "x"}}', r"model_error must be a number or null, got 'x'"),
     (f'"note": {"[" * 20}{"]" * 20}', r"note.* must be nested no deeper than 12 tables and lists"),

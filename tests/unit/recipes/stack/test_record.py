@@ -216,7 +216,7 @@ NOT_SHOWN = [
     ("interfaces", GONE, r"table \[interfaces\] is missing"),
     ("interfaces/green", GONE, r"table \[interfaces.green\] is missing"),
     ("interfaces/blue/quality/0/rel", GONE, r"\[interfaces.blue.quality 1\] rel must be a list of numbers, got noth"),
-    ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"blue\] quality must be tables of lists of one length"),
+    ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"\[interfaces.blue\] quality 1 must be lists of one length, got"),
     ("interfaces/red/fit/0", GONE, r"\[interfaces.red\] fit must be 1, one an interface, got 0"),
     ("interfaces/red/starts/0/count", 0.5, r"\[interfaces.red.starts 1\] count must be a whole number, got 0.5"),
     ("layers/1/mu_a", 1, r"\[layers 2\] mu_a must be a list of numbers, got 1"),
