@@ -65,11 +65,14 @@ def direct(optical: Floats, height: Floats, k: float) -> Floats:
 def _direct_close(a: Floats, b: Floats) -> Floats:
     """Return (1/2) sum over m of (-b)^m/m! E_{m+1}(a)."""
     decay, integral = np.exp(-a), exp1(a)
-    total, power = integral.copy(), np.ones_like(a)
+    total, power, term, minus = integral.copy(), np.ones_like(a), np.empty_like(a), -b
     for m in range(1, SERIES_TERMS):
-        integral = (decay - a * integral) / m
-        power *= -b / m
-        total += power * integral
+        integral *= a
+        np.subtract(decay, integral, out=integral)
+        integral *= 1.0 / m
+        power *= minus
+        power *= 1.0 / m
+        total += np.multiply(power, integral, out=term)
     return 0.5 * total
 
 
@@ -77,10 +80,13 @@ def _direct_far(a: Floats, b: Floats) -> Floats:
     """Return K by Gauss's rule in v."""
     largest = a + b + FALLEN
     v = np.log((largest + np.sqrt(largest**2 - 4 * a * b)) / (2 * a))
-    total = np.zeros_like(a)
+    total, growth, rest, minus = np.zeros_like(a), np.empty_like(a), np.empty_like(a), -a
     for x, weight in zip(*gauss(DIRECT_NODES), strict=True):
-        growth = np.exp(x * v)
-        total += weight * np.exp(-a * growth - b / growth)
+        np.exp(np.multiply(x, v, out=growth), out=growth)
+        np.divide(b, growth, out=rest)
+        growth *= minus
+        growth -= rest
+        total += np.multiply(weight, np.exp(growth, out=growth), out=growth)
     return 0.5 * v * total
 
 
@@ -146,45 +152,34 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
         gap = np.maximum(targets[0][:, None] - ends[1], ends[0] - targets[1][:, None])
         close |= gap < CLOSE * (ends[1] - ends[0])
     own = np.eye(here.panels, dtype=bool) & (mirror is None)
-    matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
-    far = ~(close | own)
+    far, shape = ~(close | own), (-1, here.nodes)
     row, column = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
-    whole = matrix.reshape(z.size, z.size)
-    whole[row, column] = direct(np.abs(here.tau[row] - tau[column]), np.abs(here.z[row] - z[column]), k)
-    whole[column, row] = whole[row, column]
-    whole *= here.weight
-    target, source = np.nonzero(close & ~own)
-    rule = quadrature.near_end(here.nodes)
-    # The panel's end on the target's side, and whether that is its lower one.
+    (target, source), (itself, _) = np.nonzero(close & ~own), np.nonzero(own)
+    end, inside = quadrature.near_end(here.nodes), quadrature.near_node(here.nodes)
+    upwards = inside.height[:, : inside.height.shape[1] // 2]
+    # Whether the panel's end on the target's side is its lower one.
     below = tau_ends[0, source] < here.tau_ends[0, target]
-    upwards = np.where(below, 1, 0)
-    tau_end, z_end = tau_ends[upwards, source, None], z_ends[upwards, source, None]
-    tau_gap = np.abs(here.tau.reshape(-1, here.nodes)[target] - tau_end)
-    z_gap = np.abs(here.z.reshape(-1, here.nodes)[target] - z_end)
-    tau_length, z_length = np.diff(tau_ends, axis=0)[0, source], np.diff(z_ends, axis=0)[0, source]
-    kernel = direct(
-        tau_gap[:, :, None] + tau_length[:, None, None] * rule.height,
-        z_gap[:, :, None] + z_length[:, None, None] * rule.height,
-        k,
-    ) * (rule.weight * (here.alpha[source] * tau_length)[:, None, None])
-    blocks = kernel @ rule.through
+    pieces = []  # optical thicknesses, and heights: all of K in one call, of which small ones take half of the time
+    for at, image, ends in ((here.tau, tau, tau_ends), (here.z, z, z_ends)):
+        gap, length = at.reshape(shape)[target] - ends[below.astype(int), source, None], np.diff(ends, axis=0)[0]
+        near = np.abs(gap)[:, :, None] + length[source, None, None] * end.height
+        pieces.append([np.abs(at[row] - image[column]), near, length[itself, None, None] * upwards])
+    optical, height = (np.concatenate([piece.ravel() for piece in each]) for each in pieces)
+    apart, near, above = np.split(direct(optical, height, k), np.cumsum([piece.size for piece in pieces[0]])[:2])
+    matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
+    whole = matrix.reshape(z.size, z.size)
+    whole[row, column] = whole[column, row] = apart
+    whole *= here.weight
+    weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
+    blocks = (near.reshape(pieces[0][1].shape) * (end.weight * weight[source])) @ end.through
     flip = below if mirror is None else ~below
     blocks[flip] = blocks[flip][:, :, ::-1]
     matrix[target, :, source] = blocks
-    if mirror is None:
-        matrix[np.arange(here.panels), :, np.arange(here.panels)] = _own(here, k)
-    return whole
-
-
-def _own(here: Depths, k: float) -> Floats:
-    """Return mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
-    rule = quadrature.near_node(here.nodes)
-    tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
-    upwards = rule.height[:, : rule.height.shape[1] // 2]
-    above = direct(tau_length * upwards, z_length * upwards, k)
     # What lies below a node lies above its mirror image in the panel's middle.
-    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * (here.alpha[:, None, None] * tau_length * rule.weight)
-    return np.einsum("piq,iqj->pij", kernel, rule.through, optimize=True)
+    above = above.reshape(pieces[0][2].shape)
+    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * (weight[itself] * inside.weight)
+    matrix[itself, :, itself] = np.einsum("piq,iqj->pij", kernel, inside.through, optimize=True)
+    return whole
 
 
 def _slanted(here: Depths, slants: Slants) -> Floats:
