@@ -22,7 +22,9 @@ stack, is smooth, and is summed over the directions of `quadrature`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import exp1, expn, j0
@@ -34,8 +36,10 @@ from mcml_sim.media.medium import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
-SERIES_TERMS = 16
-DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen by so many e-folds: 3e-12 of K
+# Terms of the series, nodes of Gauss's rule, and by how many e-folds its integrand falls: 3e-12 of K, and 2e-10 where
+# panels have few nodes. Thick plates in which nothing is absorbed show a million times that.
+FINE, COARSE = (16, 16, 28.0), (13, 13, 22.0)
+KEPT = 8  # sets of pairs
 
 
 class Field(NamedTuple):
@@ -48,8 +52,9 @@ class Field(NamedTuple):
     down: Floats  # response X of the light that comes out below
 
 
-def direct(optical: Floats, height: Floats, k: float) -> Floats:
+def direct(optical: Floats, height: Floats, k: float, is_fine: bool = True) -> Floats:
     """Return K at optical thicknesses T > 0 and heights Z, of one shape."""
+    terms, nodes, fallen = FINE if is_fine else COARSE
     across = k * height
     length = np.sqrt(optical**2 + across**2)
     # a e^v + b e^-v is the exponent
@@ -57,16 +62,16 @@ def direct(optical: Floats, height: Floats, k: float) -> Floats:
     b = 0.25 * across**2 / a
     value = np.zeros_like(a)
     close, seen = a < 1.0, (a >= 1.0) & (length < quadrature.DARK)
-    value[close] = _direct_close(a[close], b[close])
-    value[seen] = _direct_far(a[seen], b[seen])
+    value[close] = _direct_close(a[close], b[close], terms)
+    value[seen] = _direct_far(a[seen], b[seen], nodes, fallen)
     return value
 
 
-def _direct_close(a: Floats, b: Floats) -> Floats:
+def _direct_close(a: Floats, b: Floats, terms: int) -> Floats:
     """Return (1/2) sum over m of (-b)^m/m! E_{m+1}(a)."""
     decay, integral = np.exp(-a), exp1(a)
     total, power, term, minus = integral.copy(), np.ones_like(a), np.empty_like(a), -b
-    for m in range(1, SERIES_TERMS):
+    for m in range(1, terms):
         integral *= a
         np.subtract(decay, integral, out=integral)
         integral *= 1.0 / m
@@ -76,12 +81,12 @@ def _direct_close(a: Floats, b: Floats) -> Floats:
     return 0.5 * total
 
 
-def _direct_far(a: Floats, b: Floats) -> Floats:
+def _direct_far(a: Floats, b: Floats, nodes: int, fallen: float) -> Floats:
     """Return K by Gauss's rule in v."""
-    largest = a + b + FALLEN
+    largest = a + b + fallen
     v = np.log((largest + np.sqrt(largest**2 - 4 * a * b)) / (2 * a))
     total, growth, rest, minus = np.zeros_like(a), np.empty_like(a), np.empty_like(a), -a
-    for x, weight in zip(*gauss(DIRECT_NODES), strict=True):
+    for x, weight in zip(*gauss(nodes), strict=True):
         np.exp(np.multiply(x, v, out=growth), out=growth)
         np.divide(b, growth, out=rest)
         growth *= minus
@@ -100,7 +105,7 @@ def solve(here: Depths, k: float, rule: Nodes) -> Field:
     up = at_once + _out_later(here, slants)
     down = 0 * up
     if here.height < np.inf:
-        turned = here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
+        turned = replace(here, z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
         slanted = slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
         down = _out_at_once(turned, slanted, k, rule) + _out_later(turned, slanted)
     unscattered = {"searchlight": beam(here, here.tau), "diffuse": 4 * here.above**2 * up}
@@ -131,7 +136,7 @@ def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
         z, tau, weight = here.tail
         decay = np.hypot(here.last.mu_t * quadrature.slowest(here.last.alpha), k)
         mode = weight * np.exp(-decay * (z - here.z[-1]))
-        matrix[:, -1] += direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
+        matrix[:, -1] += direct(tau - here.tau[:, None], z - here.z[:, None], k, here.is_fine) @ mode
     return matrix
 
 
@@ -141,8 +146,31 @@ def _mirrors(here: Depths) -> list[tuple[float, float]]:
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
-def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None) -> Floats:
-    """Return mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
+class _Pairs(NamedTuple):
+    """Pairs of depths that `_by_panel` takes K between, and what it takes K with; the same for many wave numbers.
+
+    optical, height  thicknesses and heights between them (pairs,): all in one call, of which small ones take half of
+                     the time. First those of nodes apart, then those of nodes near a panel, then those within panels
+    ends             numbers of the first pair of the second and third kind
+    apart            rows and columns of the first kind, (2, n)
+    near, inside     target and source panels of the second and third kind
+    flipped          whether a near source's lower end is on the target's side; for its mirror image, the upper one
+    near_weight, inside_weight  weights of the nodes of the rules, (m, 1, rule) and (panels, nodes, rule)
+    """
+
+    optical: Floats
+    height: Floats
+    ends: Any
+    apart: tuple[Any, ...]
+    near: tuple[Any, ...]
+    inside: Any
+    flipped: Any
+    near_weight: Floats
+    inside_weight: Floats
+
+
+@lru_cache(maxsize=KEPT)
+def _pairs(here: Depths, mirror: tuple[float, float] | None) -> _Pairs:
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
     if mirror is not None:
         z, tau, z_ends, tau_ends = mirror[0] - z, mirror[1] - tau, mirror[0] - z_ends[::-1], mirror[1] - tau_ends[::-1]
@@ -153,32 +181,50 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
         close |= gap < CLOSE * (ends[1] - ends[0])
     own = np.eye(here.panels, dtype=bool) & (mirror is None)
     far, shape = ~(close | own), (-1, here.nodes)
-    row, column = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
+    apart = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
     (target, source), (itself, _) = np.nonzero(close & ~own), np.nonzero(own)
     end, inside = quadrature.near_end(here.nodes), quadrature.near_node(here.nodes)
     upwards = inside.height[:, : inside.height.shape[1] // 2]
     # Whether the panel's end on the target's side is its lower one.
     below = tau_ends[0, source] < here.tau_ends[0, target]
-    pieces = []  # optical thicknesses, and heights: all of K in one call, of which small ones take half of the time
+    pieces = []
     for at, image, ends in ((here.tau, tau, tau_ends), (here.z, z, z_ends)):
         gap, length = at.reshape(shape)[target] - ends[below.astype(int), source, None], np.diff(ends, axis=0)[0]
         near = np.abs(gap)[:, :, None] + length[source, None, None] * end.height
-        pieces.append([np.abs(at[row] - image[column]), near, length[itself, None, None] * upwards])
-    optical, height = (np.concatenate([piece.ravel() for piece in each]) for each in pieces)
-    apart, near, above = np.split(direct(optical, height, k), np.cumsum([piece.size for piece in pieces[0]])[:2])
+        pieces.append([np.abs(at[apart[0]] - image[apart[1]]), near, length[itself, None, None] * upwards])
+    weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
+    return _Pairs(
+        optical=np.concatenate([piece.ravel() for piece in pieces[0]]),
+        height=np.concatenate([piece.ravel() for piece in pieces[1]]),
+        ends=np.cumsum([piece.size for piece in pieces[0]])[:2],
+        apart=apart,
+        near=(target, source),
+        inside=itself,
+        flipped=below if mirror is None else ~below,
+        near_weight=end.weight * weight[source],
+        inside_weight=inside.weight * weight[itself],
+    )
+
+
+def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None) -> Floats:
+    """Return mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
+    pairs = _pairs(here, mirror)
+    apart, near, above = np.split(direct(pairs.optical, pairs.height, k, here.is_fine), pairs.ends)
     matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
-    whole = matrix.reshape(z.size, z.size)
+    whole = matrix.reshape(here.z.size, here.z.size)
+    row, column = pairs.apart
     whole[row, column] = whole[column, row] = apart
     whole *= here.weight
-    weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
-    blocks = (near.reshape(pieces[0][1].shape) * (end.weight * weight[source])) @ end.through
-    flip = below if mirror is None else ~below
-    blocks[flip] = blocks[flip][:, :, ::-1]
+    (target, source), itself = pairs.near, pairs.inside
+    shape = (-1, here.nodes, pairs.near_weight.shape[2])
+    blocks = (near.reshape(shape) * pairs.near_weight) @ quadrature.near_end(here.nodes).through
+    blocks[pairs.flipped] = blocks[pairs.flipped][:, :, ::-1]
     matrix[target, :, source] = blocks
     # What lies below a node lies above its mirror image in the panel's middle.
-    above = above.reshape(pieces[0][2].shape)
-    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * (weight[itself] * inside.weight)
-    matrix[itself, :, itself] = np.einsum("piq,iqj->pij", kernel, inside.through, optimize=True)
+    above = above.reshape(itself.size, here.nodes, pairs.inside_weight.shape[2] // 2)
+    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * pairs.inside_weight
+    through = quadrature.near_node(here.nodes).through
+    matrix[itself, :, itself] = (kernel.swapaxes(0, 1) @ through).swapaxes(0, 1)
     return whole
 
 
@@ -210,8 +256,8 @@ def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Float
 def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
     """Return X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
-    phase = 0.55 * k * quadrature.deepest(here) * min(quadrature.steepest(here), 1.5)
-    t, d_mu = quadrature.cones(here, rule.slope + int(phase))
+    phase = k * quadrature.deepest(here) * min(quadrature.steepest(here), 1.5)
+    t, d_mu = quadrature.cones(here, rule.slope + int(quadrature.more(quadrature.SLOPES_OF_PHASE, rule.slope) * phase))
     a, b = reflectance(here.above, t), reflectance(here.below, t)
     ways = [(here.z, here.tau, 1 - a - matched)]
     if here.height < np.inf and here.below != 1:
@@ -221,7 +267,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
         light = np.exp(-np.multiply.outer(np.sqrt(1 + t * t).real, tau)) * j0(k * np.multiply.outer(t.real, z))
         out += (0.5 * d_mu * passes / np.sqrt(1 + t * t)).real @ light
         if matched:
-            out += 0.5 * np.exp(-np.hypot(tau, k * z)) - tau * direct(tau, z, k)  # X without surfaces
+            out += 0.5 * np.exp(-np.hypot(tau, k * z)) - tau * direct(tau, z, k, here.is_fine)  # X without surfaces
     ray = slice(slants.cones, None)
     a, b, weight = slants.a[ray], slants.b[ray], slants.weight[ray] * slants.mu[ray]
     out += ((weight * (1 - a - matched)) @ slants.from_top[ray]).real

@@ -29,15 +29,19 @@ FADED = 30.0  # exponent by which light has faded where it is not followed any d
 DARK = 38.0  # optical depth beyond which e^-T is rounding
 FEWEST, MOST = 4, 100  # nodes
 GRADING = 2  # power of the distance to the end of a panel by which nodes crowd there
-NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
+FEW = 16  # nodes of a panel: with fewer, all that panels hold is integrated less finely
+NEAR_STEP, FEW_STEP, NEAR_LAST = 0.1, 0.15, 3.4  # of the double-exponential rule
 
 TURN = complex(np.exp(0.25j * np.pi))  # of slopes beyond the cones
 RAY_NODES = 14  # of a panel
 AZIMUTHS = 0.7  # eights of them for each e-fold by which waves are shorter than mean free paths
 STEEPEST = 1e9  # where no critical angle ends the slopes
 THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical angles crosses to and fro
+SLOPES_OF_PHASE, AZIMUTHS_OF_PHASE = 0.55, 0.25  # more of them for each radian that phases turn, if there are so many
+FULL = 24  # without any turn; of fewer, fewer in proportion
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
 MOST_PHASE = 40.0  # as far as they turn no farther than this
+KEPT = 8  # sets of depths
 
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
@@ -66,8 +70,9 @@ class Nodes:
         return replace(self, depth=max(FEWEST, depth), slope=max(FEWEST, slope), azimuth=max(FEWEST, azimuth))
 
 
-class Depths(NamedTuple):
-    """Depths in the layers of a medium that scatter, N = panels * nodes, for one wave number. Lengths in its unit."""
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """Depths in the layers of a medium that scatter, N = panels * nodes, for many wave numbers. Lengths in its unit."""
 
     z: Floats  # depths of the nodes, (N,) [length]
     tau: Floats  # optical depths of the nodes, (N,) [-]
@@ -94,12 +99,32 @@ class Depths(NamedTuple):
         """Number of nodes of a panel."""
         return self.z.size // max(self.panels, 1)
 
+    @property
+    def is_fine(self) -> bool:
+        """Return whether integrals over panels are to be as fine as they get."""
+        return self.nodes >= FEW
+
+
+Panels = tuple[tuple[int, float, float, int], ...]  # layer's number, length of its first and last [mfp], how many
+
 
 def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     """Return the depths of a medium whose layers share one index, for light of wave number k [1/length]."""
+    return _placed(medium, _panels(medium.layers, k), rule)
+
+
+@lru_cache(maxsize=KEPT)
+def _placed(medium: Medium, panels: Panels, rule: Nodes) -> Depths:
     layers, tops = medium.layers, medium.z_edges
-    tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
-    z_ends, tau_ends, scatters = _panels(layers, tops, tau_tops, k)
+    tau_tops = np.cumsum([0.0, *map(_optical, layers)])
+    ends: list[tuple[float, float, float, float]] = []
+    scatters: list[Layer] = []
+    for number, finest_above, finest_below, count in panels:
+        cuts = _cuts(_optical(layers[number]), finest_above, finest_below)[: 1 + count]
+        z, tau = tops[number] + cuts / layers[number].mu_t, tau_tops[number] + cuts
+        ends += zip(z[:-1], z[1:], tau[:-1], tau[1:], strict=True)
+        scatters += [layers[number]] * count
+    z_ends, tau_ends = np.reshape(np.reshape(ends, (-1, 4)).T, (2, 2, -1))
     s, d_s = gauss(rule.depth)
     x, d_x = _crowded(s)
     at = np.stack([1 - x, x], axis=1)
@@ -128,27 +153,26 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     )
 
 
-def _panels(layers: tuple[Layer, ...], tops: Floats, tau_tops: Floats, k: float) -> tuple[Floats, Floats, list[Layer]]:
-    """Return depths and optical depths of the ends of panels, (2, panels) each, and the panels' layers."""
-    ends: list[tuple[float, float, float, float]] = []
-    scatters: list[Layer] = []
-    faded = 0.0
+def _optical(layer: Layer) -> float:
+    return layer.mu_t * layer.thickness if layer.mu_t else 0.0
+
+
+def _panels(layers: tuple[Layer, ...], k: float) -> Panels:
+    """Return the panels of each layer that scatters, as far as light of wave number k [1/length] comes."""
+    found, faded = [], 0.0
     numbers = [number for number, layer in enumerate(layers) if layer.mu_s > 0]
     for number, layer in enumerate(layers):
-        optical = tau_tops[number + 1] - tau_tops[number]
+        optical = _optical(layer)
         fades = min(np.hypot(slowest(layer.alpha), k / layer.mu_t), 1.0) if layer.mu_t else 0.0  # per mean free path
         if layer.mu_s > 0:
             # Where light gets out its own length 1/k must be resolved.
             finest = min(FIRST_PANEL, WAVES * layer.mu_t / k) if k > 0 else FIRST_PANEL
-            cuts = _cuts(optical, *(finest if number == numbers[at] else FIRST_PANEL for at in (0, -1)))
-            cuts = cuts[: 1 + np.count_nonzero(faded + fades * cuts[:-1] < FADED)]
-            z, tau = tops[number] + cuts / layer.mu_t, tau_tops[number] + cuts
-            ends += zip(z[:-1], z[1:], tau[:-1], tau[1:], strict=True)
-            scatters += [layer] * (cuts.size - 1)
+            first, last = (finest if number == numbers[at] else FIRST_PANEL for at in (0, -1))
+            cuts = _cuts(optical, first, last)
+            found.append((number, first, last, int(np.count_nonzero(faded + fades * cuts[:-1] < FADED))))
         if np.isfinite(optical):
             faded += fades * optical
-    z_ends, tau_ends = np.reshape(np.reshape(ends, (-1, 4)).T, (2, 2, -1))
-    return z_ends, tau_ends, scatters
+    return tuple(found)
 
 
 @lru_cache(maxsize=512)
@@ -157,6 +181,7 @@ def slowest(alpha: float) -> float:
     return float(decay_rate(alpha))
 
 
+@lru_cache(maxsize=512)
 def _cuts(optical: float, first: float, last: float) -> Floats:
     """Return ends of panels in a layer [mfp]: from either end each twice as long as the one before."""
     growth = 2.0 ** np.arange(60) - 1
@@ -193,7 +218,7 @@ class Near(NamedTuple):
 @lru_cache
 def near_node(nodes: int) -> Near:
     """Return the rule from each node to both ends, in x, not s: K is a logarithm times what is smooth in x."""
-    share, d_share = double_exponential()
+    share, d_share = double_exponential(nodes)
     x = _crowded(gauss(nodes)[0])[0][:, None, None]
     side = np.concatenate([-x, 1 - x], axis=1)
     at, length = (x + side * share).reshape(nodes, -1), np.abs(side)
@@ -203,15 +228,16 @@ def near_node(nodes: int) -> Near:
 @lru_cache
 def near_end(nodes: int) -> Near:
     """Return the rule from the panel's upper end, (rule,) and (rule, nodes)."""
-    share, d_share = double_exponential()
+    share, d_share = double_exponential(nodes)
     return Near(share, d_share, _through(share, nodes))
 
 
-def double_exponential() -> tuple[Floats, Floats]:
-    """Return nodes and weights on (0, 1)."""
-    y = np.arange(-NEAR_LAST, NEAR_LAST + NEAR_STEP / 2, NEAR_STEP)
+def double_exponential(nodes: int = FEW) -> tuple[Floats, Floats]:
+    """Return nodes and weights on (0, 1), for panels of so many nodes."""
+    step = NEAR_STEP if nodes >= FEW else FEW_STEP
+    y = np.arange(-NEAR_LAST, NEAR_LAST + step / 2, step)
     share = 1 / (1 + np.exp(np.pi * np.sinh(y)))
-    return share, NEAR_STEP * np.pi * np.cosh(y) * share * (1 - share)
+    return share, step * np.pi * np.cosh(y) * share * (1 - share)
 
 
 def _through(x: Floats, nodes: int) -> Floats:
@@ -299,12 +325,21 @@ def deepest(here: Depths) -> float:
     return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
 
 
+def more(of_phase: float, nodes: int) -> float:
+    """Return how many more nodes each radian of phase takes."""
+    return of_phase * min(nodes / FULL, 1.0)
+
+
 def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """Return tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
-    t, d_mu = cones(here, rule.slope + int(0.55 * phase))
+    t, d_mu = cones(here, rule.slope + int(more(SLOPES_OF_PHASE, rule.slope) * phase))
     # Of each slope as many azimuths as its own phases take.
     share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
-    azimuths = np.ones(t.size, int) if k == 0 else rule.azimuth // 3 + (0.25 * phase * share).astype(int)
+    azimuths = (
+        np.ones(t.size, int)
+        if k == 0
+        else rule.azimuth // 3 + (more(AZIMUTHS_OF_PHASE, rule.azimuth) * phase * share).astype(int)
+    )
     of = np.repeat(np.arange(t.size), azimuths)
     place = (np.arange(of.size) - (np.cumsum(azimuths) - azimuths)[of] + 0.5) / azimuths[of]
     columns = [(t[of], np.cos(0.5 * np.pi * place), 0.5 * d_mu[of] / azimuths[of])]
