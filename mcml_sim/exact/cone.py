@@ -37,7 +37,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.special_functions import dispersion, logarithm, square_root
+from mcml_sim.exact.special_functions import dispersion, inverse, logarithm, square_root
 
 SLOPES = np.linspace(-0.8, 0.8, 7)  # Im tau of the paths at hand
 FIRST_TAU, LAST_TAU = -7.0, 10.0  # beyond, the integrand is its own leading power to 1e-12
@@ -53,9 +53,9 @@ class System(NamedTuple):
     source: jax.Array  # vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)
 
 
-def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -> jax.Array:
+def series(equations: System, orders: int) -> jax.Array:
     """Return m_j, where R^(k) / alpha = sum alpha^j m_j over the orders of scattering less one: (2, orders)."""
-    matrix, leaving, source = system(n, k, x_nodes, angles)
+    matrix, leaving, source = equations
     _, powers = jax.lax.scan(lambda v, _: (matrix @ v, v), leaving, None, length=orders)
     return source @ powers.T / np.pi
 
@@ -78,36 +78,37 @@ def system(n: jax.Array, k: jax.Array, x_nodes: int, angles: int) -> System:
     turn = jnp.where(k.imag == 0.0, 1.0, np.exp(0.25j * np.pi))
     y, dy = _y_nodes(jax.lax.stop_gradient(n), jnp.abs(k), x_nodes)
     x, root = turn * y, jnp.sqrt(dy) * square_root(turn)
-    f, slope, mu, weight = _mean_over_azimuth(n, k, turn, y, angles)
-    q = 0.5 * jnp.sum(f * weight, axis=(0, 2))
-    over_mu = -0.5j * weight / mu
-    (ahead, back), dh = jnp.sum(f * over_mu, axis=2), jnp.sum(slope * over_mu, axis=(0, 2))
-    h = ahead - back
+    q, h, dh = _over_cone(n, k, turn, y, angles)
     whole, derivative = -x * h, -(h + x * dh) / (2.0 * x)  # Q and dQ / d(x^2)
     squares = x * x
     same = np.eye(x_nodes, dtype=bool)
     apart = jnp.where(same, 1.0, squares[:, None] - squares)
-    loewner = jnp.where(same, derivative, (whole[:, None] - whole) / apart)
+    loewner = jnp.where(same, derivative, (whole[:, None] - whole) * inverse(apart))
     spread = 1.0 - dispersion(jnp.ones(()), squares + k * k)
     matrix = jnp.where(same, spread, 0.0) - root[:, None] * loewner * root / np.pi
     source = root * jnp.stack([4.0 * n / (n + 1.0) ** 2 / (1.0 + squares), 2.0 * n**2 * q])
     return System(matrix, root * q, source)
 
 
-def _mean_over_azimuth(
+def _over_cone(
     n: jax.Array, k: jax.Array, turn: jax.Array, y: jax.Array, angles: int
-) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """Return f(x) and f(-x) by nodes of the cone, their derivatives, mu and the weights: each (2, x, angles)."""
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Return q(x), h(x) = -Q / x and dh/dx by nodes of the cone, each complex128 (x,)."""
     both = jnp.stack([y, -y])
     cone = _cone(n, jnp.abs(k), angles)
     middle = _between_singularities(*jax.lax.stop_gradient((n, k, turn * both)))
     nearest = jnp.argmin(jnp.abs(middle[..., None] - SLOPES), axis=-1)
-    mu, sine, weight = (part[nearest] for part in cone)
+    # XLA takes rows of complex numbers one number at a time.
+    mu, sine, weight = (jax.lax.complex(part.real[nearest], part.imag[nearest]) for part in cone)
     depth = 1.0 + 1j * (turn * both)[..., None] * mu
     across = 1j * k * sine
     # The first factor winds from the fourth quadrant to the third, the second from the second to the fourth.
-    f = mu / (np.exp(0.25j * np.pi) * square_root(-1j * (depth + across)) * square_root(depth - across))
-    return f, -1j * (depth / mu) * f**3, mu, weight
+    roots = np.exp(0.25j * np.pi) * square_root(-1j * (depth + across)) * square_root(depth - across)
+    over_mu = inverse(roots)  # f / mu
+    ahead, back = -0.5j * jnp.sum(over_mu * weight, axis=2)
+    moments = weight * mu * over_mu
+    q = 0.5 * jnp.sum(moments, axis=(0, 2))
+    return q, ahead - back, -0.5 * jnp.sum(depth * moments * over_mu * over_mu, axis=(0, 2))
 
 
 def _between_singularities(n: jax.Array, k: jax.Array, x: jax.Array) -> jax.Array:

@@ -128,26 +128,36 @@ def _total_of(w: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Ar
 
 def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
     """Return the table of one n > 1, or its derivative by n, in seconds."""
-    with jax.enable_x64(True), jax.core.eval_context():
-        lines = np.stack([_line(n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
-        # And the polynomials at k = 0.
-        first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
-        alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * chebyshev_nodes(rule.degree)) ** 2
-        origins = np.full(alpha.shape[0], ORIGIN)
-        totals = _polynomials(_resolvents(n, origins, alpha, *_sizes(rule, MIDDLE_NODES), slope))
-        lines = np.concatenate([lines, totals[:, :, None]], axis=2)
-        ray = _ray(rule.line).k
-        beyond = np.abs(ray) > MIDDLE
-        sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
-        parts = [
-            _in_chunks(partial(_series, n, x_nodes=x_nodes, angles=angles, slope=slope), part)
-            for part, (x_nodes, angles) in zip((ray[~beyond], ray[beyond]), sizes, strict=True)
-        ]
+    ray = _ray(rule.line).k
+    beyond = np.abs(ray) > MIDDLE
+    sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
+    parts = [partial(_line, n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))]
+    parts += [partial(_origins, n, rule, slope)]
+    parts += [
+        partial(_in_chunks, partial(_series, n, x_nodes=x_nodes, angles=angles, slope=slope), part)
+        for part, (x_nodes, angles) in zip((ray[~beyond], ray[beyond]), sizes, strict=True)
+    ]
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:  # the longest of them are last
+        *of_lines, totals, near, far = list(pool.map(_in_double, reversed(parts)))[::-1]
+    lines = np.concatenate([np.stack(of_lines, axis=1), totals[:, :, None]], axis=2)
     if not slope:  # what enters comes out again where nothing is absorbed, z = -1
         for light, name in enumerate(ILLUMINATIONS):
             white = lines[light, -1, -1]
             white[0] += entered(Setting(name, n)) - white @ (-1.0) ** np.arange(rule.degree)
-    return Table(lines, np.concatenate(parts, axis=1))
+    return Table(lines, np.concatenate([near, far], axis=1))
+
+
+def _in_double(part: Callable[[], Complexes]) -> Complexes:
+    with jax.enable_x64(True), jax.core.eval_context():  # which holds for a thread
+        return part()
+
+
+def _origins(n: float, rule: Rule, slope: bool) -> Complexes:
+    """Return the polynomials of every group at k = 0: (2, groups, degree)."""
+    first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
+    alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * chebyshev_nodes(rule.degree)) ** 2
+    origins = np.full(CHUNK, ORIGIN)  # as many as wave numbers go together: one program serves both
+    return _polynomials(_resolvents(n, origins, alpha, *_sizes(rule, MIDDLE_NODES), slope))
 
 
 def shapes(rule: Rule) -> Table:
@@ -182,10 +192,13 @@ def _polynomials(values: Complexes) -> Complexes:
 
 
 def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: int, slope: bool) -> Complexes:
-    """Return R^(k) / alpha for albedos (k, m), complex by the nodes in w, or its derivative by n: (2, k, m)."""
+    """Return R^(k) / alpha for albedos (k, m), complex by the nodes in w, or its derivative by n: (2, k, m).
+
+    There may be more wave numbers than rows of albedos.
+    """
     here, change = ([np.asarray(part) for part in system] for system in _systems(n, k, x_nodes, angles, slope))
     transforms = []
-    for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=True):
+    for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=False):
         resolvents = np.eye(x_nodes) - albedo[:, None, None] * matrix
         adjoint = np.linalg.solve(resolvents, leaving[None, :, None])[..., 0]
         if not slope:
@@ -199,15 +212,9 @@ def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: 
 
 
 def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Complexes:
-    """Compute at all k, on every core: (2, k, ...)."""
+    """Compute at all k, few at once: (2, k, ...)."""
     parts = np.array_split(np.pad(k, (0, -k.size % CHUNK), mode="edge"), -(-k.size // CHUNK))
-
-    def in_double(part: Complexes) -> Complexes:
-        with jax.enable_x64(True):  # which holds for a thread
-            return function(part)
-
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        return np.concatenate(list(pool.map(in_double, parts)), axis=1)[:, : k.size]
+    return np.concatenate([function(part) for part in parts], axis=1)[:, : k.size]
 
 
 @partial(jit, static_argnums=(2, 3, 4))
@@ -222,14 +229,16 @@ def _systems(
     return jax.jvp(at, (n,), (1.0,)) if slope else (at(n), ())
 
 
-@partial(jit, static_argnums=(2, 3, 4))
-def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
+def _series(n: float, k: Complexes, x_nodes: int, angles: int, slope: bool) -> Complexes:
     """Return the transform of each order of scattering, or its derivative by n: (2, k, orders)."""
+    here, change = _systems(n, k, x_nodes, angles, slope)
+    return np.asarray(_in_orders(here, change) if slope else _in_orders(here))
 
-    def at(n: jax.Array) -> jax.Array:
-        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles), out_axes=1)(k)
 
-    return jax.jvp(at, (n,), (1.0,))[1] if slope else at(n)
+@jit
+def _in_orders(here: cone.System, change: cone.System | None = None) -> jax.Array:
+    at = jax.vmap(partial(cone.series, orders=ORDERS), out_axes=1)
+    return at(here) if change is None else jax.jvp(at, (here,), (change,))[1]
 
 
 def _sizes(rule: Rule, factors: tuple[float, float]) -> tuple[int, int]:

@@ -112,6 +112,11 @@ def _gauss_rule(order: int) -> tuple[Floats, Floats]:
     return nodes, measure.sum() * vectors[0] ** 2
 
 
+def inverse(z: jax.Array) -> jax.Array:
+    """Return 1 / z of z != 0."""
+    return jnp.conj(z) / (z.real**2 + z.imag**2)
+
+
 @jax.custom_jvp
 def square_root(z: jax.Array) -> jax.Array:
     """Return the principal root of z != 0."""

@@ -326,7 +326,7 @@ def test_the_code_s_matrix_is_the_page_s_and_its_powers_are_orders():
     k = 0.5j + 3.0 * RAY
     with jax.enable_x64(True):
         matrix, leaving, source = (np.asarray(part) for part in jax.jit(lambda k: cone.system(1.4, k, 160, 112))(k))
-        series = np.asarray(jax.jit(lambda k: cone.series(1.4, k, 40, 160, 112))(k))
+        series = np.asarray(jax.jit(lambda k: cone.series(cone.system(1.4, k, 160, 112), 40))(k))
     for index, light in enumerate(LIGHTS):
         q, s, m = system(k, 1.4, light)
         whole = 0.8 / np.pi * source[index] @ np.linalg.solve(np.eye(160) - 0.8 * matrix, leaving)

@@ -52,7 +52,7 @@ def test_light_scattered_once_is_the_closed_form(light):
     """`single_scattering` shares no code with the cone."""
     where = Setting(light, n=1.4)
     rate, weighted = transform_density(where)
-    series = jax.jit(lambda k: cone.series(1.4, k, 1, 160, 112))
+    series = jax.jit(lambda k: cone.series(cone.system(1.4, k, 160, 112), 1))
     with jax.enable_x64(True):
         for size in (1.0, 10.0, 300.0):
             k = size * np.exp(0.25j * np.pi)
