@@ -286,7 +286,7 @@ def _sets(contents: Iterable[tuple[str, Content]]) -> dict[str, tuple[Content, s
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
 LABEL_DISTANCE = 0.5  # of an axis name from its panel [inch]
-MOST, KEPT = 18, 12  # constants of which a figure shows all: the panels of more are too small, so it shows so many
+MOST = 9  # constants that a figure shows: the panels of more are too small
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
@@ -298,8 +298,8 @@ def corner_figure(record_name: str, source: Source) -> Figure:
     if len(names) > MOST:
         correlation = np.abs(np.corrcoef(samples, rowvar=False))
         np.fill_diagonal(correlation, 0.0)
-        kept = sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:KEPT].tolist())
-        held_back = f"the {KEPT} of {len(names)} constants that\nare most correlated with another one"
+        kept = sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:MOST].tolist())
+        held_back = f"the {MOST} of {len(names)} constants that\nare most correlated with another one"
         samples, names = samples[:, kept], [names[place] for place in kept]
     constants = [fitted.content["constants"][name] for name in names]
     figure = canvas(8.0, layout="none")
@@ -357,7 +357,7 @@ def _axes(grid: NDArray[Any], names: list[str]) -> None:
 
 
 def _outer(axis: Any, label: str, rotation: float) -> None:
-    axis.set_major_formatter(ScalarFormatter(useOffset=False))
+    axis.set_major_formatter(ScalarFormatter(useOffset=False, useMathText=False))
     axis.get_major_formatter().set_scientific(False)
     axis.set_label_text(label)
     for text in axis.get_ticklabels():
