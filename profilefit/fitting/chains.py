@@ -262,6 +262,8 @@ def walk(
     start = start.copy()
     for _ in range(HALVINGS):
         outside = ~np.isfinite(log_density(start))
+        if not np.any(outside):
+            break
         start[outside] = 0.5 * (start[outside] + centre)
     sampler = emcee.EnsembleSampler(*start.shape, log_density, vectorize=True, moves=list(moves))
     sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()

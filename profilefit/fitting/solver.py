@@ -282,7 +282,7 @@ def solve(
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, _scaled(jacobian, scale), proposed, ends)
-        here, aimed, damping, state = _stepped(proposed, _scaled(values, unit), _scaled(slope, unit), state, y, size)
+        here, *ahead = _stepped(proposed, _scaled(values, unit), _scaled(slope, unit), state, y, size)
         taken = steps == 1 or not np.array_equal(here, y)
         if taken:
             y, best = here, (point, values, jacobian)
@@ -292,17 +292,18 @@ def solve(
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
                 slope = _held(values, _scaled(jacobian, scale), y, ends)
-                _, aimed, damping, state = _stepped(y, _scaled(values, unit), _scaled(slope, unit), None, y, size)
+                _, *ahead = _stepped(y, _scaled(values, unit), _scaled(slope, unit), None, y, size)
+            top, triangle = ahead[-2:]  # stand for values and slope from here on: the same products of columns
+        aimed, damping, state = ahead[:3]
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
-        slope = _held(best[1], _scaled(best[2], scale), y, ends)
-        step = _within(room, aimed - y, damping, _scaled(best[1], unit), _scaled(slope, unit))
+        step = _within(room, aimed - y, damping, top, triangle)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
         least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
         if ended or steps >= most:
             break
-        change = best[2] @ ((aimed - y) * scale)  # of the residuals, by the linear model
-        if -float(change @ (2.0 * best[1] + change)) < least:
+        change = triangle @ (aimed - y)  # of the residuals, by the linear model
+        if -float(change @ (2.0 * top + change)) < least * unit**2:
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
@@ -348,7 +349,8 @@ def _scaled(numbers: Floats, scale: Floats | float) -> Floats:
 
 def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:
     """Return the Jacobian without what would move parameters beyond bounds (Bertsekas, SIAM J. Control Optim. 20)."""
-    return np.where(_active(values, jacobian, y, ends), 0.0, jacobian)
+    active = _active(values, jacobian, y, ends)
+    return np.where(active, 0.0, jacobian) if np.any(active) else jacobian
 
 
 class _Tangent(eqx.Module):
@@ -388,7 +390,10 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
 
 
 def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Any, ...]:
-    """Advance least squares by the triangular factor, filled up to a `size` of parameters; results of `_advanced`."""
+    """Advance least squares by the triangular factor, filled up to a `size` of parameters.
+
+    Return what `_advanced` does, and the factor: the column of the values (p + 1,) and those of the slope.
+    """
     count = y.size
     triangle = np.zeros((size + 1, size + 1))
     if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):
@@ -401,7 +406,7 @@ def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, s
     more = (0, size - count)
     at, y = np.pad(at, more), np.pad(y, more)
     here, aimed, damping, state = _advanced(SOLVER, at, triangle[:, size], triangle[:, :size], state, y)
-    return here[:count], aimed[:count], damping, state
+    return here[:count], aimed[:count], damping, state, triangle[:, size], triangle[:, :count]
 
 
 def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: float) -> str:
@@ -431,7 +436,7 @@ def minimise(
         at: value and gradient (p,) for (p,).
         start: (p,) point to start from.
         bounds: lowest and highest points, all finite.
-        tolerance: size of every derivative by y at which the search ends.
+        tolerance: size of every derivative by x, times cos y, at which the search ends.
         most: number of evaluations after which the search gives up.
 
     Returns:
@@ -444,14 +449,15 @@ def minimise(
         value, gradient = at(middle + half * np.sin(y))
         return y, value, gradient * half * np.cos(y)
 
-    best = last = evaluated(np.arcsin(np.clip((start - middle) / np.where(half > 0, half, 1.0), -1.0, 1.0)))
+    reach = np.where(half > 0, half, 1.0)
+    best = last = evaluated(np.arcsin(np.clip((start - middle) / reach, -1.0, 1.0)))
     unit = max(float(np.max(np.abs(last[2]))), 1.0)  # the first step is the gradient: of length 1 at most
     state = None
     for _ in range(most):
         value = np.asarray(last[1] / unit)
         here, aimed, _, state = _advanced(MINIMISER, last[0], value, last[2] / unit, state, best[0])
         best = last if np.array_equal(here, last[0]) else best
-        if converged := bool(np.max(np.abs(best[2])) <= tolerance):
+        if converged := bool(np.max(np.abs(best[2]) / reach) <= tolerance):
             break
         last = evaluated(aimed)
     y = best[0]
