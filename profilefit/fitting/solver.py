@@ -278,11 +278,10 @@ def solve(
     scale = 1.0 / np.where(sizes > 0, sizes, 1.0) if scale is None else np.asarray(scale, float)
     unit = COLUMN / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
-    size = next((size for size in SIZES if size >= start.size), start.size)
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, _scaled(jacobian, scale), proposed, ends)
-        here, *ahead = _stepped(proposed, _scaled(values, unit), _scaled(slope, unit), state, y, size)
+        here, aimed, damping, state, *factor = _stepped(proposed, values, slope, unit, state, y)
         taken = steps == 1 or not np.array_equal(here, y)
         if taken:
             y, best = here, (point, values, jacobian)
@@ -292,9 +291,8 @@ def solve(
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
                 slope = _held(values, _scaled(jacobian, scale), y, ends)
-                _, *ahead = _stepped(y, _scaled(values, unit), _scaled(slope, unit), None, y, size)
-            top, triangle = ahead[-2:]  # stand for values and slope from here on: the same products of columns
-        aimed, damping, state = ahead[:3]
+                _, aimed, damping, state, *factor = _stepped(y, values, slope, unit, None, y)
+            top, triangle = factor  # stand for values and slope: the same products of columns
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
         step = _within(room, aimed - y, damping, top, triangle)
         proposed = np.clip(y + step, *ends)
@@ -389,16 +387,13 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
     return np.asarray(here), np.asarray(proposed), float(damping), state
 
 
-def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Any, ...]:
-    """Advance least squares by the triangular factor, filled up to a `size` of parameters.
-
-    Return what `_advanced` does, and the factor: the column of the values (p + 1,) and those of the slope.
-    """
-    count = y.size
+def _stepped(at: Floats, values: Floats, slope: Floats, unit: float, state: Any, y: Floats) -> tuple[Any, ...]:
+    """Advance least squares by the triangular factor, filled up to one of `SIZES`; results of `_advanced`, and it."""
+    count, size = y.size, next((size for size in SIZES if size >= y.size), y.size)
     triangle = np.zeros((size + 1, size + 1))
-    if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):
+    rows = _scaled(np.column_stack([slope, values]), unit)
+    if np.all(np.isfinite(rows)):
         with np.errstate(over="ignore", invalid="ignore"):
-            rows = np.column_stack([slope, values])
             factor = np.linalg.qr(rows[np.any(rows, axis=1)], mode="r")  # residuals that do not count are 0
         triangle[: len(factor), [*range(count), size]] = factor
     else:
