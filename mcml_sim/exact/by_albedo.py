@@ -57,8 +57,7 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = 
         for value in np.unique(alpha):
             here = alpha == value
             solved = _transform(float(value), setting, rule)
-            size = BLOCK if np.count_nonzero(here) > 1 else 1  # a block of one number would be all filling
-            started.append((here, [_of_block(kernel, solved, value, block) for block in blocks(x[here], size)]))
+            started.append((here, [_of_block(kernel, solved, value, block) for block in blocks(x[here])]))
         for here, parts in started:
             out[here] = np.concatenate(parts)[: np.count_nonzero(here)]
     return out
