@@ -40,9 +40,9 @@ SMALL_TERMS = 13  # which ends below rounding
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def bessel_k(order: int, z: jax.Array) -> jax.Array:
     """Return K_order(z) for `order` 0 or 1, complex128 `z` != 0, |arg z| <= pi/4; relative error below 1e-13."""
-    near = jnp.abs(z) < SERIES_RADIUS
-    series = _series(order, jnp.where(near, z, SERIES_RADIUS))
-    return jnp.where(near, series, _fractions(order, jnp.where(near, SERIES_RADIUS, z)))
+    near, angle = jnp.abs(z) < SERIES_RADIUS, jnp.arctan(z.imag / z.real)  # which takes a quarter of the time
+    series = _series(order, jnp.where(near, z, SERIES_RADIUS), angle)
+    return jnp.where(near, series, _fractions(order, jnp.where(near, SERIES_RADIUS, z), angle))
 
 
 @bessel_k.defjvp
@@ -54,14 +54,14 @@ def _bessel_k_jvp(order: int, primals: tuple, tangents: tuple) -> tuple[jax.Arra
     return value, slope * dz
 
 
-def _series(order: int, z: jax.Array) -> jax.Array:
+def _series(order: int, z: jax.Array, angle: jax.Array) -> jax.Array:
     k = np.arange(SERIES_TERMS)
     bessel_i = np.exp(-gammaln(k + 1) - gammaln(k + order + 1))
     rest = bessel_i * 0.5 * (digamma(k + 1) + digamma(k + order + 1))
     half = 0.5 * z
     square = half * half
     # jnp.log of complex numbers takes ten times as long
-    ln_half = jax.lax.complex(0.5 * jnp.log(half.real**2 + half.imag**2), jnp.arctan(z.imag / z.real))
+    ln_half = jax.lax.complex(0.5 * jnp.log(half.real**2 + half.imag**2), angle)
     logarithmic, regular = ln_half * _polynomial(bessel_i, square), _polynomial(rest, square)
     if order == 0:
         return regular - logarithmic
@@ -75,7 +75,7 @@ def _polynomial(coefficients: Floats, x: jax.Array) -> jax.Array:
     return value
 
 
-def _fractions(order: int, z: jax.Array) -> jax.Array:
+def _fractions(order: int, z: jax.Array, angle: jax.Array) -> jax.Array:
     real, imag = z.real, z.imag
     sum_real, sum_imag = jnp.zeros_like(real), jnp.zeros_like(imag)
     for pole, weight in zip(*_gauss_rule(order), strict=True):
@@ -83,7 +83,7 @@ def _fractions(order: int, z: jax.Array) -> jax.Array:
         sum_real, sum_imag = sum_real + part * (real + pole), sum_imag - part * imag
     sign = -1.0 if order == 0 else 1.0
     decay = jnp.exp(-real) * jnp.sqrt(0.5 * np.pi / jnp.sqrt(real**2 + imag**2))
-    phase = -imag - 0.5 * jnp.arctan(imag / real)
+    phase = -imag - 0.5 * angle
     wave = jax.lax.complex(decay * jnp.cos(phase), decay * jnp.sin(phase))
     return wave * jax.lax.complex(1.0 + sign * sum_real, sign * sum_imag)
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import emcee
@@ -31,7 +31,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
-from mcml_sim.exact.compiled import filter_jit
+from mcml_sim.exact.compiled import WIDE, filter_jit
 from mcml_sim.media.arrays import Floats, require, require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
@@ -167,6 +167,8 @@ class Ridge:
     def bent(self, straight: Floats) -> tuple[Floats, Floats]:
         """Return parameters (m, p) at straight coordinates (m, p), and ln of the volume (m,) of those in these."""
         within = np.clip(straight[:, 0], self.first[0], self.first[-1])
+        if self.spread is not None:  # every root is 1
+            return np.column_stack([straight[:, 0], self._others(within) + straight[:, 1:]]), np.zeros(len(within))
         root = self._root(within)
         others = self._others(within) + np.einsum("mij,mj->mi", root, straight[:, 1:])
         return np.column_stack([straight[:, 0], others]), np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
@@ -262,6 +264,8 @@ def walk(
     start = start.copy()
     for _ in range(HALVINGS):
         outside = ~np.isfinite(log_density(start))
+        if not np.any(outside):
+            break
         start[outside] = 0.5 * (start[outside] + centre)
     sampler = emcee.EnsembleSampler(*start.shape, log_density, vectorize=True, moves=list(moves))
     sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()
@@ -375,7 +379,7 @@ class _Density(eqx.Module):
             density = cls(fit.law, fit.rings, *numbers, ResidualFunction(fit.objective, fit.free))
             return jax.tree.map(jnp.asarray, density)
 
-    @filter_jit
+    @partial(filter_jit, options=WIDE)
     def __call__(self, points):
         def log_density(theta):
             moved = self.centre + self.adjust @ (theta - self.centre)

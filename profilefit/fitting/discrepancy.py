@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact.compiled import filter_jit
+from mcml_sim.exact.compiled import BRIEF, filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
@@ -283,7 +283,7 @@ def _scales(x: Floats) -> Floats:
     return np.array([SHORTEST * np.min(np.diff(along)), LONGEST * np.ptp(along)]) if along.size > 1 else np.ones(2)
 
 
-@filter_jit
+@partial(filter_jit, options=BRIEF)
 def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
     def energy(vector):
         moved = law.with_vector(problem.free, vector).under(rings.surface)

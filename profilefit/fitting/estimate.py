@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import equinox as eqx
@@ -32,7 +32,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError, SettingError
-from mcml_sim.exact.compiled import filter_jit
+from mcml_sim.exact.compiled import BRIEF, filter_jit
 from mcml_sim.exact.light import reduced, unreduced
 from mcml_sim.media.arrays import Floats, require, require_own_process
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
@@ -404,7 +404,7 @@ def followed(hessian: Floats, mixed: Floats) -> Floats:
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
 
 
-@filter_jit
+@partial(filter_jit, options=BRIEF)
 def _curved(residual, vector, along, law, rings):
     """One column of both: all at once would compile as long as a fit."""
 

@@ -207,29 +207,32 @@ def matern(distance: Floats) -> Floats:
     return (1.0 + scaled) * np.exp(-scaled)
 
 
-def _bent(distance: Floats) -> Floats:
-    """Return d `matern` / d ln length."""
+def _bent(distance: Floats) -> tuple[Floats, Floats]:
+    """Return `matern` and its derivative by ln length, of one exponential."""
     scaled = np.sqrt(3.0) * distance
-    return scaled**2 * np.exp(-scaled)
+    decay = np.exp(-scaled)
+    return (1.0 + scaled) * decay, scaled**2 * decay
 
 
 def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floats]:
     """Return minus the restricted log likelihood at ln of amplitude and lengths, and its gradient (3,)."""
-    square, far_u, far_s = np.exp(2.0 * theta[0]), apart_u * np.exp(-theta[1]), apart_s * np.exp(-theta[2])
-    along_u, along_s = matern(far_u), matern(far_s)
-    kernel = square * (along_u * along_s + NUGGET * np.eye(y.size))
+    square = np.exp(2.0 * theta[0])
+    (along_u, bent_u), (along_s, bent_s) = _bent(apart_u * np.exp(-theta[1])), _bent(apart_s * np.exp(-theta[2]))
+    kernel = square * along_u * along_s
+    kernel.flat[:: y.size + 1] += square * NUGGET
     value, by_covariance = _restricted(kernel + noise, y, slope)
-    parts = 2.0 * kernel, square * _bent(far_u) * along_s, square * along_u * _bent(far_s)
-    return value, np.array([np.vdot(by_covariance, part) for part in parts])
+    parts = kernel, bent_u * along_s, along_u * bent_s
+    return value, np.array([2.0, square, square]) * [np.vdot(by_covariance, part) for part in parts]
 
 
 def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
     """Return minus Patterson and Thompson's (3) of `y` but for `slope` times anything; derivatives by `covariance`."""
     root = np.linalg.cholesky(covariance)
-    lower = np.tril(dpotri(root, lower=1)[0])  # of the inverse: a third of what solving for it takes
+    lower = dpotri(root, lower=1)[0]  # of the inverse, 0 above as `root` is: a third of what solving for it takes
     across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
     seen = solve_triangular(root, across, lower=True, trans=1)
-    inverse = lower + np.tril(lower, -1).T - seen @ seen.T  # of what `slope` leaves
+    inverse = lower + lower.T - seen @ seen.T  # of what `slope` leaves
+    inverse.flat[:: y.size + 1] -= np.diag(lower)
     rest = inverse @ y
     logs = np.sum(np.log(np.diag(root))) + np.sum(np.log(np.abs(np.diag(triangle))))
     return float(logs + 0.5 * (y @ rest)), 0.5 * (inverse - np.outer(rest, rest))

@@ -278,11 +278,10 @@ def solve(
     scale = 1.0 / np.where(sizes > 0, sizes, 1.0) if scale is None else np.asarray(scale, float)
     unit = COLUMN / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
-    size = next((size for size in SIZES if size >= start.size), start.size)
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, _scaled(jacobian, scale), proposed, ends)
-        here, aimed, damping, state = _stepped(proposed, _scaled(values, unit), _scaled(slope, unit), state, y, size)
+        here, aimed, damping, state, *factor = _stepped(proposed, values, slope, unit, state, y)
         taken = steps == 1 or not np.array_equal(here, y)
         if taken:
             y, best = here, (point, values, jacobian)
@@ -292,17 +291,17 @@ def solve(
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
                 slope = _held(values, _scaled(jacobian, scale), y, ends)
-                _, aimed, damping, state = _stepped(y, _scaled(values, unit), _scaled(slope, unit), None, y, size)
+                _, aimed, damping, state, *factor = _stepped(y, values, slope, unit, None, y)
+            top, triangle = factor  # stand for values and slope: the same products of columns
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
-        slope = _held(best[1], _scaled(best[2], scale), y, ends)
-        step = _within(room, aimed - y, damping, _scaled(best[1], unit), _scaled(slope, unit))
+        step = _within(room, aimed - y, damping, top, triangle)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
         least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
         if ended or steps >= most:
             break
-        change = best[2] @ ((aimed - y) * scale)  # of the residuals, by the linear model
-        if -float(change @ (2.0 * best[1] + change)) < least:
+        change = triangle @ (aimed - y)  # of the residuals, by the linear model
+        if -float(change @ (2.0 * top + change)) < least * unit**2:
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
@@ -348,7 +347,8 @@ def _scaled(numbers: Floats, scale: Floats | float) -> Floats:
 
 def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:
     """Return the Jacobian without what would move parameters beyond bounds (Bertsekas, SIAM J. Control Optim. 20)."""
-    return np.where(_active(values, jacobian, y, ends), 0.0, jacobian)
+    active = _active(values, jacobian, y, ends)
+    return np.where(active, 0.0, jacobian) if np.any(active) else jacobian
 
 
 class _Tangent(eqx.Module):
@@ -387,13 +387,13 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
     return np.asarray(here), np.asarray(proposed), float(damping), state
 
 
-def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Any, ...]:
-    """Advance least squares by the triangular factor, filled up to a `size` of parameters; results of `_advanced`."""
-    count = y.size
+def _stepped(at: Floats, values: Floats, slope: Floats, unit: float, state: Any, y: Floats) -> tuple[Any, ...]:
+    """Advance least squares by the triangular factor, filled up to one of `SIZES`; results of `_advanced`, and it."""
+    count, size = y.size, next((size for size in SIZES if size >= y.size), y.size)
     triangle = np.zeros((size + 1, size + 1))
-    if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):
+    rows = _scaled(np.column_stack([slope, values]), unit)
+    if np.all(np.isfinite(rows)):
         with np.errstate(over="ignore", invalid="ignore"):
-            rows = np.column_stack([slope, values])
             factor = np.linalg.qr(rows[np.any(rows, axis=1)], mode="r")  # residuals that do not count are 0
         triangle[: len(factor), [*range(count), size]] = factor
     else:
@@ -401,7 +401,7 @@ def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, s
     more = (0, size - count)
     at, y = np.pad(at, more), np.pad(y, more)
     here, aimed, damping, state = _advanced(SOLVER, at, triangle[:, size], triangle[:, :size], state, y)
-    return here[:count], aimed[:count], damping, state
+    return here[:count], aimed[:count], damping, state, triangle[:, size], triangle[:, :count]
 
 
 def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: float) -> str:
@@ -431,7 +431,7 @@ def minimise(
         at: value and gradient (p,) for (p,).
         start: (p,) point to start from.
         bounds: lowest and highest points, all finite.
-        tolerance: size of every derivative by y at which the search ends.
+        tolerance: size of every derivative by x, times cos y, at which the search ends.
         most: number of evaluations after which the search gives up.
 
     Returns:
@@ -444,14 +444,15 @@ def minimise(
         value, gradient = at(middle + half * np.sin(y))
         return y, value, gradient * half * np.cos(y)
 
-    best = last = evaluated(np.arcsin(np.clip((start - middle) / np.where(half > 0, half, 1.0), -1.0, 1.0)))
+    reach = np.where(half > 0, half, 1.0)
+    best = last = evaluated(np.arcsin(np.clip((start - middle) / reach, -1.0, 1.0)))
     unit = max(float(np.max(np.abs(last[2]))), 1.0)  # the first step is the gradient: of length 1 at most
     state = None
     for _ in range(most):
         value = np.asarray(last[1] / unit)
         here, aimed, _, state = _advanced(MINIMISER, last[0], value, last[2] / unit, state, best[0])
         best = last if np.array_equal(here, last[0]) else best
-        if converged := bool(np.max(np.abs(best[2])) <= tolerance):
+        if converged := bool(np.max(np.abs(best[2]) / reach) <= tolerance):
             break
         last = evaluated(aimed)
     y = best[0]

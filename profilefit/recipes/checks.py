@@ -5,8 +5,8 @@ objective small, with its working weights and not the inverse covariance of the 
 what rests on too few photons is left out of both fits. A law that is not the truth has another optimum for every
 weighting, so only then is the photons' noise all that can part them.
 
-Discretisation is how far constants are from those of infinitely narrow rings. A fit is repeated with rings two to six
-times as wide, made of the same photons. What falls with the square of the width (a ring's middle in place of its
+Discretisation is how far constants are from those of infinitely narrow rings. A fit is repeated with rings two and
+three times as wide, made of the same photons. What falls with the square of the width (a ring's middle in place of its
 average, a straight line in place of the cdf) is extrapolated to a width of zero (Richardson, Phil. Trans. R. Soc. A
 210, 1911). An objective that compares integrals over rings has nearly none.
 """
@@ -48,9 +48,9 @@ LARGEST_CUT = 0.1  # of a standard error of A: what the end of the longest paths
 LEAST_CHANCE = 0.0027  # of a difference by noise alone that is none: three standard errors of a single constant
 AGREE, DIFFER = "the fits agree", "the fits differ by more than the photons' noise"
 NO_ERRORS = "the photon fit has no finite errors: leave out radial bins that hold next to no light"
-# Widths of rings [of those fitted], as many at once as the jackknife has groups: that solver is compiled already. Of
-# the trusted ones the error is made; wider rings show the order.
-FACTORS, TRUSTED, ORDER = tuple(range(1, estimate.JACKKNIFE_GROUPS + 1)), (2, 3), 2
+# Widths of rings [of those fitted] that the error is made of, and the order in which it falls with them.
+TRUSTED, ORDER = (2, 3), 2
+FACTORS = (1, *TRUSTED)
 NONE = 1e-9  # width of a ring that holds nothing [of the next edge]: narrower than any other, wide enough to divide by
 
 
