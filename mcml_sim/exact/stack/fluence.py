@@ -22,9 +22,10 @@ stack, is smooth, and is summed over the directions of `quadrature`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import exp1, expn, j0
@@ -39,7 +40,7 @@ CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated b
 # Terms of the series, nodes of Gauss's rule, and by how many e-folds its integrand falls: 3e-12 of K, and 2e-10 where
 # panels have few nodes. Thick plates in which nothing is absorbed show a million times that.
 FINE, COARSE = (16, 16, 28.0), (13, 13, 22.0)
-KEPT = 8  # sets of pairs
+KEPT = 8  # sets of depths, whose pairs many wave numbers share
 
 
 class Field(NamedTuple):
@@ -128,9 +129,9 @@ def normal_reflectances(here: Depths) -> tuple[float, float]:
 
 def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
     """Return the integral operator on fluences at the nodes, (N, N)."""
-    matrix = _by_panel(here, k)
+    matrix = _by_panel(here)(k)
     for mirror in _mirrors(here):
-        matrix += _by_panel(here, k, mirror)
+        matrix += _by_panel(here, mirror)(k)
     matrix += _slanted(here, slants) * here.weight
     if here.tail.size:  # below the last node, per fluence there: the slowest mode never ends
         z, tau, weight = here.tail
@@ -146,31 +147,9 @@ def _mirrors(here: Depths) -> list[tuple[float, float]]:
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
-class _Pairs(NamedTuple):
-    """Pairs of depths that `_by_panel` takes K between, and what it takes K with; the same for many wave numbers.
-
-    optical, height  thicknesses and heights between them (pairs,): all in one call, of which small ones take half of
-                     the time. First those of nodes apart, then those of nodes near a panel, then those within panels
-    ends             numbers of the first pair of the second and third kind
-    apart            rows and columns of the first kind, (2, n)
-    near, inside     target and source panels of the second and third kind
-    flipped          whether a near source's lower end is on the target's side; for its mirror image, the upper one
-    near_weight, inside_weight  weights of the nodes of the rules, (m, 1, rule) and (panels, nodes, rule)
-    """
-
-    optical: Floats
-    height: Floats
-    ends: Any
-    apart: tuple[Any, ...]
-    near: tuple[Any, ...]
-    inside: Any
-    flipped: Any
-    near_weight: Floats
-    inside_weight: Floats
-
-
 @lru_cache(maxsize=KEPT)
-def _pairs(here: Depths, mirror: tuple[float, float] | None) -> _Pairs:
+def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callable[[float], Floats]:
+    """Return a function of k: mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
     if mirror is not None:
         z, tau, z_ends, tau_ends = mirror[0] - z, mirror[1] - tau, mirror[0] - z_ends[::-1], mirror[1] - tau_ends[::-1]
@@ -181,51 +160,42 @@ def _pairs(here: Depths, mirror: tuple[float, float] | None) -> _Pairs:
         close |= gap < CLOSE * (ends[1] - ends[0])
     own = np.eye(here.panels, dtype=bool) & (mirror is None)
     far, shape = ~(close | own), (-1, here.nodes)
-    apart = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
+    row, column = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
     (target, source), (itself, _) = np.nonzero(close & ~own), np.nonzero(own)
     end, inside = quadrature.near_end(here.nodes), quadrature.near_node(here.nodes)
     upwards = inside.height[:, : inside.height.shape[1] // 2]
     # Whether the panel's end on the target's side is its lower one.
     below = tau_ends[0, source] < here.tau_ends[0, target]
-    pieces = []
+    flip = below if mirror is None else ~below
+    pieces = []  # optical thicknesses, and heights: all of K in one call, of which small ones take half of the time
     for at, image, ends in ((here.tau, tau, tau_ends), (here.z, z, z_ends)):
         gap, length = at.reshape(shape)[target] - ends[below.astype(int), source, None], np.diff(ends, axis=0)[0]
         near = np.abs(gap)[:, :, None] + length[source, None, None] * end.height
-        pieces.append([np.abs(at[apart[0]] - image[apart[1]]), near, length[itself, None, None] * upwards])
-    weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
-    return _Pairs(
-        optical=np.concatenate([piece.ravel() for piece in pieces[0]]),
-        height=np.concatenate([piece.ravel() for piece in pieces[1]]),
-        ends=np.cumsum([piece.size for piece in pieces[0]])[:2],
-        apart=apart,
-        near=(target, source),
-        inside=itself,
-        flipped=below if mirror is None else ~below,
-        near_weight=end.weight * weight[source],
-        inside_weight=inside.weight * weight[itself],
+        pieces.append([np.abs(at[row] - image[column]), near, length[itself, None, None] * upwards])
+    optical, height = (np.concatenate([piece.ravel() for piece in each]) for each in pieces)
+    starts, (_, of_near, of_own) = (
+        np.cumsum([piece.size for piece in pieces[0]])[:2],
+        (each.shape for each in pieces[0]),
     )
+    weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
+    near_weight, own_weight = end.weight * weight[source], inside.weight * weight[itself]
 
+    def at_wave(k: float) -> Floats:
+        apart, near, above = np.split(direct(optical, height, k, here.is_fine), starts)
+        matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
+        whole = matrix.reshape(here.z.size, here.z.size)
+        whole[row, column] = whole[column, row] = apart
+        whole *= here.weight
+        blocks = (near.reshape(of_near) * near_weight) @ end.through
+        blocks[flip] = blocks[flip][:, :, ::-1]
+        matrix[target, :, source] = blocks
+        # What lies below a node lies above its mirror image in the panel's middle.
+        above = above.reshape(of_own)
+        kernel = np.concatenate([above, above[:, ::-1]], axis=2) * own_weight
+        matrix[itself, :, itself] = (kernel.swapaxes(0, 1) @ inside.through).swapaxes(0, 1)
+        return whole
 
-def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None) -> Floats:
-    """Return mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
-    pairs = _pairs(here, mirror)
-    apart, near, above = np.split(direct(pairs.optical, pairs.height, k, here.is_fine), pairs.ends)
-    matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
-    whole = matrix.reshape(here.z.size, here.z.size)
-    row, column = pairs.apart
-    whole[row, column] = whole[column, row] = apart
-    whole *= here.weight
-    (target, source), itself = pairs.near, pairs.inside
-    shape = (-1, here.nodes, pairs.near_weight.shape[2])
-    blocks = (near.reshape(shape) * pairs.near_weight) @ quadrature.near_end(here.nodes).through
-    blocks[pairs.flipped] = blocks[pairs.flipped][:, :, ::-1]
-    matrix[target, :, source] = blocks
-    # What lies below a node lies above its mirror image in the panel's middle.
-    above = above.reshape(itself.size, here.nodes, pairs.inside_weight.shape[2] // 2)
-    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * pairs.inside_weight
-    through = quadrature.near_node(here.nodes).through
-    matrix[itself, :, itself] = (kernel.swapaxes(0, 1) @ through).swapaxes(0, 1)
-    return whole
+    return at_wave
 
 
 def _slanted(here: Depths, slants: Slants) -> Floats:
@@ -257,7 +227,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
     """Return X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
     phase = k * quadrature.deepest(here) * min(quadrature.steepest(here), 1.5)
-    t, d_mu = quadrature.cones(here, rule.slope + int(quadrature.more(quadrature.SLOPES_OF_PHASE, rule.slope) * phase))
+    t, d_mu = quadrature.cones(here, int(rule.slope * (1 + quadrature.SLOPES * phase)))
     a, b = reflectance(here.above, t), reflectance(here.below, t)
     ways = [(here.z, here.tau, 1 - a - matched)]
     if here.height < np.inf and here.below != 1:

@@ -37,8 +37,7 @@ RAY_NODES = 14  # of a panel
 AZIMUTHS = 0.7  # eights of them for each e-fold by which waves are shorter than mean free paths
 STEEPEST = 1e9  # where no critical angle ends the slopes
 THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical angles crosses to and fro
-SLOPES_OF_PHASE, AZIMUTHS_OF_PHASE = 0.55, 0.25  # more of them for each radian that phases turn, if there are so many
-FULL = 24  # without any turn; of fewer, fewer in proportion
+SLOPES, AZIMUTHS_A_SLOPE = 0.55 / 24, 0.25 / 8  # as much more of them for each radian that phases turn
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
 MOST_PHASE = 40.0  # as far as they turn no farther than this
 KEPT = 8  # sets of depths
@@ -325,20 +324,13 @@ def deepest(here: Depths) -> float:
     return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
 
 
-def more(of_phase: float, nodes: int) -> float:
-    """Return how many more nodes each radian of phase takes."""
-    return of_phase * min(nodes / FULL, 1.0)
-
-
 def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """Return tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
-    t, d_mu = cones(here, rule.slope + int(more(SLOPES_OF_PHASE, rule.slope) * phase))
+    t, d_mu = cones(here, int(rule.slope * (1 + SLOPES * phase)))
     # Of each slope as many azimuths as its own phases take.
     share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
     azimuths = (
-        np.ones(t.size, int)
-        if k == 0
-        else rule.azimuth // 3 + (more(AZIMUTHS_OF_PHASE, rule.azimuth) * phase * share).astype(int)
+        np.ones(t.size, int) if k == 0 else (rule.azimuth / 3 * (1 + AZIMUTHS_A_SLOPE * phase * share)).astype(int)
     )
     of = np.repeat(np.arange(t.size), azimuths)
     place = (np.arange(of.size) - (np.cumsum(azimuths) - azimuths)[of] + 0.5) / azimuths[of]
