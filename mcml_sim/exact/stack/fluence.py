@@ -40,7 +40,6 @@ CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated b
 # Terms of the series, nodes of Gauss's rule, and by how many e-folds its integrand falls: 3e-12 of K, and 2e-10 where
 # panels have few nodes. Thick plates in which nothing is absorbed show a million times that.
 FINE, COARSE = (16, 16, 28.0), (13, 13, 22.0)
-KEPT = 8  # sets of depths, whose pairs many wave numbers share
 
 
 class Field(NamedTuple):
@@ -53,9 +52,9 @@ class Field(NamedTuple):
     down: Floats  # response X of the light that comes out below
 
 
-def direct(optical: Floats, height: Floats, k: float, is_fine: bool = True) -> Floats:
-    """Return K at optical thicknesses T > 0 and heights Z, of one shape."""
-    terms, nodes, fallen = FINE if is_fine else COARSE
+def direct(optical: Floats, height: Floats, k: float, panel: int = quadrature.FEW) -> Floats:
+    """Return K at optical thicknesses T > 0 and heights Z, of one shape, for panels of so many nodes."""
+    terms, nodes, fallen = FINE if panel >= quadrature.FEW else COARSE
     across = k * height
     length = np.sqrt(optical**2 + across**2)
     # a e^v + b e^-v is the exponent
@@ -137,7 +136,7 @@ def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
         z, tau, weight = here.tail
         decay = np.hypot(here.last.mu_t * quadrature.slowest(here.last.alpha), k)
         mode = weight * np.exp(-decay * (z - here.z[-1]))
-        matrix[:, -1] += direct(tau - here.tau[:, None], z - here.z[:, None], k, here.is_fine) @ mode
+        matrix[:, -1] += direct(tau - here.tau[:, None], z - here.z[:, None], k, here.nodes) @ mode
     return matrix
 
 
@@ -147,7 +146,7 @@ def _mirrors(here: Depths) -> list[tuple[float, float]]:
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=quadrature.KEPT)
 def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callable[[float], Floats]:
     """Return a function of k: mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
@@ -181,7 +180,7 @@ def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callab
     near_weight, own_weight = end.weight * weight[source], inside.weight * weight[itself]
 
     def at_wave(k: float) -> Floats:
-        apart, near, above = np.split(direct(optical, height, k, here.is_fine), starts)
+        apart, near, above = np.split(direct(optical, height, k, here.nodes), starts)
         matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
         whole = matrix.reshape(here.z.size, here.z.size)
         whole[row, column] = whole[column, row] = apart
@@ -237,7 +236,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
         light = np.exp(-np.multiply.outer(np.sqrt(1 + t * t).real, tau)) * j0(k * np.multiply.outer(t.real, z))
         out += (0.5 * d_mu * passes / np.sqrt(1 + t * t)).real @ light
         if matched:
-            out += 0.5 * np.exp(-np.hypot(tau, k * z)) - tau * direct(tau, z, k, here.is_fine)  # X without surfaces
+            out += 0.5 * np.exp(-np.hypot(tau, k * z)) - tau * direct(tau, z, k, here.nodes)  # X without surfaces
     ray = slice(slants.cones, None)
     a, b, weight = slants.a[ray], slants.b[ray], slants.weight[ray] * slants.mu[ray]
     out += ((weight * (1 - a - matched)) @ slants.from_top[ray]).real

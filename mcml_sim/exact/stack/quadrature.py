@@ -40,7 +40,7 @@ THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical a
 SLOPES, AZIMUTHS_A_SLOPE = 0.55 / 24, 0.25 / 8  # as much more of them for each radian that phases turn
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
 MOST_PHASE = 40.0  # as far as they turn no farther than this
-KEPT = 8  # sets of depths
+KEPT = 8  # sets of depths, whose pairs many wave numbers share
 
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
@@ -98,14 +98,6 @@ class Depths:
         """Number of nodes of a panel."""
         return self.z.size // max(self.panels, 1)
 
-    @property
-    def is_fine(self) -> bool:
-        """Return whether integrals over panels are to be as fine as they get."""
-        return self.nodes >= FEW
-
-
-Panels = tuple[tuple[int, float, float, int], ...]  # layer's number, length of its first and last [mfp], how many
-
 
 def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     """Return the depths of a medium whose layers share one index, for light of wave number k [1/length]."""
@@ -113,7 +105,7 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
 
 
 @lru_cache(maxsize=KEPT)
-def _placed(medium: Medium, panels: Panels, rule: Nodes) -> Depths:
+def _placed(medium: Medium, panels: tuple[tuple[int, float, float, int], ...], rule: Nodes) -> Depths:
     layers, tops = medium.layers, medium.z_edges
     tau_tops = np.cumsum([0.0, *map(_optical, layers)])
     ends: list[tuple[float, float, float, float]] = []
@@ -156,8 +148,8 @@ def _optical(layer: Layer) -> float:
     return layer.mu_t * layer.thickness if layer.mu_t else 0.0
 
 
-def _panels(layers: tuple[Layer, ...], k: float) -> Panels:
-    """Return the panels of each layer that scatters, as far as light of wave number k [1/length] comes."""
+def _panels(layers: tuple[Layer, ...], k: float) -> tuple[tuple[int, float, float, int], ...]:
+    """Return panels of layers that scatter, as far as light of wave number k comes: layer, ends' lengths, count."""
     found, faded = [], 0.0
     numbers = [number for number, layer in enumerate(layers) if layer.mu_s > 0]
     for number, layer in enumerate(layers):
@@ -329,9 +321,7 @@ def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexe
     t, d_mu = cones(here, int(rule.slope * (1 + SLOPES * phase)))
     # Of each slope as many azimuths as its own phases take.
     share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
-    azimuths = (
-        np.ones(t.size, int) if k == 0 else (rule.azimuth / 3 * (1 + AZIMUTHS_A_SLOPE * phase * share)).astype(int)
-    )
+    azimuths = np.full(t.size, rule.azimuth / 3 * (1 + AZIMUTHS_A_SLOPE * phase * share) if k > 0 else 1.0).astype(int)
     of = np.repeat(np.arange(t.size), azimuths)
     place = (np.arange(of.size) - (np.cumsum(azimuths) - azimuths)[of] + 0.5) / azimuths[of]
     columns = [(t[of], np.cos(0.5 * np.pi * place), 0.5 * d_mu[of] / azimuths[of])]

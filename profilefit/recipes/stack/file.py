@@ -56,7 +56,6 @@ from profilefit.materials import BY_NAME, SOURCE, Material
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
 
 Floats = NDArray[np.float32]
-Three = tuple[float, float, float]
 Refusal = Callable[..., InputError]
 BY_MATERIAL = ("mu_a", "mu_s", "g")  # what a material says
 UNIT = "mm"  # of the materials, and of a file that names none
