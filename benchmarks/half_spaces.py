@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from benchmarks import half_space_table, high_orders
 from mcml_sim import Grid, Orders, Setting, exact, simulate_orders
 from mcml_sim.exact import forwards
-from mcml_sim.exact.light import unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.tracing.order_bins import Counts
@@ -68,15 +67,15 @@ def rows(setting: Setting, found: Orders) -> list[Row]:
     return [row(setting, found, alpha) for alpha in ALPHAS]
 
 
-def row(setting: Setting, found: Orders, reduced: float) -> Row:
+def row(setting: Setting, found: Orders, alpha: float) -> Row:
     """Return the row of one reduced albedo."""
-    alpha, edges = unreduced(reduced, setting.g), found.grid.r_edges
+    edges, mfp = found.grid.r_edges, float(found.mfp(alpha))
     width = np.diff(edges)[:, None]
     r = 0.5 * (edges[:-1, None] + edges[1:, None] + width * NODES[0])
-    light = np.sum(2.0 * np.pi * r * exact.profile(r, alpha, setting=setting) * 0.5 * width * NODES[1], axis=1)
+    light = np.sum(2.0 * np.pi * r * exact.profile(r, alpha, mfp, setting) * 0.5 * width * NODES[1], axis=1)
     photons, whole = found.energy(alpha), found.reflectance(alpha)
     value, error = np.asarray(photons.value), np.asarray(photons.standard_error)
-    x = np.sqrt(edges[1:] * np.maximum(edges[:-1], NEAREST / 10)) * (1.0 - alpha * setting.g)
+    x = np.sqrt(edges[1:] * np.maximum(edges[:-1], NEAREST / 10)) / mfp
     known = (error > 0) & (error < FEWEST * value)
     z = np.where(known, (light - value) / np.where(known, error, 1.0), 0.0)
     relative = np.where(error < WELL * value, np.abs(light / np.where(value > 0, value, 1.0) - 1.0), 0.0)
@@ -84,7 +83,7 @@ def row(setting: Setting, found: Orders, reduced: float) -> Row:
     at = int(np.argmax(np.where(middle, relative, 0.0)))
     total = float(np.asarray(exact.reflectance(alpha, setting)))
     return Row(
-        reduced,
+        alpha,
         (float(np.sum(z[middle] ** 2)), int(middle.sum())),
         (float(np.sum(z[near] ** 2)), int(near.sum())),
         (float(relative[at]), float(error[at] / value[at]), float(x[at])),

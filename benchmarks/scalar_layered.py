@@ -70,7 +70,7 @@ def _layers(medium: Medium) -> tuple[Floats, Floats, Floats, Floats, Floats, Flo
     inside = n[1:-1]
     critical = np.sqrt(np.maximum(1 - np.stack([n[:-2], n[2:]]) ** 2 / inside**2, 0.0))
     mu_t = np.array([layer.mu_t for layer in medium.layers])
-    absorbed = np.array([1 - layer.alpha if layer.mu_t else 0.0 for layer in medium.layers])
+    absorbed = np.array([layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in medium.layers])
     return n, medium.z_edges, mu_t, absorbed, np.array([layer.g for layer in medium.layers]), critical
 
 

@@ -13,8 +13,8 @@
     light.reflectance, light.profile([0.01, 0.1])
 
 `transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `by_albedo` its inverse,
-`forwards` the table where g > 0, `stack` the layers, all with their sources. `alpha` and `mfp` are those of the
-medium itself, not reduced by 1 - g.
+`forwards` the table where g > 0, `stack` the layers, all with their sources. `alpha` is the reduced albedo
+mu_s' / (mu_s' + mu_a) and `mfp` the transport mean free path 1 / (mu_s' + mu_a), mu_s' = (1 - g) mu_s, whatever g.
 
 Every function of the half space takes lengths in any one unit with `mfp` in that unit, and broadcasts `r` (or `xi`)
 against `alpha`. Numbers, lists and numpy arrays give float64 numpy arrays, a float for scalars; what is out of range is

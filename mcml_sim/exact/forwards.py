@@ -9,8 +9,8 @@ f a cubic spline in ln x at Chebyshev's nodes of s, for Chebyshev's extreme poin
 the polynomial through them; kappa is found anew. `benchmarks/half_space_table.py` makes the file: low orders of
 photons, the higher ones solved (`benchmarks/high_orders.py`).
 
-`reflectance`, `profile`, `cdf` and `quantile` take albedos and radii of the medium itself, radii in mean free paths:
-float64 arrays of one shape after broadcasting, of numpy or of jax, as are the answers.
+`reflectance`, `profile`, `cdf` and `quantile` take reduced albedos and radii in l*: float64 arrays of one shape after
+broadcasting, of numpy or of jax, as are the answers.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from scipy.interpolate import BSpline
 from mcml_sim.errors import InputError
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import filter_jit
-from mcml_sim.exact.light import LEAST, ExactLight, coefficients, nodes, reduced, tabulated, unreduced
+from mcml_sim.exact.light import LEAST, ExactLight, coefficients, nodes, tabulated, unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.arrays import Floats
@@ -136,7 +136,7 @@ def reflectance(alpha: Any, setting: Setting) -> Any:
 
 
 def profile(x: Any, alpha: Any, setting: Setting, coarse: bool = False) -> Any:
-    """Return R_d [1/mfp^2]; `coarse` as in `light`."""
+    """Return R_d [1/l*^2]; `coarse` as in `light`."""
     return _called(_profile, light(setting, coarse), x, alpha)
 
 
@@ -146,7 +146,7 @@ def cdf(x: Any, alpha: Any, setting: Setting) -> Any:
 
 
 def quantile(xi: Any, alpha: Any, setting: Setting) -> Any:
-    """Return the radius within which that share leaves [mfp]."""
+    """Return the radius within which that share leaves [l*]."""
     return _called(_quantile, light(setting), xi, alpha)
 
 
@@ -172,23 +172,20 @@ def _each(function: Any, own: ExactLight, x: Array, alpha: Array) -> Array:
 
 
 def _reflectance(own: ExactLight, _: Array, alpha: Array) -> Array:
-    return own.total(reduced(alpha, own.g).alpha)
+    return own.total(alpha)
 
 
 def _profile(own: ExactLight, x: Array, alpha: Array) -> Array:
-    by, length = reduced(alpha, own.g)
-    near = jnp.clip(x / length, NEAREST, FARTHEST)
-    around = 2.0 * jnp.pi * jnp.where((x == 0.0) & (alpha == 0.0), 1.0, x) * length  # no light is none at the source
-    return own.ring_density(near, by) / around
+    around = 2.0 * jnp.pi * jnp.where((x == 0.0) & (alpha == 0.0), 1.0, x)  # no light is none at the source
+    return own.ring_density(jnp.clip(x, NEAREST, FARTHEST), alpha) / around
 
 
 def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
-    by, length = reduced(alpha, own.g)
-    return _within(own, x / length, by, _whole(own, by))
+    return _within(own, x, alpha, _whole(own, alpha))
 
 
 def _within(own: ExactLight, x: Array, alpha: Array, of: tuple[Array, Array, Array]) -> Array:
-    """Return the share within x [l*], of reduced albedos; `of` as in `_whole`.
+    """Return the share within x [l*]; `of` as in `_whole`.
 
     It is the share in all light of their profile, from which A differs by the error of the table. Beyond FAR light
     falls off as that of a white medium, if there is any.
@@ -206,19 +203,18 @@ def _whole(own: ExactLight, alpha: Array) -> tuple[Array, Array, Array]:
 
 
 def _quantile(own: ExactLight, xi: Array, alpha: Array) -> Array:
-    by, length = reduced(alpha, own.g)
-    low, high, of = jnp.log(SHORTEST), jnp.log(LONGEST), _whole(own, by)
+    low, high, of = jnp.log(SHORTEST), jnp.log(LONGEST), _whole(own, alpha)
 
     def halved(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         low, high = ends
         middle = 0.5 * (low + high)
-        beyond = _within(own, jnp.exp(middle), by, of) < xi
+        beyond = _within(own, jnp.exp(middle), alpha, of) < xi
         return jnp.where(beyond, middle, low), jnp.where(beyond, high, middle)
 
     ends = jax.lax.fori_loop(0, HALVINGS, halved, (low, high))
     x = jax.lax.stop_gradient(jnp.where(xi == 1.0, 1.0, jnp.exp(0.5 * (ends[0] + ends[1]))))
     # One step of Newton's without its value, for the derivatives of the implicit function.
-    density = own.ring_density(x, jnp.maximum(by, DARKEST)) / of[1]
-    step = xi - _within(own, x, by, of)
+    density = own.ring_density(x, jnp.maximum(alpha, DARKEST)) / of[1]
+    step = xi - _within(own, x, alpha, of)
     step = (step - jax.lax.stop_gradient(step)) / jax.lax.stop_gradient(jnp.maximum(density, FAINTEST))
-    return length * jnp.where(xi == 1.0, jnp.inf, jnp.where(xi == 0.0, 0.0, x) + step)
+    return jnp.where(xi == 1.0, jnp.inf, jnp.where(xi == 0.0, 0.0, x) + step)

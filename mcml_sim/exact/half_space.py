@@ -29,15 +29,15 @@ WHERE = (
 )
 # What an argument of this name is, and its least and greatest value.
 ARGUMENTS = {
-    "alpha": ("a single-scattering albedo in [0, 1]", 0.0, 1.0),
-    "mfp": ("a mean free path > 0, from 1e-100 to 1e+100", 1e-100, 1e100),  # its square is a float64
+    "alpha": ("a reduced albedo in [0, 1]", 0.0, 1.0),
+    "mfp": ("a transport mean free path > 0, from 1e-100 to 1e+100", 1e-100, 1e100),  # its square is a float64
     "r": ("a radius >= 0", 0.0, np.inf),
     "xi": ("a share of the energy in [0, 1]", 0.0, 1.0),
 }
 
 
 def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Return the total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
+    """Return the total diffuse reflectance A of the half space [-]; `alpha` its reduced albedo in [0, 1].
 
     R^(0), which where n = 1 equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu)
     mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
@@ -52,7 +52,8 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Return the reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A.
 
-    2 pi r R_d tends to alpha/2 at r = 0 where n = 1, else to alpha times `single_scattering.source_strength`.
+    2 pi r R_d tends to alpha / (2 mfp) at r = 0 where n = 1 and g = 0, else to alpha / (mfp (1 - g)) times
+    `single_scattering.source_strength`.
     """
     radius, albedo, length = _all_checked(setting, r=r, alpha=alpha, mfp=mfp)
     of_kind: Callable[..., Any] = partial(by_alpha, by_albedo.profile) if setting.is_isotropic else forwards.profile

@@ -57,13 +57,13 @@ class Layer:
 
     @property
     def alpha(self) -> float:
-        """Single-scattering albedo mu_s / mu_t [-]; 0 in clear glass."""
-        return self.mu_s / self.mu_t if self.mu_t else 0.0
+        """Reduced albedo mu_s' / (mu_s' + mu_a), mu_s' = (1 - g) mu_s [-]; 0 in clear glass."""
+        return (1 - self.g) * self.mu_s * self.mfp if self.mu_t else 0.0
 
     @property
     def mfp(self) -> float:
-        """Mean free path 1 / mu_t [length]; infinite in clear glass."""
-        return 1 / self.mu_t if self.mu_t else math.inf
+        """Transport mean free path 1 / (mu_s' + mu_a) [length]; infinite in clear glass."""
+        return 1 / ((1 - self.g) * self.mu_s + self.mu_a) if self.mu_t else math.inf
 
     @property
     def is_isotropic(self) -> bool:
@@ -131,14 +131,15 @@ def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -
     """Return one infinite layer under air.
 
     Args:
-        alpha: single-scattering albedo mu_s / (mu_a + mu_s) [-], 0 ... 1.
-        mfp: mean free path 1 / (mu_a + mu_s) [length]: of the light itself, not the reduced one where g != 0.
+        alpha: reduced albedo mu_s' / (mu_s' + mu_a), mu_s' = (1 - g) mu_s [-], 0 ... 1.
+        mfp: transport mean free path 1 / (mu_s' + mu_a) [length].
         n: refractive index [-].
         g: mean cosine of the scattering angle [-].
     """
-    require(is_number(alpha) and 0 <= alpha <= 1, "alpha", "a single-scattering albedo in [0, 1]", alpha)
-    require(is_number(mfp) and math.isfinite(mfp) and mfp > 0, "mfp", "a mean free path > 0", mfp)
-    return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp, g=g),))
+    require(is_number(alpha) and 0 <= alpha <= 1, "alpha", "a reduced albedo in [0, 1]", alpha)
+    require(is_number(mfp) and math.isfinite(mfp) and mfp > 0, "mfp", "a transport mean free path > 0", mfp)
+    require(is_number(g) and -1 < g < 1, "g", "a mean cosine in (-1, 1)", g)
+    return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp / (1 - g), g=g),))
 
 
 def fresnel(n1: Any, n2: Any, cos1: Any) -> tuple[Any, Any]:

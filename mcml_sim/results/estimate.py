@@ -49,6 +49,14 @@ class Estimate:
         return Estimate(self.value * factor, self.standard_error * factor, self.effective_samples)
 
 
+@dataclass(frozen=True)
+class ProfileEstimate(Estimate):
+    """Profiles of albedos, with the transport mean free path that belongs to each."""
+
+    mfp: float | Floats
+    """Transport mean free path 1 / (mu_s' + mu_a), in the unit of the profile's radii."""
+
+
 def estimate(counts: NDArray[np.int64], weights: Floats, photons: int) -> Estimate:
     """Return the mean weight per photon started, of photons counted by bin, in float64.
 

@@ -91,7 +91,7 @@ def stack(medium: Medium, unit: float) -> Stack:
     columns = {
         "thickness": [layer.thickness / unit for layer in layers],
         "top": medium.z_edges[:-1] / unit,
-        "mfp": [min(layer.mfp / unit, FARTHEST) for layer in layers],
+        "mfp": [min(1 / layer.mu_t / unit, FARTHEST) if layer.mu_t else FARTHEST for layer in layers],
         "absorbs": [layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in layers],
         "g": [layer.g if layer.mu_s else 0.0 for layer in layers],
         "n": [medium.n_above, *(layer.n for layer in layers), medium.n_below],

@@ -40,7 +40,7 @@ def reflectance_of(alpha: ArrayLike, illumination: str, n: float = 1.0, g: float
     setting = Setting(illumination, n, g)
     if n == 1.0:
         setting = Setting(illumination)  # by similarity
-    return np.asarray(exact.reflectance(unreduced(np.asarray(alpha, float), setting.g), setting), float)
+    return np.asarray(exact.reflectance(np.asarray(alpha, float), setting), float)
 
 
 def alpha_of(reflectance: ArrayLike, illumination: str, n: float = 1.0, g: float = 0.0) -> Floats:

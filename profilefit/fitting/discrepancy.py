@@ -34,7 +34,6 @@ from scipy.stats import norm
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.compiled import BRIEF, filter_jit
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import NO_LIMITS, Fit, ResidualFunction, Rings, followed
@@ -289,7 +288,7 @@ def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
         moved = law.with_vector(problem.free, vector).under(rings.surface)
         edges, alpha = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha)
         if problem.objective in OF_MAPS:
-            return moved.reflectance(unreduced(alpha[:, None], moved.setting.g))
+            return moved.reflectance(alpha[:, None])
         if problem.objective == "radial":
             r = 0.5 * (edges[1:] + edges[:-1])
             a, b, c = moved.coefficients(alpha[:, None])
@@ -343,11 +342,6 @@ class LawWithErrors:
         return cls(law, tuple(covariance.get("names", ())), objective, noise, read(content, arrays))
 
     @property
-    def reduced(self) -> Any:
-        """The law of the reduced albedos and radii that all quantities here are of."""
-        return self.law.in_reduced()
-
-    @property
     def is_map(self) -> bool:
         return self.objective in OF_MAPS
 
@@ -370,10 +364,10 @@ class AtAlbedo:
     @classmethod
     def of(cls, known: LawWithErrors, alpha: float) -> AtAlbedo:
         """Evaluate a law at an albedo."""
-        total = float(known.reduced.albedo.reflectance(alpha))
+        total = float(known.law.albedo.reflectance(alpha))
         alone, none = np.array([alpha]), np.zeros((1, EDGES.size - 1))
         rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
-        energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
+        energy, slope = predicted(ResidualFunction(known.objective, known.free), known.law, rings)
         lit = energy[0] > 0  # (7) ends where it falls below zero
         return cls(known, alpha, np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0))
 
@@ -418,7 +412,7 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     """Return R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
     require(not (known.is_map or known.objective in QUANTILES), "objective", "of a fit to profiles", known.objective)
     here, radii = AtAlbedo.of(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
-    value = np.asarray(known.reduced.profile(radii, alpha), float)
+    value = np.asarray(known.law.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
     model = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
@@ -434,7 +428,7 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     albedos = np.atleast_1d(np.asarray(alpha, float))
     one, none = np.ones(albedos.size), np.zeros((albedos.size, 1))
     rings = Rings(albedos, np.array([0.0, 1.0]), none, one, none, one, np.array(NO_LIMITS), np.zeros(0))
-    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
+    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.law, rings)
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.discrepancy is not None:

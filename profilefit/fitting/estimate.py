@@ -33,7 +33,6 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact.compiled import BRIEF, filter_jit
-from mcml_sim.exact.light import reduced, unreduced
 from mcml_sim.media.arrays import Floats, require, require_own_process
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
@@ -144,15 +143,13 @@ def radial(law, rings: Rings) -> Tables:
 
 
 def albedo(law, rings: Rings) -> Tables:
-    """alpha(A) - alpha of reduced albedos, unweighted over those given."""
-    mapped = law.under(rings.surface).alpha(rings.reflectance[:, None])
-    return (reduced(mapped, law.setting.g).alpha - rings.alpha[:, None],)
+    """alpha(A) - alpha, unweighted over those given."""
+    return (law.under(rings.surface).alpha(rings.reflectance[:, None]) - rings.alpha[:, None],)
 
 
 def reflectance(law, rings: Rings) -> Tables:
     """A(alpha) - A, unweighted over the albedos given."""
-    alpha = unreduced(rings.alpha[:, None], law.setting.g)
-    return (law.under(rings.surface).reflectance(alpha) - rings.reflectance[:, None],)
+    return (law.under(rings.surface).reflectance(rings.alpha[:, None]) - rings.reflectance[:, None],)
 
 
 def relative_reflectance(law, rings: Rings) -> Tables:

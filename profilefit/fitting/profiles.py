@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
 from mcml_sim.errors import InputError
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats, require
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
@@ -64,7 +63,7 @@ class Covariance:
 class Profiles:
     """Reflectance profiles in units of the transport mean free path (l* = 1).
 
-    alpha, r_edges     (m,) reduced single-scattering albedos [-], (n + 1,) ring edges from 0 [mfp]
+    alpha, r_edges     (m,) reduced albedos [-], (n + 1,) ring edges from 0 [mfp]
     energy             (m, n) energy reflected through each ring, per unit incident [-]: the integral of 2 pi r R_d
     standard_error     (m, n) of `energy`; zero where the truth has no noise
     effective_samples  (m, n) photons that the estimate really rests on; infinite where it has no noise
@@ -129,9 +128,8 @@ class Profiles:
         """Integrate the exact half space over rings, without noise."""
         where = setting or Setting()
         albedos, edges = _albedos(alpha), Grid.from_edges(r=r_edges).r_edges
-        own = unreduced(albedos, where.g)
-        total, mfp = np.asarray(exact.reflectance(own, setting=where)), 1.0 - own * where.g  # where l* = 1
-        inside = total[:, None] * np.asarray(exact.cdf(edges, own[:, None], mfp[:, None], where))
+        total = np.asarray(exact.reflectance(albedos, setting=where))
+        inside = total[:, None] * np.asarray(exact.cdf(edges, albedos[:, None], setting=where))
         energy = np.diff(inside, axis=1)
         zero, infinite = np.zeros_like(energy), np.full_like(energy, np.inf)
         return cls(albedos, edges, energy, zero, infinite, total - inside[:, -1], "exact", where)

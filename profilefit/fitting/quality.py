@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim import exact
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import trimmed_radius
@@ -108,7 +107,7 @@ class Quality:
 
 
 def profile_quality(law: ProfileLaw, alpha: ArrayLike, setting: Setting | None = None) -> Quality:
-    """Measure a law against the exact profile of a setting at each (reduced) albedo in `alpha` (m,).
+    """Measure a law against the exact profile of a setting at each albedo in `alpha` (m,).
 
     setting  one that the law spans; its own by default
     """
@@ -116,17 +115,18 @@ def profile_quality(law: ProfileLaw, alpha: ArrayLike, setting: Setting | None =
     law, setting = _under(law, setting)
     outer = _outer(tuple(albedos), setting)
     truths = [_truth(*pair, setting) for pair in zip(albedos.tolist(), outer, strict=True)]
-    own, mfp = np.array([_medium(one, law.setting) for one in albedos.tolist()]).T[:, :, None]
     # All albedos in one call of each method.
-    profile, even = (law.profile(np.stack(r), own, mfp) for r in ([t.r for t in truths], [t.even for t in truths]))
-    cdf = law.cdf(np.stack([t.far for t in truths]), own, mfp)
+    profile, even = (
+        law.profile(np.stack(r), albedos[:, None]) for r in ([t.r for t in truths], [t.even for t in truths])
+    )
+    cdf = law.cdf(np.stack([t.far for t in truths]), albedos[:, None])
     rows = [_measures(*row) for row in zip(truths, profile, even, cdf, strict=True)]
     return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def _under(law: Law, setting: Setting | None) -> tuple[Law, Setting]:
-    """Return the law under a setting that it spans, in reduced albedos: one compiled program serves all settings."""
-    return (law, law.setting) if setting is None else (law.in_reduced().under(surface_of(setting)), setting)
+    """Return the law under a setting that it spans: one compiled program serves all settings."""
+    return (law, law.setting) if setting is None else (law.under(surface_of(setting)), setting)
 
 
 def r_squared(data: Floats, law: Floats) -> float:
@@ -146,30 +146,22 @@ class _Truth:
     scaled: Floats
 
 
-def _medium(reduced: float, setting: Setting) -> tuple[float, float]:
-    """Return alpha and mfp of a reduced albedo, where l* = 1."""
-    own = float(unreduced(reduced, setting.g))
-    return own, 1.0 - own * setting.g
-
-
 @lru_cache(maxsize=64)
 def _outer(alpha: tuple[float, ...], setting: Setting) -> list[float]:
     """Radii of `ENERGY_WITHIN` [l*], of all albedos in one call."""
-    own, mfp = np.array([_medium(one, setting) for one in alpha]).T
-    return list(np.asarray(exact.quantile(ENERGY_WITHIN, own, mfp, setting)).tolist())
+    return list(np.asarray(exact.quantile(ENERGY_WITHIN, alpha, setting=setting)).tolist())
 
 
 @lru_cache(maxsize=256)
 def _truth(alpha: float, outer: float, setting: Setting) -> _Truth:
-    own, mfp = _medium(alpha, setting)
     r = np.geomspace(NEAREST, outer, RADII)
     far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
     walked = np.append(r, outer + np.arange(1, 9) / 8)  # (6) may stop one stride beyond
-    profile = np.asarray(exact.profile(walked, own, mfp, setting))
+    profile = np.asarray(exact.profile(walked, alpha, setting=setting))
     cut = trimmed_radius(walked, walked * profile)
     even = (np.arange(RADII) + 0.5) / RADII * cut
-    scaled = even * np.asarray(exact.profile(even, own, mfp, setting))
-    return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, own, mfp, setting)), even, scaled)
+    scaled = even * np.asarray(exact.profile(even, alpha, setting=setting))
+    return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
 
 
 def _measures(truth: _Truth, profile: Floats, even: Floats, law_cdf: Floats) -> tuple[float | tuple[float, float], ...]:
@@ -206,15 +198,14 @@ class AlbedoQuality:
 
 
 def albedo_quality(law: AlbedoLaw, setting: Setting | None = None) -> AlbedoQuality:
-    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances.
+    """Measure a map on 1000 albedos even in sqrt(1 - alpha), and its shape on even reflectances.
 
     setting  one that the map spans; its own by default
     """
     law, setting = _under(law, setting)
-    law = law.in_reduced()
     s = (np.arange(1000) + 0.5) / 1000
     alpha = 1.0 - s**2
-    truth = np.asarray(exact.reflectance(unreduced(alpha, setting.g), setting=setting))
+    truth = np.asarray(exact.reflectance(alpha, setting=setting))
     mapped = np.asarray(law.reflectance(alpha))
     mapped_alpha = np.asarray(law.alpha(truth))
     with np.errstate(invalid="ignore"):

@@ -96,8 +96,7 @@ class ExactTarget:
         return np.asarray(exact.cdf(x, alpha, setting=self.setting))
 
 
-# Light that is to be gathered: `density` 2 pi x R_d / A [1/mfp] and `cdf` its share within x [-], at x = r/l; alpha and
-# l are the medium's own, not its reduced ones.
+# Light that is to be gathered: `density` 2 pi x R_d / A [1/mfp] and `cdf` its share within x [-], at x = r/l.
 Target = LawTarget | ExactTarget
 
 
@@ -138,7 +137,7 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
         return _called("sample", sampler, -np.expm1(-t), alpha)
 
     with jax.enable_x64(True):
-        jump = float(sampler.jump(jnp.asarray(sampler.law.similar(alpha, 1.0)[0])))
+        jump = float(sampler.jump(jnp.asarray(alpha)))
     breaks, flats = _map(radius, edge, -np.log1p(-jump) if jump < 1.0 else np.inf)
     t, dt = _rule(breaks)
     share = np.exp(-t) * dt

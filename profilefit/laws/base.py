@@ -235,10 +235,6 @@ class Constants(eqx.Module):
             given["albedo"] = self.albedo.at(setting)  # type: ignore[attr-defined]
         return replace(self, **given)
 
-    def in_reduced(self) -> Self:
-        """Return the law of reduced albedos and l*, as in its shader source: itself, but for a law with g."""
-        return self
-
     def under(self, surface: RefractingSurface | None) -> Self:
         """Return the law under other surfaces, one per profile, if it spans indices; None for its setting's own."""
         return self if surface is None else replace(self, surface=surface)  # type: ignore[call-arg]
@@ -273,7 +269,7 @@ class Constants(eqx.Module):
 
 
 class AlbedoLaw(Constants):
-    """A closed map between the single-scattering albedo alpha and the total reflectance A, both in [0, 1]."""
+    """A closed map between the reduced albedo alpha and the total reflectance A, both in [0, 1]."""
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -285,7 +281,7 @@ class AlbedoLaw(Constants):
 
     @abc.abstractmethod
     def reflectance(self, alpha) -> Array:
-        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
+        """Total reflectance A [-] at reduced albedo alpha [-]."""
 
     @property
     def reflectances(self) -> Range:
@@ -376,21 +372,15 @@ class ProfileLaw(Constants):
         """Every way to draw radii for this law; "exact" inverts its cdf, to rounding."""
         return {"exact": self.sampler}
 
-    def similar(self, alpha: Any, mfp: Any) -> tuple[Any, Any]:
-        """Return alpha and l of the scaled functions: the medium's own, or reduced ones where the law has a g."""
-        return alpha, mfp
-
     @evaluated
     def profile(self, r, alpha, mfp=1.0) -> Array:
         """R_d(r) [1/length^2]: 2 pi r R_d integrates to the reflectance. `r`, `mfp` in one unit; all broadcast."""
-        by, length = self.similar(alpha, mfp)
-        return self.scaled_profile(r / length, by) / length**2
+        return self.scaled_profile(r / mfp, alpha) / mfp**2
 
     @evaluated
     def cdf(self, r, alpha, mfp=1.0) -> Array:
         """Share of the reflected energy within radius r [-]. `r` and `mfp` in one unit; all broadcast."""
-        by, length = self.similar(alpha, mfp)
-        return self.scaled_cdf(r / length, by)
+        return self.scaled_cdf(r / mfp, alpha)
 
 
 class EscapeLaw(ProfileLaw):
@@ -447,17 +437,14 @@ class Sampler(eqx.Module):
     @evaluated
     def undone(self, r, xi, alpha, mfp=1.0) -> Array:
         """Return xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the inversion's error. All broadcast."""
-        by, length = self.law.similar(alpha, mfp)
-        return self.scaled_undone(r / length, xi, by)
+        return self.scaled_undone(r / mfp, xi, alpha)
 
     @evaluated
     def sample(self, xi, alpha, mfp=1.0) -> Array:
         """Radius [length] for a uniform number xi in [0, 1). All broadcast."""
-        by, length = self.law.similar(alpha, mfp)
-        return self.scaled_sample(xi, by) * length
+        return self.scaled_sample(xi, alpha) * mfp
 
     @evaluated
     def pdf(self, r, alpha, mfp=1.0) -> Array:
         """Density in r of `sample` [1/length], so that it integrates to 1 less the sampler's atoms. All broadcast."""
-        by, length = self.law.similar(alpha, mfp)
-        return self.scaled_pdf(r / length, by) / length
+        return self.scaled_pdf(r / mfp, alpha) / mfp

@@ -8,13 +8,12 @@ from __future__ import annotations
 import abc
 from dataclasses import replace
 from functools import reduce
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.exact.light import reduced, unreduced
 from profilefit.laws.base import CLOSED, Entry, Normalisation, Range, Text, evaluated
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
@@ -103,9 +102,6 @@ class FoldedRational(Normalisation):
         """Return the closed numbers of its setting, or of those that it was put under."""
         return self.surface or surface_of(self.setting)
 
-    def in_reduced(self) -> Self:
-        return replace(self, setting=replace(self.setting, g=0.0), surface=self.here())
-
     def text_numbers(self) -> dict[str, float]:
         """Return the share that enters, rho, and A_1 over alpha [-]."""
         here = self.here()
@@ -134,12 +130,11 @@ class FoldedRational(Normalisation):
 
     @evaluated
     def reflectance(self, alpha) -> Array:
-        by = reduced(jnp.asarray(alpha), self.setting.g).alpha
-        return by / self.albedo_over_reflectance(by)
+        return alpha / self.albedo_over_reflectance(alpha)
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:
-        """Return alpha / A [-] of a reduced albedo, finite at alpha = 0 too."""
+        """Return alpha / A [-], finite at alpha = 0 too."""
         s, of = jnp.sqrt(1.0 - alpha), self.terms()
         return (1.0 + s) * _cubic(of.g, s) / (of.p * (1.0 + s * (of.b + of.f * s)))
 
@@ -162,7 +157,7 @@ class FoldedRational(Normalisation):
         s = _root(dark, 1.0 - of.b + light * of.c, of.b - of.f + light * of.d, of.f)
         linear = 1.0 + of.b + of.f + light * (of.c + 2.0 * of.d)
         y = _root(light * (1.0 + of.c + of.d), linear, -(of.b + 2.0 * of.f + light * of.d), of.f)
-        return unreduced(jnp.where(share < 0.5, y * (2.0 - y), (1.0 - s) * (1.0 + s)), self.setting.g)
+        return jnp.where(share < 0.5, y * (2.0 - y), (1.0 - s) * (1.0 + s))
 
 
 class RefractingRational(FoldedRational):

@@ -6,14 +6,13 @@ import abc
 from collections import namedtuple
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.exact.light import reduced, unreduced
 from profilefit.laws.base import CLAMPS, CLOSED, Entry, EscapeLaw, ProfileLaw, Sampler, Text
 from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, left, local, map_density
 from profilefit.laws.rational import COSINES, INDICES, REFRACTING, FoldedRational
@@ -152,17 +151,6 @@ class TwoPartHazard(EscapeLaw):
 
     def text_constants(self) -> dict[str, float]:
         return {name: float(value) for name, value in self.coefficients()._asdict().items()}
-
-    def in_reduced(self) -> Self:
-        here, isotropic = self.here(), replace(self.setting, g=0.0)
-        return replace(self, setting=isotropic, surface=here, albedo=self.albedo.in_reduced())
-
-    def similar(self, alpha: Any, mfp: Any) -> tuple[Any, Any]:
-        by, length = reduced(alpha, self.setting.g)
-        return by, mfp * length
-
-    def total(self, alpha) -> Array:
-        return self.albedo.reflectance(unreduced(alpha, self.setting.g))
 
     def reflected(self, alpha: Array) -> Array:
         return alpha / self.albedo.under(self.surface).albedo_over_reflectance(alpha)

@@ -125,7 +125,7 @@ class FitSpec:
 def held_albedo(law: Light, name: str, value: float) -> float:
     """Return the albedo at which `alpha` or `A` is `value`; InputError where the law has none."""
     if name == "alpha":
-        require(LEAST <= value <= MOST, "held alpha", "a single-scattering albedo in (0, 1)", value)
+        require(LEAST <= value <= MOST, "held alpha", "a reduced albedo in (0, 1)", value)
         return value
 
     def total(alpha: float) -> float:

@@ -63,7 +63,7 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
     for channel, one in zip(CHANNELS, media, strict=True):
         constants[f"{channel}_rate"] = one.layers[0].mu_t
         for i, layer in enumerate(one.layers, start=1):
-            constants |= {f"{channel}_alpha{i}": layer.alpha, f"{channel}_g{i}": layer.g}
+            constants |= {f"{channel}_scattered{i}": layer.mu_s / layer.mu_t, f"{channel}_g{i}": layer.g}
             if 1 < i < count:
                 constants[f"{channel}_depth{i}"] = layer.mu_t * layer.thickness
     texts = [emit.read_text(part) for part in ("common", "channel", "single_scattering")]

@@ -126,8 +126,8 @@ def traced(
 
 def ring_edges(first: Layer, layers: tuple[Layer, ...]) -> Floats:
     """Return edges from the source as far as light of the slowest layer goes [length]."""
-    near = NEAREST * first.similar.mfp
-    rates = [max(float(half_space.decay_rate(one.similar.alpha)), SLOWEST) / one.similar.mfp for one in layers]
+    near = NEAREST * first.mfp
+    rates = [max(float(half_space.decay_rate(one.alpha)), SLOWEST) / one.mfp for one in layers]
     return np.append(0.0, np.geomspace(near, TRACED_FARTHEST / min(rates), RINGS))
 
 

@@ -78,7 +78,7 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES,
     """Return rings even in ln r to 99.5 % of the light: exact, or of photons where a layer scatters forward."""
     fit.require(medium)
     first = medium.layers[0]
-    unit = first.similar.mfp
+    unit = first.mfp
     if any(layer.g > 0 for layer in medium.layers):
         edges = fit.ring_edges(first, medium.layers)
         rings = tracing.rings(medium, illumination, edges, fit.STACK_PHOTONS, OFFSET)
@@ -100,7 +100,7 @@ def lights_of(
 ) -> tuple[SumLight, ...]:
     """Return `sum_light` of media of one unit of length, edges in that unit; of equal media once."""
     found = {medium: sum_light(medium, illumination, nodes, tracing) for medium in dict.fromkeys(media)}
-    return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].similar.mfp) for medium in media)
+    return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].mfp) for medium in media)
 
 
 def shared_gaussians(
@@ -121,7 +121,7 @@ def shared_gaussians(
 
 def medium_sum(medium: Medium, illumination: str, whole: float, variances: Floats, weights: Floats) -> MediumGaussians:
     """Return the sum of variances (N,) [length^2] and weights (N,) [-], in the medium's own mean free paths."""
-    scaled = tuple((variances / medium.layers[0].similar.mfp ** 2).tolist())
+    scaled = tuple((variances / medium.layers[0].mfp ** 2).tolist())
     return MediumGaussians(fit.setting_of(medium, illumination), whole, scaled, tuple(weights.tolist()))
 
 
@@ -407,7 +407,7 @@ def _model(found: JointSum, lights: Sequence[SumLight], media: Sequence[Medium],
             table=off,
             live=live,
             u=middle[counts],
-            s=np.sqrt([1.0 - medium.layers[0].similar.alpha for medium in media]),
+            s=np.sqrt([1.0 - medium.layers[0].alpha for medium in media]),
             slope=slope,
             noise=placed(noise[counts]).T[:, :, None],
             influence=np.moveaxis(placed(gain[:, counts].T), -1, 0),

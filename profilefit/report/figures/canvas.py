@@ -131,7 +131,7 @@ def albedo_axis(ax: Axes) -> None:
     ax.set_xscale("function", functions=forward_and_back)
     ax.set_xlim(0.0, 1.0)
     ax.set_xticks([0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.99, 1], ["0", ".2", ".4", ".6", ".8", ".9", ".95", ".99", "1"])
-    ax.set_xlabel("single-scattering albedo α [-], even in √(1 − α)")
+    ax.set_xlabel("reduced albedo α [-], even in √(1 − α)")
 
 
 @contextmanager

@@ -180,7 +180,7 @@ def residual_figure(record_name: str, source: Source) -> Figure:
 def _of_map(ax: Axes, fitted: Fitted) -> None:
     """Draw alpha at the data's A, or A at the data's alpha, of the fitted map, less that of the data."""
     alpha = fitted.albedos
-    law = fitted.law.in_reduced()  # as the data's albedos are
+    law = fitted.law
     reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
     if fitted.content["protocol"]["weighting"]["objective"] == "albedo":
         left, error = np.asarray(law.alpha(reflectance)) - alpha, error * np.gradient(alpha, reflectance)
@@ -265,7 +265,7 @@ def _panel(ax: Axes, key: str, sets: Mapping[str, tuple[Content, str]]) -> None:
         ax.plot(quality["alpha"], quality[which][key], label=label, markersize=3.0, **look)
     albedo_axis(ax)
     if any(content["setting"]["g"] for content, _ in sets.values()):
-        ax.set_xlabel("single-scattering albedo α [-], reduced if g ≠ 0")
+        ax.set_xlabel("reduced albedo α [-]")
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)

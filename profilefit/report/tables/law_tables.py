@@ -15,7 +15,6 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import MEASURES, OF_MAP, AlbedoQuality, Quality, albedo_quality, profile_quality
@@ -68,13 +67,13 @@ def for_each(
 
 
 def measured_samplers(named: LoadedLaw, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
-    """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
+    """Return every sampler of a profile law at `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if named.law.entry.has_text else SLOW_ALBEDOS)
     samplers, xi, target = [], np.linspace(0.0, LAST_SHARE, SHARES), ExactTarget(named.setting)
-    for name, sampler in named.law.in_reduced().samplers.items():
+    for name, sampler in named.law.samplers.items():
         errors = []
         for value in albedos:
-            drawn = drawn_by(named.law.samplers[name], xi, float(unreduced(value, named.setting.g)), target)
+            drawn = drawn_by(sampler, xi, float(value), target)
             errors.append(np.max(np.abs(drawn - xi)))
         samplers.append(MeasuredSampler(named, name, sampler_quality(sampler, albedos), np.array(errors)))
     return samplers

@@ -226,7 +226,7 @@ def light_of(of: StackRequest, count: int) -> Scattering:
     """Return the light of a record of these very layers, in ./fits or shipped; solved and fitted now where none is."""
     for folder in (LOCAL, fits_folder()):
         if (found := matching(of, folder)) is not None and (record := gaussians.find(found.name, folder)) is not None:
-            units = [medium.layers[0].similar.mfp for medium in of.media]
+            units = [medium.layers[0].mfp for medium in of.media]
             kernel = kernel_of(record.laws(of.illumination, count), units)
             return _light(kernel, record.lights(of.illumination))
     lights = lights_of(of.media, of.illumination)

@@ -202,7 +202,7 @@ def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) 
         least = np.exp(-depth / np.maximum(into, out))
         straight = least * _spent(depth, np.abs(1.0 / into - 1.0 / out))
         total = turned + (one.down * other.up + one.up * other.down) * phase.pdf(onward) * straight
-    return np.where(reached, layer.alpha * total / along, 0.0)
+    return np.where(reached, layer.mu_s / layer.mu_t * total / along, 0.0)
 
 
 def _spent(depth: float, rate: Floats) -> Floats:

@@ -55,8 +55,8 @@ def step_response(
     """
     places, albedos, length = np.broadcast_arrays(*(np.asarray(value, float) for value in (x, alpha, mfp)))
     require_all("x", places, np.isfinite(places), "a finite place")
-    require_all("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
-    require_all("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
+    require_all("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a reduced albedo in [0, 1]")
+    require_all("mfp", length, (length > 0) & np.isfinite(length), "a transport mean free path > 0")
     target: Target
     if law is None:
         target = ExactTarget(setting or Setting())

@@ -22,7 +22,6 @@ import moderngl
 import numpy as np
 
 from mcml_sim import exact
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from profilefit.fitting.quality import ENERGY_WITHIN, MEASURES, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw, Range
@@ -129,7 +128,7 @@ def check_laws(context: moderngl.Context, laws: Sequence[LoadedLaw], folder: Fol
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         at = dense_grid.arguments()
-        references = pool.map(lambda loaded: dense_grid.reference(loaded.law.in_reduced(), at), laws)
+        references = pool.map(lambda loaded: dense_grid.reference(loaded.law, at), laws)
         for loaded, known in zip(laws, references, strict=True):
             yield check_law(context, loaded, folder, exact=known)
 
@@ -145,10 +144,10 @@ def check_law(
     shader, at = ShaderLaw(context, loaded.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        right = exact or dense_grid.reference(loaded.law.in_reduced(), at)
+        right = exact or dense_grid.reference(loaded.law, at)
         both = bounds.masks(valid, dense_grid.ALPHA, dense_grid.XI)
         profiled, drawn = (np.broadcast_to(mask, at.shape) for mask in both)
-        spreads, rounding = _rounding(loaded.law.in_reduced(), found, right, at, profiled, drawn)
+        spreads, rounding = _rounding(loaded.law, found, right, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:
@@ -241,7 +240,7 @@ def check_map(context: moderngl.Context, loaded: LoadedLaw, folder: Folder, text
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
     model = bounds.model_of_map(loaded, folder)
     of_reflectance, of_alpha = bounds.valid_map(loaded, folder)
-    shader, law = ShaderMap(context, loaded.law, text), loaded.law.in_reduced()
+    shader, law = ShaderMap(context, loaded.law, text), loaded.law
     alpha, reflectance = shader.alpha(REFLECTANCE), shader.reflectance(ALPHA)
     a, c = of_alpha.holds(ALPHA), of_reflectance.holds(REFLECTANCE)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
@@ -264,7 +263,7 @@ def _map_measured(shader: ShaderMap, of_alpha: Range) -> Numbers:
     if not shader.setting.is_solved:
         return {}
     alpha = ALPHA[of_alpha.holds(ALPHA)]
-    truth = np.asarray(exact.reflectance(unreduced(alpha, shader.setting.g), setting=shader.setting))
+    truth = np.asarray(exact.reflectance(alpha, setting=shader.setting))
     return {
         "delta_A": float(np.max(np.abs(shader.reflectance(alpha) - truth))),
         "delta_alpha": float(np.max(np.abs(shader.alpha(truth) - alpha))),
@@ -301,7 +300,7 @@ class HalfCheck:
 
 def check_half(context: moderngl.Context, loaded: LoadedLaw) -> HalfCheck:
     """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
-    law = loaded.law.in_reduced()
+    law = loaded.law
     r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]
     profile, cdf = np.asarray(law.profile(r, alpha)), np.asarray(law.cdf(r, alpha))
     used = cdf <= ENERGY_WITHIN

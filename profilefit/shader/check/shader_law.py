@@ -84,20 +84,20 @@ class ShaderLaw:
         return self
 
     def values(self, r: ArrayLike, xi: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Values:
-        """Evaluate all four functions at arguments that broadcast, reduced ones, each rounded to float32 first."""
+        """Evaluate all four functions at arguments that broadcast, each rounded to float32 first."""
         return Values(*self._pass(r, xi, alpha, mfp))
 
     def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """R_d(r) [1/length^2]."""
-        return self.values(r, 0.5, *self.law.similar(alpha, mfp)).profile
+        return self.values(r, 0.5, alpha, mfp).profile
 
     def cdf(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Share of the reflected energy within r [-]."""
-        return self.values(r, 0.5, *self.law.similar(alpha, mfp)).cdf
+        return self.values(r, 0.5, alpha, mfp).cdf
 
     def sample(self, xi: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
         """Radius [length] at xi."""
-        return self.values(1.0, xi, *self.law.similar(alpha, mfp)).sample
+        return self.values(1.0, xi, alpha, mfp).sample
 
 
 class ShaderMap:

@@ -44,14 +44,14 @@ float LAW_radiance(float channel, float thickness, float cos_in, float cos_out, 
     float kept1 = 1.0;
     float sum = 0.0;
 //% for 2
-    float alpha@h = LAW_of(channel, LAW_red_alpha@h, LAW_green_alpha@h, LAW_blue_alpha@h);
+    float scattered@h = LAW_of(channel, LAW_red_scattered@h, LAW_green_scattered@h, LAW_blue_scattered@h);
     float phase@h = LAW_phase(away, LAW_of(channel, LAW_red_g@h, LAW_green_g@h, LAW_blue_g@h));
-    sum = sum + kept@h * LAW_faded(b * depth@h) * alpha@h * phase@h;
+    sum = sum + kept@h * LAW_faded(b * depth@h) * scattered@h * phase@h;
     float kept@i = kept@h * exp(-b * depth@h);
 //% end
-    float alpha@n = LAW_of(channel, LAW_red_alpha@n, LAW_green_alpha@n, LAW_blue_alpha@n);
+    float scattered@n = LAW_of(channel, LAW_red_scattered@n, LAW_green_scattered@n, LAW_blue_scattered@n);
     float phase@n = LAW_phase(away, LAW_of(channel, LAW_red_g@n, LAW_green_g@n, LAW_blue_g@n));
-    sum = sum + kept@n * alpha@n * phase@n; // of all that lies deeper
+    sum = sum + kept@n * scattered@n * phase@n; // of all that lies deeper
     float surface = LAW_passed(within, mu_in) * LAW_passed(without, mu_out) / (LAW_index * LAW_index);
     return surface * cos_in / (mu_in * mu_out * b) * sum;
 }

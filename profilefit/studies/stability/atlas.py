@@ -105,21 +105,20 @@ def _findings(name: str, look: Callable[..., Iterable[Cells | fit_cases.FitCase]
 
 
 def _of_law(named: catalogue.LoadedLaw, is_named: bool, folder: Records, quick: bool) -> Iterator[Cells]:
-    limits, text = law_cells.limits_of(named, folder), map_cells.in_reduced(named)
-    yield from law_cells.cells_of(text, limits, QUICK_ARITHMETICS if quick else law_cells.COMPUTED)
+    limits = law_cells.limits_of(named, folder)
+    yield from law_cells.cells_of(named, limits, QUICK_ARITHMETICS if quick else law_cells.COMPUTED)
     yield from law_cells.model_cells(named, limits)
-    yield from misuse.of_law(text)
+    yield from misuse.of_law(named)
     if named.label in DERIVED and not quick:
         more = DERIVED_IF_NAMED.get(named.label, ()) if is_named else ()
-        yield from gradients.of_law(text, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
+        yield from gradients.of_law(named, (*DERIVED[named.label], *more), limits.valid.alpha or EVERYWHERE)
 
 
 def _of_map(named: catalogue.LoadedLaw, folder: Records, quick: bool) -> Iterator[Cells]:
-    text = map_cells.in_reduced(named)
     yield from map_cells.cells_of(named, folder)
-    yield from misuse.of_law(text)
+    yield from misuse.of_law(named)
     if named.label in DERIVED_MAPS and not quick:
-        yield from gradients.of_map(text, bounds.valid_map(named, folder))
+        yield from gradients.of_map(named, bounds.valid_map(named, folder))
 
 
 def _of_exact(folder: Records, quick: bool) -> Iterator[Cells]:

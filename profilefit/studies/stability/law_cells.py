@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from profilefit.fitting import quality
 from profilefit.laws.base import ProfileLaw
@@ -275,9 +274,7 @@ def model_cells(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
 def _against_exact(named: LoadedLaw, limits: Limits) -> Iterator[Cells]:
     alpha, x, xi = (axis("α", ALPHA), axis("r/l", RADIUS), axis("ξ", SHARE))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
-    law, setting = named.law.in_reduced(), named.setting
-    own = np.asarray(unreduced(albedo, setting.g))  # of the medium that has this reduced albedo, and l* = 1
-    medium = own, 1.0 - own * setting.g, setting
+    law, medium = named.law, (albedo, 1.0, named.setting)
     within = np.asarray(exact.cdf(r, *medium))
     with np.errstate(all="ignore"):
         drawn = np.asarray(law.sampler.sample(share, albedo))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import jax
@@ -12,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim import exact
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
@@ -35,23 +33,18 @@ UNSTATED = "no record states the error of this direction"
 
 
 def cells_of(named: LoadedLaw, folder: Folder) -> Iterator[Cells]:
-    """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
-    text, model, spans = in_reduced(named), bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
+    """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs."""
+    model, spans = bounds.model_of_map(named, folder), bounds.valid_map(named, folder)
     for (name, measure), span in zip(WAYS.items(), spans, strict=True):
         limit = bounds.ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (cells.FLOAT64, cells.FLOAT32, cells.TEXT32, cells.TEXT16):
             at = cells.unit_axis("A" if name == cells.ALPHA_OF else "α", cells.DTYPES[arithmetic])
-            value = _value(text.law, name, arithmetic, at)
-            reference = _text_value(text.law, cells.EXTENDED, name, at.values)
-            yield _cells(text, name, arithmetic, at, value, reference, limit=limit, span=span)
-    yield from _kept_in_half(text, spans[1])
+            value = _value(named.law, name, arithmetic, at)
+            reference = _text_value(named.law, cells.EXTENDED, name, at.values)
+            yield _cells(named, name, arithmetic, at, value, reference, limit=limit, span=span)
+    yield from _kept_in_half(named, spans[1])
     if named.setting.is_solved:
         yield from _against_exact(named, *spans, model)
-
-
-def in_reduced(named: LoadedLaw) -> LoadedLaw:
-    """Return a law as a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
-    return replace(named, law=named.law.in_reduced())
 
 
 def _cells(
@@ -101,9 +94,7 @@ def _against_exact(named: LoadedLaw, colours: Range, albedos: Range, model: boun
     """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = axis("α", 1.0 - root**2)
-    own = unreduced(alpha.values, named.setting.g)
-    reflectance = axis("A", np.asarray(exact.reflectance(own, setting=named.setting)))
-    law = named.law.in_reduced()
+    reflectance, law = axis("A", np.asarray(exact.reflectance(alpha.values, setting=named.setting))), named.law
     with np.errstate(all="ignore"):
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     stated = model.get(WAYS[cells.REFLECTANCE_OF]) or np.nan

@@ -22,7 +22,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.exact.light import unreduced
 from mcml_sim.media.arrays import Floats
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
@@ -149,8 +148,6 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
     With weights by the sampler's own density, and by its law's. alpha is the reduced albedo, the edge in l*.
     """
-    alpha = float(unreduced(alpha, sampler.law.setting.g))
-    edge *= sampler.law.similar(alpha, 1.0)[1]
     quality = sampler_quality(sampler, alpha, edge=edge)
     of_law = edge_light(LawTarget(sampler.law), alpha, edge)
     truth = edge_light(ExactTarget(sampler.law.setting), alpha, edge)
@@ -167,7 +164,7 @@ def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Return square error by the edge and variance, over those of the exact quantile (2, m, blocks)."""
     rows = []
-    for alpha in unreduced(np.array(sizes.alphas), sampler.law.setting.g).tolist():
+    for alpha in sizes.alphas:
         ways = gathered(sampler.law, alpha, sampler), step_edge.by_quantile(alpha, sampler.law.setting)
         rows.append([error_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
     return np.moveaxis(np.array(rows), 2, 0)
@@ -178,8 +175,7 @@ def error_ratios(
 ) -> tuple[float, float]:
     """Return the mean square error and the variance of a gather at an edge, over those of another."""
     points = step_edge.random_points(SAMPLES, trials, seed=block + 1)
-    places = PLACES * law.similar(alpha, 1.0)[1]
-    mine, best = (step_edge.edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
+    mine, best = (step_edge.edge_estimate(g, points, PLACES, alpha, law.setting) for g in (way, over))
     square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
     return float(square), float(mine.variance.mean() / best.variance.mean())
 

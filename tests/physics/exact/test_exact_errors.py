@@ -76,7 +76,7 @@ BY_SETTING = (  # every function of an albedo under a setting
 @pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2.0], "half", None, *NO_NUMBERS])
 def test_albedo_must_be_in_0_to_1(alpha):
     for call in (*BY_SETTING, lambda alpha, _: exact.decay_rate(alpha)):
-        refused(r"alpha must be a single-scattering albedo in \[0, 1\], got \S", call, alpha, exact.SEARCHLIGHT)
+        refused(r"alpha must be a reduced albedo in \[0, 1\], got \S", call, alpha, exact.SEARCHLIGHT)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_albedo_must_be_in_0_to_1(alpha):
         (
             lambda mfp: exact.profile(1.0, 0.5, mfp),
             [0.0, -1.0, np.inf, np.nan, "long"],
-            r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100, got",
+            r"mfp must be a transport mean free path > 0, from 1e-100 to 1e\+100, got",
         ),
         (
             lambda xi: exact.quantile(xi, 0.5),

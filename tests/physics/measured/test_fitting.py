@@ -414,7 +414,7 @@ def test_a_held_reflectance_is_an_albedo():
     assert held_albedo(LAW, "A", LAW.albedo.reflectance(0.8)) == pytest.approx(0.8, abs=1e-10)
     refracting = catalogue.load("hazard", setting=Setting(n=1.4))
     refused(r"^held A must be a total reflectance in \[.*, 0.97\d+\] of this light", held_albedo, refracting, "A", 0.99)
-    refused(r"^held alpha must be a single-scattering albedo in \(0, 1\), got 1", held_albedo, LAW, "alpha", 1.0)
+    refused(r"^held alpha must be a reduced albedo in \(0, 1\), got 1", held_albedo, LAW, "alpha", 1.0)
 
 
 def test_exact_light_is_kept_for_the_next_process(monkeypatch, tmp_path):

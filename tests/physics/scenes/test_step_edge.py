@@ -196,9 +196,9 @@ def test_bias_of_the_project_law_is_small():
 
 
 def test_misuse():
-    refused("alpha must be a single-scattering albedo", step_response, 1.0, 1.5)
+    refused("alpha must be a reduced albedo", step_response, 1.0, 1.5)
     refused("x must be a finite place, got inf", step_response, np.inf, 0.5)
-    refused("mfp must be a mean free path > 0, got 0", step_response, 1.0, 0.5, 0.0)
+    refused("mfp must be a transport mean free path > 0, got 0", step_response, 1.0, 0.5, 0.0)
     hazard = {"setting": DIFFUSE, "law": profilefit.load("hazard")}
     refused("the law belongs to searchlight", step_response, 1.0, 0.5, **hazard, error=SettingError)
     refused("give a law of that setting", step_response, 1.0, 0.5, setting=Setting(n=0.9), error=SettingError)

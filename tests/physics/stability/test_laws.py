@@ -210,7 +210,7 @@ def test_a_colour_next_to_white_has_an_albedo():
 @pytest.mark.parametrize("mfp", [1e-101, 1e101, 0.0])
 def test_lengths_without_a_square_are_refused(mfp):
     refused(r"mfp must be > 0, from 1e-100 to 1e\+100", catalogue.load("hazard").profile, 1.0, 0.5, mfp)
-    refused(r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100", exact.profile, 1.0, 0.5, mfp)
+    refused(r"mfp must be a transport mean free path > 0, from 1e-100 to 1e\+100", exact.profile, 1.0, 0.5, mfp)
 
 
 def test_light_that_grazes_a_matched_surface_keeps_its_digits():

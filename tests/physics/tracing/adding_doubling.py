@@ -110,7 +110,7 @@ def _layer(layer, bundles):
 
 def _thin(layer, bundles, optical):
     """Exact matrices of a layer thin enough for an exponential: d(flux)/d(depth) = loss + gain, down and up."""
-    forward, backward = (layer.alpha * _scatter(layer.g, bundles, sign) / bundles.mu for sign in (1, -1))
+    forward, backward = (layer.mu_s / layer.mu_t * _scatter(layer.g, bundles, sign) / bundles.mu for sign in (1, -1))
     loss = np.diag(1 / bundles.mu)
     whole = expm(optical * np.block([[forward - loss, backward], [-backward, loss - forward]]))
     a, b, c, d = (np.vsplit(half, 2)[i] for i in (0, 1) for half in np.hsplit(whole, 2))

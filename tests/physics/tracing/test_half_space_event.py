@@ -106,7 +106,7 @@ def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
     grid = Grid.from_edges(r=EDGES)
     orders = simulate_orders(grid, 2**19, seed=1, setting=setting)
     for alpha in (0.4, 0.8, 0.95):
-        tally = simulate(half_space(alpha, n=setting.n, g=setting.g), grid, 2**17, seed=9)
+        tally = simulate(half_space(alpha, orders.mfp(alpha), setting.n, setting.g), grid, 2**17, seed=9)
         pairs = ((orders.profile(alpha), tally.reflectance_r), (orders.reflectance(alpha), tally.diffuse_reflectance))
         for general, own in pairs:
             error = np.hypot(general.standard_error, own.standard_error)

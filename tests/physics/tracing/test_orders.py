@@ -147,7 +147,7 @@ def test_covariance_of_many_albedos_fits_in_rank_8(run):
 def test_albedo_must_be_in_0_to_1(run, alpha):
     estimates = run.reflectance, run.profile, run.profile_derivative, run.energy, run.overflow
     for method in (*estimates, run.cut, run.weights):
-        refused(r"alpha must be a single-scattering albedo in \[0, 1\], got", method, alpha)
+        refused(r"alpha must be a reduced albedo in \[0, 1\], got", method, alpha)
 
 
 @pytest.mark.parametrize(

@@ -55,10 +55,10 @@ def test_which_media_are_matched_isotropic_half_spaces(medium, matched):
     assert medium.is_matched_isotropic_half_space == matched
 
 
-def test_half_space_takes_the_mean_free_path_of_the_light_itself():
+def test_half_space_takes_the_reduced_albedo_and_the_transport_mean_free_path():
     (layer,) = half_space(0.8, mfp=2.0, n=1.3, g=0.5).layers
     assert (layer.n, layer.g, layer.thickness, layer.mu_a) == (1.3, 0.5, math.inf, pytest.approx(0.1))
-    assert (layer.mu_s, layer.alpha, layer.mfp) == (pytest.approx(0.4), pytest.approx(0.8), pytest.approx(2.0))
+    assert (layer.mu_s, layer.alpha, layer.mfp) == (pytest.approx(0.8), pytest.approx(0.8), pytest.approx(2.0))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, "1", None, True, np.True_, np.complex128(0.5)])
@@ -125,8 +125,12 @@ def test_any_difference_makes_another_setting_and_light_does_not_unmatch_it(sett
 @pytest.mark.parametrize(
     ("make", "values", "message"),
     [
-        (half_space, [-0.1, 1.1, math.nan, None, True], r"alpha must be a single-scattering albedo in \[0, 1\]"),
-        (lambda mfp: half_space(0.5, mfp=mfp), [0, -1, math.inf, math.nan, "1"], "mfp must be a mean free path > 0"),
+        (half_space, [-0.1, 1.1, math.nan, None, True], r"alpha must be a reduced albedo in \[0, 1\]"),
+        (
+            lambda mfp: half_space(0.5, mfp=mfp),
+            [0, -1, math.inf, math.nan, "1"],
+            "mfp must be a transport mean free path > 0",
+        ),
         (Setting, ["laser", "", None, 3, ["diffuse"]], "illumination must be one of searchlight, diffuse"),
         (lambda n: Setting(n=n), [0.0, -1.4, np.inf, "glass", *NO_NUMBERS], "n must be a refractive index > 0"),
         (lambda g: Setting(g=g), [-1.0, 1.0, 2.0, "forward", *NO_NUMBERS], r"g must be a mean cosine in \(-1, 1\)"),

@@ -20,11 +20,11 @@ from tests.fixtures import slow
 
 FITS = catalogue.fits_folder()
 LAWS = {
-    one.label: one.law.in_reduced()
+    one.label: one.law
     for one in catalogue.profile_laws(FITS, matched=False)
     if not isinstance(one.law, BeamDiffusion)  # it has no text
 }
-MAPS = {one.label: one.law.in_reduced() for one in catalogue.albedo_laws(FITS, matched=False)}
+MAPS = {one.label: one.law for one in catalogue.albedo_laws(FITS, matched=False)}
 ALPHA = np.array([0.03, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999, 0.99999, 1.0])[:, None]
 X = np.geomspace(1e-6, 200.0, 120)[None, :]
 XI = np.concatenate([np.geomspace(1e-6, 9e-3, 20), np.linspace(0.0123, 0.99, 80), 1.0 - np.geomspace(9e-3, 1e-6, 20)])

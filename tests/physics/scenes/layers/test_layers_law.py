@@ -67,7 +67,7 @@ def test_the_closed_sum_of_the_documentation():
     for layer in TISSUE.layers:
         p = (1 - layer.g**2) / (4 * np.pi * (1 + layer.g**2 - 2 * layer.g * turned) ** 1.5)
         own = layer.mu_t * layer.thickness
-        total += layer.alpha * p * np.exp(-rate * depth) * (1 - np.exp(-rate * own)) / rate
+        total += layer.mu_s / layer.mu_t * p * np.exp(-rate * depth) * (1 - np.exp(-rate * own)) / rate
         depth += own
     expected = passed(cos_in, into) * passed(cos_out, out) / n**2 * cos_in / (into * out) * total
     assert single_scattering(TISSUE, cos_in, cos_out, turn) == pytest.approx(expected, rel=1e-13)
