@@ -15,7 +15,7 @@ mfp = np.array([1.2, 0.8, 0.55])  # transport mean free path [mm]
 alpha = profilefit.albedo_law("rational", setting=light).alpha(colour)
 law = profilefit.load("hazard", setting=light)
 
-print("single-scattering albedo:", *(f"{one:.4f}" for one in alpha))
+print("reduced albedo:", *(f"{one:.4f}" for one in alpha))
 print(" r [mm]   R_d [1/mm²]: red, green, blue    share within r")
 for r in (0.1, 0.3, 1.0, 3.0):
     profile, within = law.profile(r, alpha, mfp=mfp), law.cdf(r, alpha, mfp=mfp)

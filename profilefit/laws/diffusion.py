@@ -94,7 +94,7 @@ class DiffusionLaw(ProfileLaw):
 
     @evaluated
     def reflectance(self, alpha) -> Array:
-        """Total reflectance of the law itself at single-scattering albedo alpha [-]."""
+        """Total reflectance of the law itself at reduced albedo alpha [-]."""
         return self.unscaled_energy(jnp.asarray(jnp.inf), alpha)
 
     def total(self, alpha) -> Array:

@@ -48,11 +48,11 @@ PROFILE_NAMES = (
     ("pdf(r, alpha, mfp)", "density of that radius [1/length]"),
     ("shape(alpha)", "all that depends on alpha only, once a material or a pixel; with it, in x = r / mfp:"),
     ("density, _cumulated, _radius, _radius_density (x or xi, shape)", ""),
-    ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
+    ("alpha(A)", "reduced albedo alpha for a total reflectance A"),
 )
 MAP_NAMES = (PROFILE_NAMES[-1], ("map_reflectance(alpha)", "and back"))
 CONVENTIONS = """\
-alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
+alpha = mu_s' / (mu_s' + mu_a) is the reduced albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
 
 

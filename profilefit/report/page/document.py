@@ -27,7 +27,7 @@ LEAD = (
     "profile."
 )
 CONVENTIONS = (
-    "alpha: single-scattering albedo; A: total diffuse reflectance; l or mfp: transport mean free path "
+    "alpha: reduced albedo; A: total diffuse reflectance; l or mfp: transport mean free path "
     "1 / (mu_s' + mu_a), the unit of r; searchlight: a pencil beam (normal, collimated); diffuse: cosine-weighted "
     "light from all sides. Errors are one standard error."
 )

@@ -79,7 +79,7 @@ CAPTIONS = {
     "liang-19-inverse": "The inverse cdf (19)-(20): printed, regenerated and exact.",
     "inversion-error": "Largest error of inverse cdfs in the share of the reflected energy, by albedo.",
     "constants": "Printed constants against regenerated ones. z: their difference over its error.",
-    "quality": "Error over the single-scattering albedo, at held-out albedos.",
+    "quality": "Error over the reduced albedo, at held-out albedos.",
     "residuals": "Residuals of the fit.",
 }
 

@@ -111,7 +111,7 @@ class Stage(GpuOwner):
             law: one with a shader source, or an `ExactLaw`, which is sampled; or a technique of another kind.
             mfp: transport mean free path of red, green and blue, or one for all [mm].
             sampling: of each pixel.
-            fixed_alpha: reduced single-scattering albedo of the three, or one for all [-]; by default that of A, pixel
+            fixed_alpha: reduced albedo of the three, or one for all [-]; by default that of A, pixel
                 by pixel.
             rows: the first, and the first beyond: only these are drawn and returned, though they gather from all.
         """

@@ -46,7 +46,7 @@ def step_response(
     """Return L(x) / A: the share of its light that a point gathers from beyond the edge at 0, where x > 0 is lit [-].
 
     x        place [length], any real number; mfp in the same unit; x, alpha, mfp broadcast
-    alpha    single-scattering albedo in [0, 1]
+    alpha    reduced albedo in [0, 1]
     setting  of the exact half space, or that of the law; by default the law's, or a searchlight on a matched surface
     law      its cdf instead of the exact one: what no number of samples takes away
 

@@ -34,7 +34,7 @@ class Frame:
 
     size   columns and rows [pixels];  pixel  its side [mm], in perspective at a depth of 1 mm
     mfp    transport mean free path of red, green, blue (3,) [mm]
-    fixed_alpha  reduced single-scattering albedo (3,) [-]; None where a pixel's own A gives it
+    fixed_alpha  reduced albedo (3,) [-]; None where a pixel's own A gives it
     mean_reflectance  function that returns the mean A (3,) where light scatters [-]
     scene  that is seen; None where buffers were uploaded
     """

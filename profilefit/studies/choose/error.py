@@ -122,7 +122,7 @@ class ReferenceLight:
         require(1.0 <= n <= REFRACTING.high, "index", f"a refractive index in [1, {REFRACTING.high:g}]", n)
 
     def alpha(self, reflectance: float) -> float:
-        """Return the single-scattering albedo [-] of a reflectance A [-]."""
+        """Return the reduced albedo [-] of a reflectance A [-]."""
         return max(albedo_of(reflectance, self.setting), DARKEST)
 
     def beyond(self, reflectance: float) -> Beyond:

@@ -1,5 +1,7 @@
 """Exact light of half spaces that scatter forwards: the table against photons and against what is known of it."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,9 +9,11 @@ import pytest
 from scipy import stats
 
 from benchmarks import half_spaces
-from mcml_sim import Setting, exact
+from mcml_sim import Layer, Setting, exact, half_space
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import forwards, single_scattering
+from profilefit import load
+from profilefit.shader.emit import law_text
 
 ALPHAS = np.array([0.3, 0.9, 0.99, 0.9995])
 R = np.geomspace(0.01, 30.0, 9)
@@ -39,6 +43,32 @@ def test_similarity_is_told_from_it():
     z = (other - photons.value) / np.maximum(photons.standard_error, 1e-12)
     rings = (edges[:-1] > 0.05) & (edges[1:] < 5)
     assert stats.chi2.sf(np.sum(z[rings] ** 2), rings.sum()) < 1e-9
+
+
+def test_alpha_and_mfp_are_the_reduced_ones_of_light_photons_laws_and_shaders():
+    """Tissue of mu_s = 18 and mu_a = 0.2 per mm: alpha = 0.9, mfp = 0.5 mm."""
+    layer = Layer(n=1.4, mu_a=0.2, mu_s=18.0, g=0.9)
+    (same,) = half_space(0.9, 0.5, 1.4, 0.9).layers
+    assert (layer.alpha, layer.mfp) == pytest.approx((0.9, 0.5))
+    assert (same.mu_a, same.mu_s) == pytest.approx((0.2, 18.0))
+    photons, law, text = half_spaces.reference(TISSUE), load("hazard", setting=TISSUE), dict[str, Any]()
+    exec(law_text(law, "python", "law"), text)
+    edges = photons.grid.r_edges / layer.mu_t  # [mm]
+    found = photons.profile(0.9)
+    assert found.mfp / layer.mu_t == pytest.approx(0.5)
+    rings = (edges[:-1] > 0.05) & (edges[1:] < 3.0)
+
+    def off(cdf):
+        """Mean error of the light in rings."""
+        own = np.diff(cdf) * exact.reflectance(0.9, TISSUE) / photons.grid.r_areas
+        return np.mean(np.abs(own / found.value - 1.0)[rings])
+
+    assert off(exact.cdf(edges, 0.9, 0.5, TISSUE)) < 0.005
+    assert off(law.cdf(edges, 0.9, 0.5)) < 0.02
+    assert off(text["law_cdf"](edges, 0.9, 0.5)) < 0.02
+    assert law.albedo.alpha(found_total := photons.reflectance(0.9).value) == pytest.approx(0.9, abs=0.003)
+    assert text["law_alpha"](found_total) == pytest.approx(0.9, abs=0.003)
+    assert off(exact.cdf(edges, 18.0 / 18.2, 1.0 / 18.2, TISSUE)) > 0.3  # negative control: not reduced
 
 
 @pytest.mark.slow
