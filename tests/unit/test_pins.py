@@ -67,7 +67,7 @@ def orders() -> str:
 def refracting() -> str:
     setting = mcml_sim.Setting("diffuse", n=1.4, g=0.5)
     run = mcml_sim.simulate_orders(mcml_sim.Grid(0.5, 20), PHOTONS, seed=4, setting=setting)
-    return digest(run.counts.exits, run.reflectance(0.9).value)
+    return digest(run.counts.exits, run.reflectance(9 / 11).value)  # mu_s / (mu_s + mu_a) is 0.9
 
 
 def layered() -> str:

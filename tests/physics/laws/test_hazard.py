@@ -338,9 +338,10 @@ def test_ends_are_exact_with_g(setting):
     law, nearest = load("hazard", setting=setting), 1e-9
     alpha = FEW[:, 0]
     source = 2 * np.pi * nearest * law.profile(nearest, alpha)
-    np.testing.assert_allclose(source, alpha * single_scattering.source_strength(setting), rtol=1e-6)
+    once = 1.0 / (1.0 - setting.g)  # mu_s over mu_s'
+    np.testing.assert_allclose(source, once * alpha * single_scattering.source_strength(setting), rtol=1e-6)
     assert law.albedo.reflectance(1.0) == pytest.approx(single_scattering.entered(setting), rel=1e-12)
-    assert law.albedo.reflectance(1e-9) / 1e-9 == pytest.approx(single_scattering.reflected(setting), rel=1e-6)
+    assert law.albedo.reflectance(1e-9) / 1e-9 == pytest.approx(once * single_scattering.reflected(setting), rel=1e-6)
     np.testing.assert_allclose(law.cdf([0.0, 1e9], 0.9), [0, 1], atol=1e-12)
     assert np.all(np.diff(law.cdf(WIDE, FEW), axis=1) >= 0)
     assert np.all(law.profile(WIDE, FEW) >= 0)

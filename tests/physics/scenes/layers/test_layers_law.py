@@ -77,7 +77,7 @@ def photons(medium: Medium, cos_in: float, count: int, seed: int):
     """Slow twin: cosines, cosines of the azimuth and weights of photons that leave above after one scattering."""
     random, layers = np.random.default_rng(seed), medium.layers
     index = np.array([medium.n_above, *(layer.n for layer in layers), medium.n_below])
-    mu_t, alpha, g = (np.array([getattr(layer, name) for layer in layers]) for name in ("mu_t", "alpha", "g"))
+    mu_t, alpha, g = np.array([(layer.mu_t, layer.mu_s / (layer.mu_t or 1.0), layer.g) for layer in layers]).T
     edges = medium.z_edges
     place = np.full(count, -1)  # of a layer; -1 above, len(layers) below
     course = np.tile([np.sqrt(1 - cos_in**2), 0.0, cos_in], (count, 1))
