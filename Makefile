@@ -62,9 +62,10 @@ docs: $(VENV)/.installed-test  ## build the site into docs/_build/html; a warnin
 programs: $(VENV)/.installed  ## OpenGL, an HLSL compiler, a browser, as root on Debian; elsewhere tests of them are skipped
 	@sh -c "$$FIND_PROGRAMS"
 
-lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
+lint: $(VENV)/.installed-test  ## ruff, codespell and mypy; changes nothing
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
+	$(PY) -m codespell_lib
 	$(PY) -m mypy
 
 format: $(VENV)/.installed-test  ## let ruff fix and format the sources
