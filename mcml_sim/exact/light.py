@@ -14,7 +14,7 @@ mu_s (1 - g) l*. D_1 belongs to the unreduced medium, 1 + alpha g / (1 - g) mean
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -33,19 +33,6 @@ LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
 GONE = 40.0  # kappa x, from where there is no light that counts
 ENERGY = np.polynomial.legendre.leggauss(96)
-
-
-class Reduced(NamedTuple):
-    """Scale that a medium shares with one whose scattering has no direction."""
-
-    alpha: Any  # reduced albedo mu_s (1 - g) l* [-]
-    length: Any  # length l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths
-
-
-def reduced(alpha: Any, g: Any) -> Reduced:
-    """Return the reduced scale of an albedo mu_s / (mu_s + mu_a)."""
-    length = 1.0 / (1.0 - alpha * g)
-    return Reduced(alpha * (1.0 - g) * length, length)
 
 
 def unreduced(alpha: Any, g: float) -> Any:
