@@ -126,11 +126,7 @@ def test_any_difference_makes_another_setting_and_light_does_not_unmatch_it(sett
     ("make", "values", "message"),
     [
         (half_space, [-0.1, 1.1, math.nan, None, True], r"alpha must be a reduced albedo in \[0, 1\]"),
-        (
-            lambda mfp: half_space(0.5, mfp),
-            [0, -1, math.inf, math.nan, "1"],
-            "mfp must be a transport mean free path >",
-        ),
+        (lambda mfp: half_space(0.5, mfp), [0, -1, np.inf, np.nan, "1"], "mfp must be a transport mean free path > 0"),
         (Setting, ["laser", "", None, 3, ["diffuse"]], "illumination must be one of searchlight, diffuse"),
         (lambda n: Setting(n=n), [0.0, -1.4, np.inf, "glass", *NO_NUMBERS], "n must be a refractive index > 0"),
         (lambda g: Setting(g=g), [-1.0, 1.0, 2.0, "forward", *NO_NUMBERS], r"g must be a mean cosine in \(-1, 1\)"),
