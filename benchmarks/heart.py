@@ -59,7 +59,7 @@ def kernels() -> list[Kernel]:
     found = []
     for name in STACKS:
         media = stack.request(name).stack.media
-        units = [medium.layers[0].similar.mfp for medium in media]
+        units = [medium.layers[0].mfp for medium in media]
         found.append(kernel_of(shared_gaussians(media, "diffuse", COUNT), units))
     return found
 

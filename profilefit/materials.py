@@ -21,7 +21,7 @@ class Material:
 
     @property
     def alpha(self) -> tuple[float, ...]:
-        """Single-scattering albedo sigma_s' / (sigma_s' + sigma_a) of each channel [-]."""
+        """Reduced albedo sigma_s' / (sigma_s' + sigma_a) of each channel [-]."""
         return tuple(s / (s + a) for s, a in zip(self.scattering, self.absorption, strict=True))
 
     @property

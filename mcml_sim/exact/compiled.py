@@ -10,9 +10,9 @@ import jax
 # Its newer emitters of loops work out anew what several results share: a law's Jacobian takes five times as long, and
 # compiles half as long again (jaxlib 0.10; 0.11 may not know the option).
 OPTIONS: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else {}
-# Of large programs that run a few dozen times: they run in milliseconds, and compile in half of the seconds.
+# Options for large programs that run a few dozen times: compiling takes half as long.
 BRIEF = OPTIONS | {"xla_backend_optimization_level": 0}
-# Of programs that run for seconds and whose digits nothing else depends on: an eighth less time where AVX-512 is.
+# Options for programs that run for seconds and whose digits decide nothing else: an eighth faster with AVX-512.
 WIDE = OPTIONS | {"xla_cpu_prefer_vector_width": 512}
 
 

@@ -113,8 +113,9 @@ def digest(table: SplinedLight) -> str:
 
 @lru_cache(maxsize=2048)
 def decay_rate(alpha: float, g: float) -> float:
-    """Return kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [1/mfp].
+    """Return kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [mu_s + mu_a].
 
+    Here alpha is mu_s / (mu_s + mu_a), not the reduced one.
     1 over the largest eigenvalue of the tridiagonal matrix of l / sqrt(h_l-1 h_l), h_l = (2 l + 1)(1 - alpha g^l).
     """
     ell = np.arange(DEGREE + 1)

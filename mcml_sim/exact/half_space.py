@@ -85,7 +85,7 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
 
 
 def decay_rate(alpha: Numbers) -> float | Floats:
-    """Return kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls as e^{-kappa r / mfp} r^-2 [-]."""
+    """Return kappa of isotropic scattering, where alpha artanh(kappa) = kappa: R_d falls as e^{-kappa r / mfp} r^-2."""
     return scalar_or_array(elementwise(_decay_rate, *_all_checked(SEARCHLIGHT, alpha=alpha)))
 
 

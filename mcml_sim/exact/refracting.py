@@ -148,6 +148,7 @@ def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
 
 
 def _in_double(part: Callable[[], Complexes]) -> Complexes:
+    """Call a function in double precision."""
     with jax.enable_x64(True), jax.core.eval_context():  # which holds for a thread
         return part()
 
@@ -198,7 +199,9 @@ def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: 
     """
     here, change = ([np.asarray(part) for part in system] for system in _systems(n, k, x_nodes, angles, slope))
     transforms = []
-    for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=False):
+    for albedo, matrix, leaving, source, *by_n in zip(
+        alpha, *(part[: len(alpha)] for part in (*here, *change)), strict=True
+    ):
         resolvents = np.eye(x_nodes) - albedo[:, None, None] * matrix
         adjoint = np.linalg.solve(resolvents, leaving[None, :, None])[..., 0]
         if not slope:
@@ -237,6 +240,7 @@ def _series(n: float, k: Complexes, x_nodes: int, angles: int, slope: bool) -> C
 
 @jit
 def _in_orders(here: cone.System, change: cone.System | None = None) -> jax.Array:
+    """Return the transform of each order, or how it changes with the systems."""
     at = jax.vmap(partial(cone.series, orders=ORDERS), out_axes=1)
     return at(here) if change is None else jax.jvp(at, (here,), (change,))[1]
 

@@ -58,7 +58,8 @@ class Layer:
     @property
     def alpha(self) -> float:
         """Reduced albedo mu_s' / (mu_s' + mu_a), mu_s' = (1 - g) mu_s [-]; 0 in clear glass."""
-        return (1 - self.g) * self.mu_s * self.mfp if self.mu_t else 0.0
+        scattered = (1 - self.g) * self.mu_s
+        return scattered / (scattered + self.mu_a) if self.mu_t else 0.0  # exactly 1 where nothing is absorbed
 
     @property
     def mfp(self) -> float:

@@ -97,7 +97,7 @@ class Orders:
         )
 
     def merged(self, r_edges: ArrayLike) -> Orders:
-        """Return these photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
+        """Return these photons on fewer, wider rings: `r_edges` rise from 0, each one an edge of this grid."""
         grid = Grid.from_edges(r=r_edges)
         index = np.searchsorted(self.grid.r_edges, grid.r_edges)
         if index[-1] >= self.grid.r_edges.size or np.any(self.grid.r_edges[index] != grid.r_edges):

@@ -127,7 +127,7 @@ def simulate_orders(
     """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
     Args:
-        grid: rings, edges in mean free paths [mfp].
+        grid: rings, edges in units of 1 / (mu_s + mu_a).
         photons: how many to start, 1 to 1e13.
         seed: whole number >= 0; equal seeds start with equal photons.
         setting: the light and the surface; Setting() and its diffuse twin are the fastest.

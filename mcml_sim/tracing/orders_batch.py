@@ -31,8 +31,8 @@ def trace_batch(
 ) -> order_bins.Counts:
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64 (`pool.lanes`).
 
-    Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
-    kernel is the one that needs no directions.
+    Lengths of the grid are in units of 1 / (mu_s + mu_a). Where the surface does not refract and scattering is
+    isotropic, the kernel is the one that needs no directions.
     """
     bins = order_bins.bins_of(setting)
     key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(bins.stops)

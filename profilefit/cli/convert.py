@@ -30,7 +30,7 @@ def _length(words: str) -> Any:
 
 def convert(
     context: typer.Context,
-    alpha: Annotated[str | None, typer.Option(help="Single-scattering albedo mu_s' / (mu_s' + mu_a).")] = None,
+    alpha: Annotated[str | None, typer.Option(help="Reduced albedo mu_s' / (mu_s' + mu_a).")] = None,
     reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
     illumination: Annotated[str | None, typer.Option(help=f"Of --reflectance and --falloff: {LIGHTS_HELP}.")] = None,
     n: Annotated[float, typer.Option("--n", help="Refractive index of the surface that A is of.")] = 1.0,

@@ -208,7 +208,7 @@ def matern(distance: Floats) -> Floats:
 
 
 def _bent(distance: Floats) -> tuple[Floats, Floats]:
-    """Return `matern` and its derivative by ln length, of one exponential."""
+    """Return `matern` and its derivative by ln length."""
     scaled = np.sqrt(3.0) * distance
     decay = np.exp(-scaled)
     return (1.0 + scaled) * decay, scaled**2 * decay
@@ -228,7 +228,7 @@ def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floa
 def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
     """Return minus Patterson and Thompson's (3) of `y` but for `slope` times anything; derivatives by `covariance`."""
     root = np.linalg.cholesky(covariance)
-    lower = dpotri(root, lower=1)[0]  # of the inverse, 0 above as `root` is: a third of what solving for it takes
+    lower = dpotri(root, lower=1)[0]  # lower triangle of the inverse, in a third of the time that solving takes
     across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
     seen = solve_triangular(root, across, lower=True, trans=1)
     inverse = lower + lower.T - seen @ seen.T  # of what `slope` leaves

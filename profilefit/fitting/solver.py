@@ -388,7 +388,7 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
 
 
 def _stepped(at: Floats, values: Floats, slope: Floats, unit: float, state: Any, y: Floats) -> tuple[Any, ...]:
-    """Advance least squares by the triangular factor, filled up to one of `SIZES`; results of `_advanced`, and it."""
+    """Advance least squares by the triangular factor, filled up to one of `SIZES`; return it after `_advanced`'s."""
     count, size = y.size, next((size for size in SIZES if size >= y.size), y.size)
     triangle = np.zeros((size + 1, size + 1))
     rows = _scaled(np.column_stack([slope, values]), unit)

@@ -277,7 +277,7 @@ class AlbedoLaw(Constants):
 
     @abc.abstractmethod
     def alpha(self, reflectance) -> Array:
-        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
+        """Reduced albedo alpha [-] at total reflectance A [-]."""
 
     @abc.abstractmethod
     def reflectance(self, alpha) -> Array:
@@ -347,7 +347,7 @@ class ProfileLaw(Constants):
         """Limit of 2 pi x R_d at x -> 0, before any scaling [1/mfp]; the exact one is alpha / 2."""
 
     def total(self, alpha) -> Array:
-        """Return the total reflectance A [-] that the profile integrates to at an albedo of the scaled functions."""
+        """Return the total reflectance A [-] that the profile integrates to."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
 
     def reflected(self, alpha: Array) -> Array:

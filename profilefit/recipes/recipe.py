@@ -115,8 +115,7 @@ class Recipe(Declared):
 
     indices        refractive indices that a law which spans them is fitted to at once; the record says n = setting.n
                    where it speaks of one
-    cosines        mean cosines g that a law which spans them is fitted to at once, at each index; albedos and rings are
-                   reduced ones then
+    cosines        mean cosines g that a law which spans them is fitted to at once, at each index
     check          "orders": fit the tracer's photons too, and compare with the fit to the exact half space
     random_starts  how many fits begin at random constants, to see whether one ends better
     """

@@ -119,7 +119,7 @@ class Fitted:
 
     @property
     def albedos(self) -> Floats:
-        """Single-scattering albedos that were fitted (n,) [-]; RecordError where the protocol is damaged."""
+        """Reduced albedos that were fitted (n,) [-]; RecordError where the protocol is damaged."""
         file = f"{self.content['name']}.json: protocol.albedos"
         declared = Albedos.of(file, self.content["protocol"]["albedos"], RecordError)
         return albedo_values(declared, self.law.setting)

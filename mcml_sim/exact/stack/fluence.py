@@ -37,9 +37,10 @@ from mcml_sim.media.medium import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
-# Terms of the series, nodes of Gauss's rule, and by how many e-folds its integrand falls: 3e-12 of K, and 2e-10 where
-# panels have few nodes. Thick plates in which nothing is absorbed show a million times that.
+# Terms of the series, nodes of Gauss's rule, and by how many e-folds its integrand falls. The error of K is 3e-12, and
+# 2e-10 where panels have few nodes. Thick plates in which nothing is absorbed show a million times that.
 FINE, COARSE = (16, 16, 28.0), (13, 13, 22.0)
+MOST_KEPT = 600  # depths of a stack whose pairs are kept: they take 24 bytes times the square of it
 
 
 class Field(NamedTuple):
@@ -128,9 +129,10 @@ def normal_reflectances(here: Depths) -> tuple[float, float]:
 
 def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
     """Return the integral operator on fluences at the nodes, (N, N)."""
-    matrix = _by_panel(here)(k)
+    by_panel = _kept_by_panel if here.z.size <= MOST_KEPT else _by_panel
+    matrix = by_panel(here)(k)
     for mirror in _mirrors(here):
-        matrix += _by_panel(here, mirror)(k)
+        matrix += by_panel(here, mirror)(k)
     matrix += _slanted(here, slants) * here.weight
     if here.tail.size:  # below the last node, per fluence there: the slowest mode never ends
         z, tau, weight = here.tail
@@ -146,7 +148,6 @@ def _mirrors(here: Depths) -> list[tuple[float, float]]:
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
-@lru_cache(maxsize=quadrature.KEPT)
 def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callable[[float], Floats]:
     """Return a function of k: mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
@@ -197,6 +198,9 @@ def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callab
     return at_wave
 
 
+_kept_by_panel = lru_cache(maxsize=quadrature.KEPT)(_by_panel)
+
+
 def _slanted(here: Depths, slants: Slants) -> Floats:
     """Return G without the mirror images, (N, N)."""
     a, b, whole = slants.a, slants.b, slants.whole
@@ -226,7 +230,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
     """Return X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
     phase = k * quadrature.deepest(here) * min(quadrature.steepest(here), 1.5)
-    t, d_mu = quadrature.cones(here, int(rule.slope * (1 + quadrature.SLOPES * phase)))
+    t, d_mu = quadrature.cones(here, int(rule.slope * (1 + quadrature.SLOPES_A_RADIAN * phase)))
     a, b = reflectance(here.above, t), reflectance(here.below, t)
     ways = [(here.z, here.tau, 1 - a - matched)]
     if here.height < np.inf and here.below != 1:

@@ -37,7 +37,7 @@ RAY_NODES = 14  # of a panel
 AZIMUTHS = 0.7  # eights of them for each e-fold by which waves are shorter than mean free paths
 STEEPEST = 1e9  # where no critical angle ends the slopes
 THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical angles crosses to and fro
-SLOPES, AZIMUTHS_A_SLOPE = 0.55 / 24, 0.25 / 8  # as much more of them for each radian that phases turn
+SLOPES_A_RADIAN, AZIMUTHS_A_RADIAN = 0.55 / 24, 0.25 / 8  # growth of their numbers by the radian of phase
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
 MOST_PHASE = 40.0  # as far as they turn no farther than this
 KEPT = 8  # sets of depths, whose pairs many wave numbers share
@@ -318,10 +318,10 @@ def deepest(here: Depths) -> float:
 
 def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """Return tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
-    t, d_mu = cones(here, int(rule.slope * (1 + SLOPES * phase)))
+    t, d_mu = cones(here, int(rule.slope * (1 + SLOPES_A_RADIAN * phase)))
     # Of each slope as many azimuths as its own phases take.
     share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
-    azimuths = np.full(t.size, rule.azimuth / 3 * (1 + AZIMUTHS_A_SLOPE * phase * share) if k > 0 else 1.0).astype(int)
+    azimuths = np.full(t.size, rule.azimuth / 3 * (1 + AZIMUTHS_A_RADIAN * phase * share) if k > 0 else 1.0).astype(int)
     of = np.repeat(np.arange(t.size), azimuths)
     place = (np.arange(of.size) - (np.cumsum(azimuths) - azimuths)[of] + 0.5) / azimuths[of]
     columns = [(t[of], np.cos(0.5 * np.pi * place), 0.5 * d_mu[of] / azimuths[of])]

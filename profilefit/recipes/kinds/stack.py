@@ -401,9 +401,9 @@ def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mappi
     if any(layer.g > 0 for layer in medium.layers):
         tops = []
         for layer, values in zip(medium.layers, recorded, strict=True):
-            own, similar = replace(setting, g=layer.g), layer.similar
+            own = replace(setting, g=layer.g)
             law = ForwardHalfSpace(own, **{name: float(values[name]) for name in ForwardHalfSpace.constant_names()})
-            tops.append(LayerLaw(own, law, similar.alpha, similar.mfp))
+            tops.append(LayerLaw(own, law, layer.alpha, layer.mfp))
         return tops
     tops = stacks.isotropic_tops(medium, setting)
     today = tops[0].law.constants()

@@ -137,23 +137,22 @@ def lowest(solutions: Sequence[Solution]) -> Solution:
 
 
 def traced_half_space(layer: Layer, setting: Setting, tracing: Tracing = USUAL, offset: int = 0) -> LayerLaw:
-    """Fit the law of a layer's half space to traced light, in similar lengths and albedo; offset  of the seed."""
+    """Fit the law of a layer's half space to traced light; offset  of the seed."""
     own = replace(setting, g=layer.g)
-    similar = layer.similar
     edges = ring_edges(layer, (layer,))
     medium = Medium((replace(layer, thickness=np.inf),), layer.n / setting.n)
     rings = tracing.rings(medium, setting.illumination, edges, HALF_SPACE_PHOTONS, offset)
-    data = (rings.edges / similar.mfp, rings.energy, rings.weight)
+    data = (rings.edges / layer.mfp, rings.energy, rings.weight)
 
     def residual(parameters, light):
         at, energy, weight = light
-        within = _half_space_of(own, similar.alpha, rings.whole, parameters).unscaled_energy(at, jnp.asarray(0.0))
+        within = _half_space_of(own, layer.alpha, rings.whole, parameters).unscaled_energy(at, jnp.asarray(0.0))
         return weight * (jnp.diff(within) / energy - 1.0)
 
     best = lowest([least_squares(residual, np.array(start), data) for start in HALF_SPACE_STARTS])
     with jax.enable_x64(True):
-        law = jax.tree.map(float, _half_space_of(own, similar.alpha, rings.whole, jnp.asarray(best.parameters)))
-    return LayerLaw(own, law, similar.alpha, similar.mfp)
+        law = jax.tree.map(float, _half_space_of(own, layer.alpha, rings.whole, jnp.asarray(best.parameters)))
+    return LayerLaw(own, law, layer.alpha, layer.mfp)
 
 
 def _half_space_of(setting: Setting, albedo: float, whole: float, parameters) -> ForwardHalfSpace:

@@ -264,8 +264,6 @@ def _panel(ax: Axes, key: str, sets: Mapping[str, tuple[Content, str]]) -> None:
         quality = content["quality"]
         ax.plot(quality["alpha"], quality[which][key], label=label, markersize=3.0, **look)
     albedo_axis(ax)
-    if any(content["setting"]["g"] for content, _ in sets.values()):
-        ax.set_xlabel("reduced albedo α [-]")
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)

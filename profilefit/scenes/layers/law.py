@@ -9,14 +9,14 @@
 Single scattering is a sum over the layers, for any indices and any phase functions.
 Light of one direction outside has one direction in each layer: down, and up where an interface below threw it back.
 What arrives of it at a depth is a product of Beer's and Fresnel's factors, and so is, by reciprocity, what reaches the
-eye from there. Of a layer of albedo alpha and index n, with cosines mu_i and mu_o inside, t optical depths below its
-top
+eye from there. Of a layer of index n that scatters a share a = mu_s / mu_t, with cosines mu_i and mu_o inside, t
+optical depths below its top
 
-    L = alpha (n_above / n)^2  cos_in / (mu_i mu_o)  sum_ab p(c_ab) int in_a(t) out_b(t) dt,    a, b down or up,
+    L = a (n_above / n)^2  cos_in / (mu_i mu_o)  sum_ab p(c_ab) int in_a(t) out_b(t) dt,    a, b down or up,
 
 in_down = D e^{-t / mu_i}, say. With one index in all layers and no surface below that is
 
-    L = T_i T_o / n^2  cos_in / (mu_i mu_o)  sum_j alpha_j p_j e^{-b t_j} (1 - e^{-b d_j}) / b,   b = 1/mu_i + 1/mu_o,
+    L = T_i T_o / n^2  cos_in / (mu_i mu_o)  sum_j a_j p_j e^{-b t_j} (1 - e^{-b d_j}) / b,   b = 1/mu_i + 1/mu_o,
 
 t_j and d_j the optical depths above and inside layer j (P. Hanrahan and W. Krueger, Reflection from layered surfaces
 due to subsurface scattering, SIGGRAPH 1993, for one layer).
@@ -189,7 +189,7 @@ def _depth(layer: Layer) -> float:
 
 
 def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) -> Floats:
-    """Return alpha / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
+    """Return a / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
     reached = (one.cosine > 0) & (other.cosine > 0)
     into, out = np.where(reached, one.cosine, 1.0), np.where(reached, other.cosine, 1.0)
     depth = _depth(layer)

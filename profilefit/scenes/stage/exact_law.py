@@ -71,7 +71,7 @@ class ExactLaw:
 
 
 def require_isotropic(setting: Setting) -> None:
-    """Raise SettingError where a setting has g: a scene's albedos and lengths are reduced, exact light's are not."""
+    """Raise SettingError where a setting has g: the tables take the decay rate of isotropic scattering."""
     if setting.g != 0.0:
         raise SettingError(f"a scene's exact light scatters isotropically: setting must have g = 0, got {setting}")
 

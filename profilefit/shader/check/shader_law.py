@@ -109,7 +109,7 @@ class ShaderMap:
         self._pass = _Pass(context, f"{self.name} map", source, "f4")
 
     def alpha(self, reflectance: ArrayLike) -> Floats:
-        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
+        """Reduced albedo alpha [-] at total reflectance A [-]."""
         return self._pass(reflectance, 0.5, 0.0, 0.0)[0]
 
     def reflectance(self, alpha: ArrayLike) -> Floats:

@@ -23,7 +23,7 @@ float LAW_map_reflectance(float alpha) {
     return middle;
 }
 
-// Single-scattering albedo alpha [-] for a total reflectance A [-]
+// Reduced albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
     float t = LAW_exponent(clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE));
     return t * pf_mean_decay(t);

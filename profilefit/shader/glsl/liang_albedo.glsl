@@ -5,7 +5,7 @@ float LAW_map_reflectance(float alpha) {
     return min(alpha * LAW_map_w / (lean + rest), LAW_map_fold);
 }
 
-// Single-scattering albedo alpha [-] for a total reflectance A [-]
+// Reduced albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
     float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
     return min(LAW_map_p * share / (LAW_map_w + share * (share + LAW_map_q)), 1.0);

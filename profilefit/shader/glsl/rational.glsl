@@ -11,7 +11,7 @@ float LAW_map_alpha_over_reflectance(float alpha) {
     return (1.0 + s) * (1.0 + s * (LAW_map_c + LAW_map_d * s)) / (1.0 + LAW_map_b * s);
 }
 
-// Single-scattering albedo alpha [-] for a total reflectance A [-]: the root s of a quadratic where A is large, and
+// Reduced albedo alpha [-] for a total reflectance A [-]: the root s of a quadratic where A is large, and
 // 1 - s where it is small, so that neither cancels.
 float LAW_alpha(float reflectance) {
     float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);

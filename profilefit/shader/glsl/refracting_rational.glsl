@@ -43,7 +43,7 @@ float LAW_map_root(float rest, float linear_term, float quadratic) {
     return x;
 }
 
-// Single-scattering albedo alpha [-] for a total reflectance A [-]: the root s where A is large, and 1 - s where it is
+// Reduced albedo alpha [-] for a total reflectance A [-]: the root s where A is large, and 1 - s where it is
 // small, so that neither cancels.
 float LAW_alpha(float reflectance) {
     float share = clamp(reflectance / LAW_MAX_REFLECTANCE, 0.0, 1.0);

@@ -7,7 +7,7 @@ float LAW_map_reflectance(float alpha) {
     return clamp(2.0 * constant / (root - slope), 0.0, 1.0);
 }
 
-// Single-scattering albedo alpha [-] for a total reflectance A [-]
+// Reduced albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
     float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
     float s = LAW_map_p0 + LAW_map_p1 * share - sqrt(LAW_map_q0 + share * (LAW_map_q1 + share * LAW_map_q2));

@@ -276,7 +276,7 @@ def once(n: float, arithmetic: str) -> Cells:
     """Return light scattered once: over g, what lies below, thickness, both directions and the angle between them."""
     dtype = cells.DTYPES[arithmetic]
     values = [np.array(each).astype(dtype).astype(float) for each in (DEPTHS, COSINES, COSINES, TURNED)]
-    axes = axis("g", FORWARD), axis("α below", BELOW), *map(axis, ("d/l", "cos in", "cos out", "turned"), values)
+    axes = axis("g", FORWARD), axis("μs/μt below", BELOW), *map(axis, ("d/l", "cos in", "cos out", "turned"), values)
     depth, into, out, turned = np.meshgrid(*values, indexing="ij", sparse=True)
     value, reference = np.empty((2, *(one.values.size for one in axes)))
     for i, g in enumerate(FORWARD):

@@ -80,10 +80,11 @@ def test_the_line_starts_where_light_decays():
 @pytest.mark.parametrize("g", [0.5, 0.8])
 def test_totals_of_photons(g, sidak):
     """And a negative control, in which the phase function is a dipole's."""
-    alpha = np.array([0.6, 0.9, 0.99, 0.999])
+    own = np.array([0.6, 0.9, 0.99, 0.999])  # mu_s / (mu_s + mu_a)
+    alpha = own * (1 - g) / (1 - own * g)
     for light, name in enumerate(LIGHTS):
         photons = simulate_orders(Grid(1.0, 1), 2**20, 5, Setting(name, N, g), progress=False).reflectance(alpha)
         for degree, agrees in ((16, True), (2, False)):
-            found = high_orders.transforms(N, g, 0, np.array([1e-6 + 0j]), alpha, high_orders.Fineness(degree))
+            found = high_orders.transforms(N, g, 0, np.array([1e-6 + 0j]), own, high_orders.Fineness(degree))
             z = (found[light, 0].real - photons.value) / photons.standard_error
             assert (np.abs(z).max() < sidak(4)) == agrees

@@ -177,7 +177,7 @@ def test_albedos_must_be_a_list_above_zero(alpha, white_run):
 
 
 def test_forward_orders_are_refused_and_white_media_and_numbers_allowed(white_run):
-    # Rings of forward orders are in mean free paths, which are other shares of l* for each albedo.
+    # Rings of forward orders are in 1 / (mu_s + mu_a), which is another share of l* for each albedo.
     run = simulate_orders(Grid(1.0, 3), 100, seed=1, setting=Setting(g=0.5))
     refused(r"orders must be of light that scatters isotropically, got g = 0\.5", Profiles.from_orders, run, [0.5])
     run = simulate_orders(Grid(1.0, 3), 1000, seed=1)

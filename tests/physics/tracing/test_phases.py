@@ -87,8 +87,9 @@ def test_light_scattered_once(phase, illumination, photons):
 def test_layers_and_orders_agree(phase, photons):
     """Two kernels that share nothing but the phase function: A and rings of one half space."""
     orders = simulate_orders(GRID, photons, 5, Setting(n=1.2, phase=phase))
-    layered = simulate(Medium((Layer(1.2, 0.2, 0.8, 0.0, phase=phase),)), GRID, photons, 6)
-    totals, rings = (orders.reflectance(0.8), layered.diffuse_reflectance), (orders.profile(0.8), layered.reflectance_r)
+    layer = Layer(1.2, 0.2, 0.8, 0.0, phase=phase)
+    tally, own = simulate(Medium((layer,)), GRID, photons, 6), layer.alpha
+    totals, rings = (orders.reflectance(own), tally.diffuse_reflectance), (orders.profile(own), tally.reflectance_r)
     for one, other in (totals, rings):
         error = np.hypot(one.standard_error, np.asarray(other.standard_error))
         assert np.all(np.abs(np.asarray(one.value) - other.value) < 4.5 * error)

@@ -165,7 +165,7 @@ def test_an_exact_inverse_has_its_laws_bias_only():
 def test_a_law_with_g_is_judged_by_light_that_scatters_forwards():
     law = profilefit.load("hazard", setting=Setting(n=1.4, g=0.8))
     own, by_law_density = samplers.asymptotic_bias(law.sampler, ALPHA, EDGE)
-    assert abs(own) < 1e-3  # .08 where its own albedo and the reduced one are mixed
+    assert abs(own) < 1e-3
     assert by_law_density == pytest.approx(own, abs=1e-5)  # one step of the inverse, not two
 
 

@@ -18,6 +18,7 @@ NO_NUMBERS = (np.nan, None, True, False, np.complex128(0.5), np.complex128(1.4))
 
 def test_derived_numbers_of_a_layer():
     assert (TISSUE.mu_t, TISSUE.alpha, TISSUE.mfp) == (100, pytest.approx(9.9 / 10.9), pytest.approx(1 / 10.9))
+    assert {Layer(1.4, 0.0, mu_s, g).alpha for mu_s in (49.0, 1.9, 3.8) for g in (0.0, 0.9)} == {1.0}
     similar = TISSUE.similar
     assert (similar.g, similar.mu_a, similar.thickness, similar.mu_s) == (0, 1, 0.1, pytest.approx(9.9))
     glass = Layer(n=1.5, mu_a=0, mu_s=0, g=1, thickness=0.1)

@@ -130,7 +130,7 @@ def test_residuals_of_a_profile_are_those_of_its_rings(source):
 
 @pytest.mark.parametrize("name", ["albedo-rational-forward", "albedo-rational-diffuse-forward"])
 def test_residuals_of_a_map_with_g_are_of_reduced_albedos(source, name):
-    """Its error is 2.9e-3 at worst; taken for the medium's own, albedos that are reduced leave .35."""
+    """Its error is 2.9e-3 at worst."""
     [ax] = residual_figure(name, source).axes
     left = np.asarray(ax.lines[0].get_ydata(), float)
     assert left.size > 20
