@@ -203,8 +203,7 @@ def apart(first: Floats, other: Floats) -> Floats:
 
 def matern(distance: Floats) -> Floats:
     """Return the correlation at distances in units of the length."""
-    scaled = np.sqrt(3.0) * distance
-    return (1.0 + scaled) * np.exp(-scaled)
+    return _bent(distance)[0]
 
 
 def _bent(distance: Floats) -> tuple[Floats, Floats]:

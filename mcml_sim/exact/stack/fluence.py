@@ -173,10 +173,8 @@ def _by_panel(here: Depths, mirror: tuple[float, float] | None = None) -> Callab
         near = np.abs(gap)[:, :, None] + length[source, None, None] * end.height
         pieces.append([np.abs(at[row] - image[column]), near, length[itself, None, None] * upwards])
     optical, height = (np.concatenate([piece.ravel() for piece in each]) for each in pieces)
-    starts, (_, of_near, of_own) = (
-        np.cumsum([piece.size for piece in pieces[0]])[:2],
-        (each.shape for each in pieces[0]),
-    )
+    starts = np.cumsum([piece.size for piece in pieces[0]])[:2]
+    _, of_near, of_own = (piece.shape for piece in pieces[0])
     weight = (here.alpha * np.diff(tau_ends, axis=0)[0])[:, None, None]
     near_weight, own_weight = end.weight * weight[source], inside.weight * weight[itself]
 
