@@ -16,7 +16,7 @@ ARGS ?=
 # Records that `make fits` makes: never the shipped ones, which tests and pages read.
 MADE := build/fits
 # Pages with tables of what was fitted, between marks.
-TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/guide/layered.md docs/guide/phases.md docs/howto/shader.md
+TABLES := README.md docs/explanation/models.md docs/validation/paper.md docs/explanation/layers.md docs/explanation/phases.md docs/howto/engine.md
 
 .DEFAULT_GOAL := help
 .PHONY: help fits records evidence claims docs test test-all benchmark programs lint format wheel clean
@@ -43,7 +43,7 @@ evidence: $(VENV)/.installed programs  ## measure what reports show beside the f
 claims: $(VENV)/.installed-test programs  ## measure what README and guides promise, on an idle machine: two hours; ARGS=--quick: less, noisier
 	@$(PIP) install --editable '.[benchmark]'
 	$(PY) -m benchmarks.claims $(ARGS)
-	$(VENV)/bin/profilefit report --fits fits --markdown docs/guide/claims.md
+	$(VENV)/bin/profilefit report --fits fits --markdown docs/validation/claims.md
 
 test: $(VENV)/.installed-test programs  ## what CI runs: lint, and all tests but the slow ones
 	@$(call BESIDE_LINT,$(PYTEST) -m "not slow" $(ARGS))

@@ -111,7 +111,7 @@ def index_text(pages: Sequence[Page], folder: Folder) -> str:
         "are those at the worst held-out albedo, as the records state them: `rel` the mean relative error "
         "of R_d, `ks` the largest error of the cumulated energy, `xi` that of the inversion, `A` that of the "
         "reflectance. The pages are made of the records when the documentation is built; "
-        "[The laws](../guide/laws.md) measures also those that have no record."
+        "[Which model](../explanation/models.md) measures also those that have no record."
     )
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.name for page in pages) + "\n```"
     return "\n\n".join(["# All laws", caption, markdown_table(header, rows), tree]) + "\n"

@@ -29,14 +29,14 @@ law_pages = importlib.import_module("law_pages")
 # Where each table stands; `make records` fills these files.
 PLACES = {
     "short": README,
-    **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/guide/laws.md"),
-    **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/guide/paper.md"),
-    "check": ROOT / "docs/howto/shader.md",
-    "claims": ROOT / "docs/guide/claims.md",
+    **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/explanation/models.md"),
+    **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/validation/paper.md"),
+    "check": ROOT / "docs/howto/engine.md",
+    "claims": ROOT / "docs/validation/claims.md",
 }
 MEASURED = ("laws", "check", "claims")
 CLAIM = re.compile(r'\[([^\]]+)\]\([\w./-]*claims\.md "([\w-]+)"\)')
-WRITTEN = [README, *(path for part in ("start", "guide", "howto", "theory") for path in ROOT.glob(f"docs/{part}/*.md"))]
+WRITTEN = [README, *sorted(path for path in ROOT.glob("docs/**/*.md") if not {"laws", "_build"} & {*path.parts})]
 
 
 def text_of(path: Path) -> str:

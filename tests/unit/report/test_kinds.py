@@ -183,7 +183,7 @@ def test_the_figure_is_whole(tmp_path):
 
 
 def test_the_guide_has_the_numbers_of_the_records():
-    """`profilefit report --markdown docs/guide/layered.md` fills its table; the prose below says what it shows."""
+    """`profilefit report --markdown docs/explanation/layers.md` fills its table; the prose below says what it shows."""
     sections = TABLES["gaussians"].sections(record.available(fits_folder() / SUMS), fits_folder())
     text = GUIDE.read_text(encoding="utf-8")
     assert f"<!-- stack-gaussians -->\n{sections['stack-gaussians']()}\n<!-- /stack-gaussians -->" in text
