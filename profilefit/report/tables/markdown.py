@@ -23,11 +23,11 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
-NAMES |= {"verdict", "law", "light", "sampler", "measure", "claim", "noise"}
+NAMES |= {"verdict", "law", "profile model", "light", "sampler", "measure", "claim", "noise"}
 NAMES |= {"held against", "command", "stack", "channel"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
-# What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
-SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
+# Profile models of the README: the one in use, the best sum of Gaussians, and those of the lowest error.
+SHORT = {("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
 SHORT |= {("hazard-refracting", "regenerated")}
 
 
@@ -143,12 +143,18 @@ def _quality(sets: Sequence[tuple[str, str, Content]], measures: Sequence[str], 
 
 
 def _short(contents: Mapping[str, Content]) -> str:
-    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
+    """Return the errors of a few profile models for a pencil beam, the worst first."""
     searchlight = {name: c for name, c in contents.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    named = [(owner + records.at_index(contents.get(owner, {})), which, values) for owner, which, values in chosen]
-    return _quality(named, ("rel", "ks"), "law")
+    rows = [
+        (owner + records.at_index(contents.get(owner, {})), which)
+        + tuple(f"{100 * end:.2g} %" for key in ("rel", "ks") for end in (np.mean(values[key]), max(values[key])))
+        for owner, which, values in chosen
+    ]
+    return markdown_table(
+        ("profile model", "constants", "R_d, mean", "R_d, worst", "energy, mean", "energy, worst"), rows
+    )
 
 
 def _measured(contents: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
