@@ -147,11 +147,10 @@ def _short(contents: Mapping[str, Content]) -> str:
     searchlight = {name: c for name, c in contents.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    rows = [
-        (owner + records.at_index(contents.get(owner, {})), which)
-        + tuple(f"{100 * end:.2g} %" for key in ("rel", "ks") for end in (np.mean(values[key]), max(values[key])))
-        for owner, which, values in chosen
-    ]
+    rows = []
+    for owner, which, values in chosen:
+        ends = (end for key in ("rel", "ks") for end in (np.mean(values[key]), max(values[key])))
+        rows.append([owner + records.at_index(contents.get(owner, {})), which, *(f"{100 * end:.2g} %" for end in ends)])
     return markdown_table(
         ("profile model", "constants", "R_d, mean", "R_d, worst", "energy, mean", "energy, worst"), rows
     )
