@@ -44,7 +44,7 @@ STANDS_FOR = {
     **dict(zip("▁▂▃▄▅▆▇█", "_.,-~=*#", strict=True)),
     **dict(zip("─│╭╮╰╯━┃", "-|++++-|", strict=True)),
     **dict(zip("αβγδκλμξπρστχω", "abgdklmxprstco", strict=True)),
-    **dict(zip("±×−–—→…·²³√∂∞≤≥≈µ’", "+x--->..23Vdi<>~u'", strict=True)),
+    **dict(zip("±×−–—→…·²³√∂∞≤≥≈µ’é", "+x--->..23Vdi<>~u'e", strict=True)),
 }
 UNKNOWN = "?"
 STOPPING = "mcml-sim: stopping after the batches in flight; Ctrl-C again stops at once\n"

@@ -19,15 +19,16 @@ from profilefit.recipes import kinds
 from profilefit.recipes.folder import EVIDENCE, fits_folder, known_folder
 
 Fits = Annotated[
-    Path | None, typer.Option(help="Folder of the records: ./fits if it has any, which is said, else the ones shipped.")
+    Path | None,
+    typer.Option(help="Folder of the records.", show_default="./fits if it has records, else the shipped folder"),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print all of it as JSON instead.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes: the result only.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the result only, without progress and notes.")]
 
 EXACT = "exact"  # light that is solved, in place of a law
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
-LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
+LIGHTS_HELP = "searchlight (a pencil beam) or diffuse"
 PARTS = ("truth", "laws", "samplers", "fits", "sea", "fur")
 FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
