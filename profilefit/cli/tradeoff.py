@@ -54,7 +54,7 @@ def tradeoff(
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": measurement_origin(typed(), folder)}
     if file.exists() and not is_comparable(read(file), origin):
-        said.print(f"{file} belongs to other records, another version or machine: it is replaced", markup=False)
+        said.print(f"{file} of other records, version or machine is replaced", markup=False)
 
     def track(turns: range, title: str) -> Iterable[int]:
         return tracked(turns, title, "turns", quiet=quiet)

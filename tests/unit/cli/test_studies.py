@@ -99,10 +99,7 @@ def test_a_part_is_written_beside_those_of_the_same_records(command, tmp_path):
     assert list(read(file)) == ["made", "machine", "laws", "samplers"]
     assert read(file)["laws"] == laws
     status, out, err = command("tradeoff", "laws", *words, "--fits", str(fits_folder()))
-    assert (
-        err.splitlines()[0]
-        == "charts/tradeoff.json belongs to other records, another version or machine: it is replaced"
-    )
+    assert err.splitlines()[0] == "charts/tradeoff.json of other records, version or machine is replaced"
     assert file.read_text(encoding="utf-8") == out
 
 
