@@ -21,7 +21,7 @@ def scene(
         str,
         typer.Argument(
             metavar="FILE.toml",
-            help=f"File of a scene; with --example its name: {', '.join(SCENES)}.",
+            help=f"File of a scene, or its name with --example: {', '.join(SCENES)}.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for pictures (PNG) and numbers (JSON).")] = OUT,
