@@ -12,7 +12,16 @@ author = "the profilefit authors"
 release = version = version_of("profilefit")
 copyright = f"{author}, MIT licence"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "mathml", "docstrings", "law_pages", "file_keys", "commands"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "mathml",
+    "docstrings",
+    "law_pages",
+    "file_keys",
+    "commands",
+]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "examples", "ext"]
 root_doc = "index"

@@ -1,4 +1,4 @@
-"""Command mcml-sim: its first screen, its subcommand, what that prints of a run, and errors in words of the shell."""
+"""Program mcml-sim: first screen, subcommand `run`, its report, and errors in terms of the command line."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def run(
     from mcml_sim.results.tally import Precision
     from mcml_sim.runs import input_runs
 
-    del resume  # changes nothing: a command resumes by itself
+    del resume  # no effect: every command resumes
     runs = read_mci(file)
     number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     if quantity is not None and precision is None:
@@ -146,7 +146,7 @@ def run(
 
 
 def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
-    """Return a whole number as people write them, 1e6 included."""
+    """Return a whole number from a text such as 1000 or 1e6; InputError otherwise."""
     from mcml_sim.media.arrays import checked_whole
 
     number: object = text
@@ -182,7 +182,7 @@ def with_error(estimate: Estimate) -> str:
 
 
 def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
-    """Return whether the precision was reached, and if not, what would reach it."""
+    """Return a line that states whether the precision was reached, or how many photons would reach it."""
     import numpy as np
 
     if goal.is_reached(estimate):
@@ -202,7 +202,7 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
 
 
 def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
-    """Yield the report of a run that is done."""
+    """Yield the report of a finished run, line by line."""
     kept = done.results
     yield f"{kept.photons} photons, seed {job.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)
@@ -213,7 +213,7 @@ def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
 
 
 def pace(done: Done, on_workers: bool) -> str:
-    """Return the seconds of a run, those of compiling apart, and the photons per second of the others."""
+    """Return the seconds of tracing and of compiling, and the photons traced per second."""
     if done.seconds is None:
         return "finished before"
     traced, times = max(done.seconds - done.compiling, 0.0), f"{done.seconds:.1f} s"
@@ -228,7 +228,7 @@ def pace(done: Done, on_workers: bool) -> str:
 
 
 def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
-    """Return a run that is done for JSON: files, and each share of the light with its standard error."""
+    """Return a finished run for JSON: files, and each share of the light with its standard error."""
     shares = {name: kept.estimates[name] for name in (*TOTALS, "energy")}
     summary = {
         "mco": job.mco,
@@ -253,14 +253,14 @@ add(app, run)
 
 
 def _remedied(text: str) -> str:
-    """Return the text of a library error, with remedies of the command line."""
+    """Return the message of a library error with remedies for the command line."""
     for theirs, ours in REMEDIES.items():
         text = text.replace(theirs, ours)
     return text
 
 
 def _hint() -> str:
-    """Return advice for a command that was not understood."""
+    """Return advice for a command line that cannot be parsed."""
     first = next(iter(sys.argv[1:]), "")
     return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else ACCEPTED
 

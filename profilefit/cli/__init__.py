@@ -1,4 +1,4 @@
-"""profilefit on the command line: one file a subcommand, with its options and with what it does."""
+"""Program profilefit: one file per subcommand, with its options and work."""
 
 from __future__ import annotations
 

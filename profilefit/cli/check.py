@@ -1,4 +1,4 @@
-"""profilefit check: run the shader sources of laws on this machine's OpenGL, and judge them by their own bounds."""
+"""profilefit check: run shader sources on this machine's OpenGL, and compare their errors with their bounds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BROKEN = 1  # exit status
 
 
 class FloatFormat(enum.StrEnum):
-    """Arithmetic to measure besides float32, in which every bound is judged."""
+    """Arithmetic to measure; bounds are always checked in float32."""
 
     SINGLE = "float32"
     HALF = "float16"
@@ -24,6 +24,7 @@ def check(
     names: Annotated[
         list[str] | None,
         typer.Argument(
+            metavar="NAME",
             help="Names of profile models, albedo inversions or records.",
             show_default="all with regenerated constants",
             autocompletion=options.subjects,

@@ -57,7 +57,7 @@ def choose(
     if kind not in OTHERS:
         body, printed, served = _technique(scene, content, measure, quiet)
     elif measure:
-        raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
+        raise InputError(f"{scene}: --measure must be left out with a {kind}'s file, which has no cost ratios")
     else:
         body, printed, served = OTHERS[kind](import_module(SCENES[kind][0]).read(str(scene), content), quiet)
     answer(body, (), printed, as_json)
@@ -116,4 +116,4 @@ def _fur(request: Any, quiet: bool) -> SceneNeed:
     return fur_content(need), fur_lines(need), need.way is not None
 
 
-OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes of which another question is answered
+OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes with other results

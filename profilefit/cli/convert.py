@@ -118,7 +118,7 @@ def convert(
 
 
 def _shares(option: str, text: str) -> Floats:
-    """Return numbers between commas, none of them a percent."""
+    """Return numbers between commas; InputError on a percentage."""
     for word in text.split(","):
         if hint := percent(word):
             raise refused(option, "numbers in [0, 1], between commas", word.strip(), hint)
@@ -126,7 +126,7 @@ def _shares(option: str, text: str) -> Floats:
 
 
 def _numbers(option: str, text: str, units: tuple[str, ...] = ()) -> tuple[Floats, str]:
-    """Numbers between commas, and the one unit of them all; units are `units`, or none."""
+    """Return numbers between commas, and their common unit, one of `units` or none."""
     import numpy as np
 
     numbers, found = [], set()

@@ -1,4 +1,4 @@
-"""profilefit examples: files to try the commands on."""
+"""profilefit examples: copies of the files that examples of commands read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""profilefit export: a law as source for a shader or a program, or as JSON."""
+"""profilefit export: a profile model as source for a shader or a program, or as JSON."""
 
 from __future__ import annotations
 

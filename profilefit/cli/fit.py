@@ -1,4 +1,4 @@
-"""profilefit fit: one's own data, and the medium that explains them."""
+"""profilefit fit: measured data, and the medium that fits them."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ def _fit_layers(
 
 
 def _medium(file: Path, unit: str) -> Medium:
-    """Return the stack of a file, in the data's unit of length."""
+    """Return the stack of a file, converted to the data's unit of length."""
     from dataclasses import replace
 
     from mcml_sim.files.whole_file import read_toml
@@ -265,7 +265,7 @@ def _medium(file: Path, unit: str) -> Medium:
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:
-    """Return what `--fix` holds: alpha or A, and l."""
+    """Return the values that `--fix` sets: alpha or A, and l."""
     from profilefit.measured.data import length
 
     held: dict[str, float] = {}

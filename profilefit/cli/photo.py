@@ -19,10 +19,10 @@ SEVERAL = ("--card", "--grey", "--dark")
 
 
 class SeveralFiles(TyperCommand):
-    """A command some of whose options take every file that follows, as a shell writes out card-*.dng."""
+    """Command with options that take several files, as a shell expands card-*.dng."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse with the option before each of its files."""
+        """Parse arguments with the option repeated before each of its files."""
         written: list[str] = []
         option: str | None = None
         for at, one in enumerate(args):
@@ -41,7 +41,8 @@ class SeveralFiles(TyperCommand):
 def photo(
     context: typer.Context,
     shots: Annotated[
-        list[Path] | None, typer.Argument(help="Exposures of a bracket: raw files, linear 16-bit TIFF or EXR.")
+        list[Path] | None,
+        typer.Argument(metavar="SHOT", help="Exposures of a bracket: raw files, linear 16-bit TIFF or EXR."),
     ] = None,
     card: Annotated[list[Path] | None, typer.Option(help="Exposures of the beam on a white opaque card.")] = None,
     grey: Annotated[
@@ -151,7 +152,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
 
 
 def _known(option: str, text: str, lengths: bool = False) -> Known:
-    """Return a value and its error, 0.18+-0.005; of lengths, in mm, where fwhm: may stand before."""
+    """Return a value and its error from 0.18+-0.005, or from a length [mm] with optional fwhm: before it."""
     from profilefit.cli.fit import WITH_ERROR
     from profilefit.measured import Known
     from profilefit.measured.data import BY_FWHM, FWHM, length

@@ -21,7 +21,7 @@ PRESETS = "Number of photons per setting, 2.1e7 (quick, minutes) or 4.2e8 (full)
 
 
 class Preset(StrEnum):
-    """Number of photons: quick is enough for four digits of most constants, full for five."""
+    """Preset number of photons; quick gives four digits of most constants, full five."""
 
     QUICK = "quick"
     FULL = "full"
@@ -32,6 +32,7 @@ def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
+            metavar="RECIPE",
             help="Names of recipes, stacks or phase functions, or their files (.toml, .csv).",
             show_default="all shipped recipes",
             autocompletion=options.recipes,

@@ -26,6 +26,7 @@ def report(
     names: Annotated[
         list[str] | None,
         typer.Argument(
+            metavar="NAME",
             help="Names of records or stacks.",
             show_default="a summary of all",
             autocompletion=options.records,
@@ -138,7 +139,7 @@ def report(
 
 
 def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[str]) -> None:
-    """Name the folder of records that are of another one; InputError on an option that says nothing of a kind."""
+    """Warn of records from another folder; InputError on an option that has no effect on a kind."""
     seen: set[str] = set()
     for kind, name, path in chosen:
         if option := next((option for option in given if option in kind.apart), None):

@@ -16,6 +16,7 @@ def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
+            metavar="NAME",
             help="Names of models, inversions or records, or exact, convert, solver, stacks, heart, sea, fur.",
             show_default="all but heart, sea and fur",
             autocompletion=options.tested,

@@ -197,7 +197,7 @@ def test_a_mistake_is_one_line(refused):
 @pytest.mark.parametrize("kind", ["heart", "sea", "fur"])
 def test_only_skin_has_a_cost_to_measure(refused, kind):
     file = EXAMPLES[f"{kind}.toml"]
-    said = f"profilefit: {file}: --measure must be left out of a {kind}'s file, of which no cost is asked\n"
+    said = f"profilefit: {file}: --measure must be left out with a {kind}'s file, which has no cost ratios\n"
     assert refused(f"choose {kind}.toml --measure", "--measure") == said
 
 
