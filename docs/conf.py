@@ -12,10 +12,20 @@ author = "the profilefit authors"
 release = version = version_of("profilefit")
 copyright = f"{author}, MIT licence"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "docstrings", "law_pages", "file_keys"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "mathml",
+    "docstrings",
+    "law_pages",
+    "file_keys",
+    "commands",
+]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "examples", "ext"]
 root_doc = "index"
+smartquotes = False  # which draw -- and ' of mu_s' as other letters
 highlight_language = "none"  # commands and tables; what is code says which
 
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
@@ -33,6 +43,7 @@ html_show_sourcelink = False
 math_numfig = False
 
 default_role = "code"
+autosummary_generate = False  # tables only
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True

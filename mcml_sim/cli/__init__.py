@@ -1,1 +1,1 @@
-"""The mcml-sim command, and what both commands have in common."""
+"""The mcml-sim command, and parts that both programs share."""

@@ -1,4 +1,4 @@
-"""Command mcml-sim: its first screen, its subcommand, what that prints of a run, and errors in words of the shell."""
+"""Program mcml-sim: first screen, subcommand `run`, its report, and errors in terms of the command line."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ __all__ = ["app", "main"]
 # The library's remedies for errors, in the command line's words.
 REMEDIES = {ELSEWHERE: "use --out elsewhere", NAMED: "--out FOLDER", RESUMES: "the same command resumes"}
 HELP = """\
-Trace light through layered media as MCML does, with error bars.
+Trace photons through layered media as MCML does, with standard errors.
 
-  mcml-sim run FILE.mci --out runs        every run of an MCML input file
-  mcml-sim run FILE.mci --precision 1e-3  until reflectance is known to 0.1 %
+  mcml-sim run FILE.mci --out runs        simulate an MCML input file
+  mcml-sim run FILE.mci --precision 1e-3  stop at an error of 0.1 %
 
 Writes NAME.mco, as MCML does, and NAME.npz with the standard error of each bin.
 After Ctrl-C the same command resumes."""
@@ -42,9 +42,8 @@ QUANTITIES = (
     *("reflectance_a", "reflectance_ra", "transmittance_a", "transmittance_ra"),
 )
 PRECISION = (
-    "Stop a run early at this relative standard error, for example 1e-3. It is looked at after 8, 16, 32, ... batches, "
-    f"first at {FIRST_LOOKS[0]} photons ({FIRST_LOOKS[1]} in a matched isotropic half space), and no run goes beyond "
-    "the photons requested."
+    "Relative standard error at which a run stops early, for example 1e-3. It is tested after 8, 16, 32, ... batches, "
+    f"first at {FIRST_LOOKS[0]} photons ({FIRST_LOOKS[1]} in a semi-infinite medium with n = 1 and g = 0)."
 )
 REPEATS = (
     "More photons or more repeats? Errors fall as 1/sqrt(photons) either way: k runs of N photons with k seeds are "
@@ -67,47 +66,46 @@ SHORT = 0.05  # compiling that is not worth a word [s]
 def run(
     file: Annotated[Path, typer.Argument(help="Input file of MCML 1 or 2 (.mci).")],
     photons: Annotated[
-        str | None, typer.Option(metavar="NUMBER", help="Photons of each run, such as 1e7.", show_default="the file's")
+        str | None,
+        typer.Option(metavar="NUMBER", help="Number of photons per run, for example 1e7.", show_default="the file's"),
     ] = None,
     seed: Annotated[
         str | None,
-        typer.Option(metavar="NUMBER", help="Seed of the photons, >= 0.", show_default="the file's, of MCML 2, else 0"),
+        typer.Option(
+            metavar="NUMBER", help="Seed of the random numbers, >= 0.", show_default="the file's in MCML 2, else 0"
+        ),
     ] = None,
     precision: Annotated[float | None, typer.Option(help=PRECISION)] = None,
     quantity: Annotated[
         str | None,
         typer.Option(
-            help=f"What --precision looks at: {', '.join(QUANTITIES)}.",
+            help=f"Quantity whose error --precision limits: {', '.join(QUANTITIES)}.",
             show_default=QUANTITY,
             autocompletion=lambda incomplete: [name for name in QUANTITIES if name.startswith(incomplete)],
         ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Changes nothing: a command resumes without.")] = False,
-    workers: Annotated[int | None, typer.Option(help="Threads.", show_default="one a core")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="No effect, since every command resumes.")] = False,
+    workers: Annotated[int | None, typer.Option(help="Number of threads.", show_default="one per core")] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler whose workers trace, like tcp://host:8786.")
+        str | None, typer.Option(help="Address of a Dask scheduler, for example tcp://host:8786.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for what is written.", show_default="the current folder, as MCML")
+        Path | None, typer.Option(help="Folder for the output files.", show_default="the current folder")
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print the totals of every run, with standard errors, as JSON instead.")
+        bool, typer.Option("--json", help="Print the totals of every run, with standard errors, as JSON.")
     ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors, and what --json does.")
-    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, and the output of --json.")] = False,
 ) -> None:
-    """Do every run of an MCML input file.
+    """Simulate every run of an MCML input file.
 
-    Each writes NAME.mco, as MCML does, and NAME.npz, with the standard error of every bin. While it runs, NAME.photons
-    keeps the finished batches: the same command goes on where it was interrupted, and leaves a run that is finished as
-    it is. Results of another run are replaced, other files are not. An absolute NAME, or one with .., needs --out, and
-    its last part is written there.
+    Writes NAME.mco, as MCML does, and NAME.npz with the standard error of every bin. The folder NAME.photons keeps
+    finished batches, so that the same command resumes after an interruption. Results of another run with this NAME are
+    replaced. A NAME that is an absolute path, or contains .., needs --out, which takes its last part.
 
     \b
-    Examples, on a file of profilefit examples:
+    Example, on a file of profilefit examples:
       mcml-sim run examples/slab.mci --photons 1e5 --out runs
-      mcml-sim run examples/slab.mci --photons 1e8 --precision 1e-3 --out runs
     """
     from rich.console import Console
 
@@ -117,11 +115,11 @@ def run(
     from mcml_sim.results.tally import Precision
     from mcml_sim.runs import input_runs
 
-    del resume  # changes nothing: a command resumes by itself
+    del resume  # no effect: every command resumes
     runs = read_mci(file)
     number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     if quantity is not None and precision is None:
-        raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
+        raise InputError(f"quantity must be left out without --precision, got {quantity!r}")
     options = input_runs.RunOptions(
         seed=None if seed is None else _whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
@@ -148,7 +146,7 @@ def run(
 
 
 def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
-    """Return a whole number as people write them, 1e6 included."""
+    """Return a whole number from a text such as 1000 or 1e6; InputError otherwise."""
     from mcml_sim.media.arrays import checked_whole
 
     number: object = text
@@ -184,7 +182,7 @@ def with_error(estimate: Estimate) -> str:
 
 
 def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
-    """Return whether the precision was reached, and if not, what would reach it."""
+    """Return a line that states whether the precision was reached, or how many photons would reach it."""
     import numpy as np
 
     if goal.is_reached(estimate):
@@ -204,7 +202,7 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
 
 
 def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
-    """Yield the report of a run that is done."""
+    """Yield the report of a finished run, line by line."""
     kept = done.results
     yield f"{kept.photons} photons, seed {job.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)
@@ -215,7 +213,7 @@ def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
 
 
 def pace(done: Done, on_workers: bool) -> str:
-    """Return the seconds of a run, those of compiling apart, and the photons per second of the others."""
+    """Return the seconds of tracing and of compiling, and the photons traced per second."""
     if done.seconds is None:
         return "finished before"
     traced, times = max(done.seconds - done.compiling, 0.0), f"{done.seconds:.1f} s"
@@ -230,7 +228,7 @@ def pace(done: Done, on_workers: bool) -> str:
 
 
 def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
-    """Return a run that is done for JSON: files, and each share of the light with its standard error."""
+    """Return a finished run for JSON: files, and each share of the light with its standard error."""
     shares = {name: kept.estimates[name] for name in (*TOTALS, "energy")}
     summary = {
         "mco": job.mco,
@@ -255,14 +253,14 @@ add(app, run)
 
 
 def _remedied(text: str) -> str:
-    """Return the text of a library error, with remedies of the command line."""
+    """Return the message of a library error with remedies for the command line."""
     for theirs, ours in REMEDIES.items():
         text = text.replace(theirs, ours)
     return text
 
 
 def _hint() -> str:
-    """Return advice for a command that was not understood."""
+    """Return advice for a command line that cannot be parsed."""
     first = next(iter(sys.argv[1:]), "")
     return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else ACCEPTED
 

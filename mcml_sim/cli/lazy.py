@@ -1,6 +1,6 @@
 """Imports on first use: names of a package (PEP 562), and a command.
 
-JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
+JAX and SciPy take seconds to import. A command that shows its help or completes a word does not need them.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 def attributes(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return the `__getattr__` and the `__dir__` of a package: `homes` names the module of each name.
 
-    A module itself has the room it is in, with a dot: "media." makes `phase` of `media.phase`, "" stays in the root.
-    An interactive shell completes names that were not used yet, too.
+    The home of a module is its folder with a dot: "media." gives `media.phase`, and "" gives a module of the root.
+    An interactive shell also completes names before their first use.
     """
 
     def of_package(name: str) -> Any:
@@ -37,9 +37,9 @@ def attributes(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], 
 
 
 def command(module: str) -> None:
-    """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last.
+    """Run `main` of `module`, and answer Ctrl-C by one line and its exit status, from the first import on.
 
-    Among imports it ends the process at once: an exception that falls into them may be dropped, or turned into another.
+    During imports Ctrl-C ends the process at once, because an exception there may be dropped or replaced.
     """
 
     def interrupt(_: int, frame: FrameType | None) -> None:

@@ -1,7 +1,7 @@
-"""Frame of any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status.
+"""Frame of every subcommand: errors in one line, exit statuses, and the first screen.
 
-The first screen says what a command is for, how it is used, its subcommands by group, all in 24 lines of 80.
-Around it are shell and user: streams that are closed, letters that a terminal lacks, Ctrl-C.
+The first screen lists purpose, usage and subcommands by group, in 24 lines of 80 columns.
+The frame also handles closed streams, letters that a terminal lacks, and Ctrl-C.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ STANDS_FOR = {
     **dict(zip("▁▂▃▄▅▆▇█", "_.,-~=*#", strict=True)),
     **dict(zip("─│╭╮╰╯━┃", "-|++++-|", strict=True)),
     **dict(zip("αβγδκλμξπρστχω", "abgdklmxprstco", strict=True)),
-    **dict(zip("±×−–—→…·²³√∂∞≤≥≈µ’", "+x--->..23Vdi<>~u'", strict=True)),
+    **dict(zip("±×−–—→…·²³√∂∞≤≥≈µ’é", "+x--->..23Vdi<>~u'e", strict=True)),
 }
 UNKNOWN = "?"
 STOPPING = "mcml-sim: stopping after the batches in flight; Ctrl-C again stops at once\n"
@@ -52,7 +52,7 @@ SHOW_CURSOR = "\x1b[?25h"  # which a progress bar hides
 
 
 class FirstScreen(TyperGroup):
-    """First screen in place of typer's --help, whose boxes per group take more than a screen for nine subcommands."""
+    """First screen in place of typer's --help, whose boxes per group need more than one screen."""
 
     def format_help(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
         """Print the screen to stdout, in colour on a terminal."""
@@ -103,10 +103,10 @@ def add_version(app: typer.Typer, package: str) -> None:
 
 
 def one_line(text: str) -> str:
-    """Return a text as one line that a terminal only prints.
+    """Return a text as one line without control characters.
 
     Names of files and words in them may hold line breaks, escape sequences or marks that turn the direction of
-    writing: everything that is not to be seen is spelled as Python spells it. Of a long text the middle is left out.
+    writing. Characters that are not printable are escaped as in Python. The middle of a long text is left out.
     """
     if len(text) > LONGEST:
         text = f"{text[: LONGEST - KEPT_END]} ... {text[-KEPT_END:]}"
@@ -117,8 +117,8 @@ def one_line(text: str) -> str:
 class Program:
     """Command with its subcommands.
 
-    mendable  the errors that are the user's to mend; remedied what they say, in words of the command line
-    stopped   what to do after Ctrl-C; hint after a command that was not understood
+    mendable  errors that the user can fix; remedied turns their messages into terms of the command line
+    stopped   message after Ctrl-C; hint after a command line that cannot be parsed
     """
 
     name: str
@@ -129,7 +129,7 @@ class Program:
     remedied: Callable[[str], str] = str
 
     def main(self) -> None:
-        """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
+        """Run a subcommand; an error that the user can fix is one line on stderr and exit status 2."""
         mend_streams()
         caught: list[Warning | str] = []
         with warnings.catch_warnings():
@@ -146,12 +146,12 @@ class Program:
         sys.exit(status)
 
     def say(self, text: object) -> None:
-        """Print one line on stderr, whatever the text holds."""
+        """Print a text as one line on stderr."""
         console = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
         console.print(f"{self.name}: {one_line(str(text))}", markup=False)
 
     def _status(self) -> int:
-        """Run the subcommand, and print what went wrong; return the exit status."""
+        """Run the subcommand, print its error if any, and return the exit status."""
         try:
             # Standalone, typer would end the process itself on Ctrl-C, and print usage errors in a box of many lines.
             status = int(self.app(prog_name=self.name, standalone_mode=False) or 0)
@@ -173,7 +173,7 @@ class Program:
             self.say(f"cannot print: {error.strerror or error}")
             _let_go_of_stdout()
         except RuntimeWarning:
-            self.say("no answer: a number on the way is beyond double precision; check units and sizes")
+            self.say("no result: an intermediate number overflows double precision; check units and sizes")
         except Exception as error:
             if sys.flags.dev_mode:
                 raise
@@ -188,12 +188,12 @@ class Program:
 
 
 def _let_go_of_stdout() -> None:
-    """Have Python not flush once more as it ends."""
+    """Redirect stdout to the null device, so that Python does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _spelled(error: UnicodeError) -> tuple[str, int]:
-    """Return the characters that could not be encoded, each as another, and where to go on."""
+    """Return replacements for characters that cannot be encoded, and the position behind them."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lost = error.object[error.start : error.end]
@@ -204,7 +204,7 @@ codecs.register_error(ENCODED, _spelled)
 
 
 def mend_streams() -> None:
-    """Have a stdout and a stderr to print to where the shell has closed them; what they cannot encode is spelled."""
+    """Open stdout and stderr where the shell has closed them, and replace characters that they cannot encode."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             # For as long as the process lives, so nobody closes it.
@@ -215,9 +215,9 @@ def mend_streams() -> None:
 
 @contextlib.contextmanager
 def two_interrupts() -> Iterator[None]:
-    """Let the first Ctrl-C print what it waits for and raise KeyboardInterrupt, and the second end the process.
+    """Let the first Ctrl-C print a line and raise KeyboardInterrupt, and the second end the process.
 
-    Compiling cannot be interrupted and takes seconds, and batches may take long: someone who insists need not wait.
+    Compiling takes seconds and cannot be interrupted, and batches may take long. A second Ctrl-C does not wait.
     """
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):  # ignored, or not Python's
@@ -247,14 +247,14 @@ def two_interrupts() -> Iterator[None]:
 
 
 def _tell(text: str) -> None:
-    """Write to stderr past its buffer, which the code that was interrupted may be about to change."""
+    """Write to stderr without its buffer, which the interrupted code may be changing."""
     with contextlib.suppress(OSError, ValueError):  # closed or full: nobody is listening
         os.write(sys.stderr.fileno(), text.encode())
 
 
 @contextlib.contextmanager
 def without_logs() -> Iterator[None]:
-    """Keep libraries from logging what an exception will say in one line."""
+    """Suppress logs of libraries, whose exceptions are printed in one line."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

@@ -20,24 +20,24 @@ WIDTH = 100  # columns of what goes into a file or a pipe, which have no width o
 
 
 def screen(width: int = WIDTH) -> Console:
-    """Open stdout, as wide as the terminal, or as COLUMNS says, or `width` [characters]; rich heeds NO_COLOR."""
+    """Open stdout with the width of the terminal, of COLUMNS, or `width` [characters]; rich respects NO_COLOR."""
     return Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else width)
 
 
 def notes(quiet: bool) -> Console:
-    """Open stderr, for what is printed besides the result."""
+    """Open stderr for notes and progress."""
     return Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
 
 
 def show(parts: Iterable[RenderableType], console: Console) -> None:
-    """Print each with a blank line after it."""
+    """Print each part with a blank line after it."""
     for part in parts:
         put(part, console)
         console.print()
 
 
 def put(part: RenderableType, console: Console) -> None:
-    """Print a table at the width that its numbers need: a cut number reads as another one, a wrapped line does not."""
+    """Print a table at the width that its numbers need, because a truncated number would be misread."""
     usual = console.width
     console.width = max(usual, Measurement.get(console, console.options.update(max_width=WIDEST), part).minimum)
     console.print(part)
@@ -61,9 +61,9 @@ def answer(
     note: str = "",
     quiet: bool = False,
 ) -> None:
-    """Print what a command found, as JSON or as tables and the lines below them.
+    """Print the result of a command, as JSON or as tables with lines below them.
 
-    Before that the JSON is kept as `name` in the folder `out`, if there is one; `note` says so, unless `quiet`.
+    With a folder `out`, the JSON is first written there as `name`, and `note` is printed unless `quiet`.
     """
     if out is not None:
         write_whole(out / name, json_text(body))

@@ -1,4 +1,4 @@
-"""profilefit on the command line: one file a subcommand, with its options and with what it does."""
+"""Program profilefit: one file per subcommand, with its options and work."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ __all__ = ["app", "main"]
 
 # The first line is empty: typer takes the margin of all others off them.
 HELP = """
-Closed-form profiles of subsurface scattering, fitted with error bars.
+Closed-form subsurface-scattering profiles, refitted with uncertainties.
 
-  profilefit regenerate hazard --out mine  simulate, and fit anew: a minute
-  profilefit export hazard --lang hlsl     the most accurate law, as a shader
-  profilefit fit FILE.csv                  alpha and l of a measured profile"""
+  profilefit regenerate hazard --out mine  refit a profile model (a minute)
+  profilefit export hazard --lang hlsl     write it as shader source
+  profilefit fit FILE.csv                  fit mu_a and mu_s' to measured data"""
 PANELS = {
-    "Make laws": (regenerate, report),
-    "Use laws": (export, choose, convert, scene),
+    "Fit models": (regenerate, report),
+    "Use models": (export, choose, convert, scene),
     "Your own data": (fit, photo, examples, schema),
-    "What to trust": (check, stability, tradeoff),
+    "Validation": (check, stability, tradeoff),
 }
 
 app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_exceptions_enable=False)

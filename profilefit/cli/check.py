@@ -1,4 +1,4 @@
-"""profilefit check: run the shader sources of laws on this machine's OpenGL, and judge them by their own bounds."""
+"""profilefit check: run shader sources on this machine's OpenGL, and compare their errors with their bounds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BROKEN = 1  # exit status
 
 
 class FloatFormat(enum.StrEnum):
-    """Arithmetic to measure besides float32, in which every bound is judged."""
+    """Arithmetic to measure; bounds are always checked in float32."""
 
     SINGLE = "float32"
     HALF = "float16"
@@ -24,34 +24,37 @@ def check(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of laws, maps or records; all that were regenerated if none is.",
+            metavar="NAME",
+            help="Names of profile models, albedo inversions or records.",
+            show_default="all with regenerated constants",
             autocompletion=options.subjects,
         ),
     ] = None,
     constants: Annotated[
         str | None,
         typer.Option(
-            help="regenerated (the default, where there are any) or a printed set (published, diffuse).",
+            help="Set of constants: regenerated, published or diffuse.",
+            show_default="regenerated where there are any",
             autocompletion=options.constants,
         ),
     ] = None,
     precision: Annotated[
-        FloatFormat, typer.Option(help="float16 measures also what half precision costs, where it is offered.")
+        FloatFormat, typer.Option(help="Arithmetic; float16 is measured beside float32 where the driver offers it.")
     ] = FloatFormat.SINGLE,
-    out: Annotated[Path | None, typer.Option(help="Folder for check.json, what --json prints.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for check.json, the output of --json.")] = None,
     fits: options.Fits = None,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Judge shader source on this machine's GPU (a minute).
+    """Check shader source on this machine's GPU (a minute).
 
-    Every source is evaluated, ends of its range included, and compared with float64 and with the exact half space. Exit
-    status 1 if a bound is broken: float32 errors below a tenth of the model's own; no NaN, infinity or negative value.
+    Evaluates every source, ends of its range included, and compares it with float64 and with the exact solution. Exit
+    status 1 if a bound is broken. Errors of float32 must be below a tenth of the model's error, and no value may be
+    NaN, infinite or negative.
 
     \b
-    Examples:
+    Example:
       profilefit check hazard albedo-rational
-      profilefit check liang --constants published
     """
     from mcml_sim.cli.screen import answer, typed
     from profilefit.recipes.evidence import measurement_origin, require_apart

@@ -28,31 +28,25 @@ SceneNeed = tuple[dict[str, Any], "Sequence[RenderableType]", bool]
 def choose(
     scene: Annotated[
         Path,
-        typer.Argument(
-            metavar="SCENE.toml", help="What is drawn, and how well: any file of `profilefit scene`, such as skin.toml."
-        ),
+        typer.Argument(metavar="SCENE.toml", help="File of a scene, for example skin.toml."),
     ],
     measure: Annotated[
-        bool, typer.Option("--measure", help="Measure cost ratios on this machine's OpenGL, not those shipped.")
+        bool,
+        typer.Option("--measure", help="Measure cost ratios on this machine's OpenGL, in place of the shipped ones."),
     ] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Find the cheapest option within a scene's limits.
 
-    The limits are its error tolerance and its time budget. Options range from no scattering through filters to samples
-    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by exact light
-    or traced, in its worst colour, and whether light scattered once needs a pass. Half a minute. --json prints every
-    option and its constants. Exit status 1 if no option is within the limits.
-
-    Of a heart's file: whether it needs an atlas, or the screen by itself is enough.
-    Of a sea's: which terms of its water's light, which splat and how many steps to a hit it needs.
-    Of a ball of fur's: how many layers by the angle of the view, and drawn which way.
+    The limits are the scene's error tolerance and time budget. Options range from no scattering to sampled profile
+    models, each with its predicted error (half a minute). A stack's result states whether one layer is enough and
+    whether single scattering needs a pass. A heart's, sea's or ball of fur's result states which atlas, terms or layers
+    it needs. Exit status 1 if no option is within the limits.
 
     \b
-    Examples, on files of profilefit examples:
+    Example, on a file of profilefit examples:
       profilefit choose examples/skin.toml
-      profilefit choose examples/layers-head.toml
     """
     from mcml_sim.cli.screen import answer
     from mcml_sim.files.whole_file import read_toml
@@ -63,7 +57,7 @@ def choose(
     if kind not in OTHERS:
         body, printed, served = _technique(scene, content, measure, quiet)
     elif measure:
-        raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
+        raise InputError(f"{scene}: --measure must be left out with a {kind}'s file, which has no cost ratios")
     else:
         body, printed, served = OTHERS[kind](import_module(SCENES[kind][0]).read(str(scene), content), quiet)
     answer(body, (), printed, as_json)
@@ -98,7 +92,7 @@ def _heart(request: Any, quiet: bool) -> SceneNeed:
     from profilefit.shader import opened
     from profilefit.studies.choose.scenes import atlas_need
 
-    with working("summing what the screen does not see", quiet), opened() as context:
+    with working("measuring hidden light", quiet), opened() as context:
         need = atlas_need(context, request)
     return atlas_content(need), [atlas_line(need)], True
 
@@ -108,7 +102,7 @@ def _sea(request: Any, quiet: bool) -> SceneNeed:
     from profilefit.report.tables.choose_table import sea_content, sea_lines
     from profilefit.studies.choose.scenes import sea_need
 
-    with working("summing the haze", quiet):
+    with working("measuring the haze", quiet):
         need = sea_need(request)
     return sea_content(need), sea_lines(need), True
 
@@ -122,4 +116,4 @@ def _fur(request: Any, quiet: bool) -> SceneNeed:
     return fur_content(need), fur_lines(need), need.way is not None
 
 
-OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes of which another question is answered
+OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes with other results

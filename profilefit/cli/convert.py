@@ -30,47 +30,49 @@ def _length(words: str) -> Any:
 
 def convert(
     context: typer.Context,
-    alpha: Annotated[str | None, typer.Option(help="Reduced albedo mu_s' / (mu_s' + mu_a).")] = None,
-    reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
-    illumination: Annotated[str | None, typer.Option(help=f"Of --reflectance and --falloff: {LIGHTS_HELP}.")] = None,
-    n: Annotated[float, typer.Option("--n", help="Refractive index of the surface that A is of.")] = 1.0,
-    g: Annotated[float, typer.Option("--g", help="Mean cosine of scattering; alpha and mu_s' stay reduced.")] = 0.0,
-    mu_a: Annotated[
-        str | None, typer.Option(help="Absorption coefficient, with --mu-s; colour and length in one.")
+    alpha: Annotated[str | None, typer.Option(help="Reduced albedo mu_s' / (mu_s' + mu_a), 0 to 1.")] = None,
+    reflectance: Annotated[str | None, typer.Option(help="Total diffuse reflectance A (the colour), 0 to 1.")] = None,
+    illumination: Annotated[
+        str | None, typer.Option(help=f"Illumination of --reflectance and --falloff: {LIGHTS_HELP}.")
     ] = None,
-    mu_s: Annotated[str | None, typer.Option(help="Reduced scattering coefficient mu_s'.")] = None,
+    n: Annotated[float, typer.Option("--n", help="Refractive index of the medium, for --reflectance.")] = 1.0,
+    g: Annotated[float, typer.Option("--g", help="Anisotropy; alpha and mu_s' stay reduced.")] = 0.0,
+    mu_a: Annotated[str | None, typer.Option(help="Absorption coefficient, for example 0.1/mm; needs --mu-s.")] = None,
+    mu_s: Annotated[str | None, typer.Option(help="Reduced scattering coefficient mu_s', for example 2/mm.")] = None,
     mfp: Annotated[str | None, _length("Transport mean free path 1 / (mu_s' + mu_a).")] = None,
-    dmfp: Annotated[str | None, _length("Diffuse mean free path (Grosjean's).")] = None,
-    dmfp_classical: Annotated[str | None, _length("The same, 1 / sqrt(3 mu_a mu_t').")] = None,
-    decay_length: Annotated[str | None, _length("The same, exact.")] = None,
-    falloff: Annotated[str | None, _length("Normalized diffusion's d = l / s(A).")] = None,
-    falloff_dmfp: Annotated[str | None, _length("Its d = l_d / s(A).")] = None,
-    mfp_unreduced: Annotated[str | None, _length("Mean free path 1 / (mu_s + mu_a).")] = None,
-    cycles_radius: Annotated[str | None, _length("Blender 5.2+: radius x scale of Random Walk.")] = None,
+    dmfp: Annotated[str | None, _length("Diffuse mean free path by Grosjean's formula.")] = None,
+    dmfp_classical: Annotated[str | None, _length("Diffuse mean free path 1 / sqrt(3 mu_a mu_t').")] = None,
+    decay_length: Annotated[str | None, _length("Diffuse mean free path, exact.")] = None,
+    falloff: Annotated[str | None, _length("Length d = l / s(A) of normalized diffusion.")] = None,
+    falloff_dmfp: Annotated[str | None, _length("Length d = l_d / s(A) of normalized diffusion.")] = None,
+    mfp_unreduced: Annotated[str | None, _length("Unreduced mean free path 1 / (mu_s + mu_a).")] = None,
+    cycles_radius: Annotated[str | None, _length("Radius x scale of Random Walk in Blender 5.2+.")] = None,
     cycles_legacy_radius: Annotated[
-        str | None, _length("Random Walk of 4.0 to 5.1, (Fixed Radius) of 3.x, (Legacy).")
+        str | None, _length("Radius x scale of Random Walk in Blender 4.0 to 5.1, (Fixed Radius) in 3.x, (Legacy).")
     ] = None,
-    cycles_burley_radius: Annotated[str | None, _length("Blender 3.0+: Christensen-Burley.")] = None,
-    cycles_skin_radius: Annotated[str | None, _length("Blender 4.0+: Random Walk (Skin); 3.x: Random Walk.")] = None,
-    hdrp_distance: Annotated[str | None, _length("Unity HDRP: Scattering Color x Multiplier.")] = None,
-    hdrp_radius: Annotated[str | None, _length("Unity HDRP: Max Radius.")] = None,
-    unreal_mfp: Annotated[str | None, _length("Unreal 5.1+, rasteriser: mean free path color x distance.")] = None,
-    unreal_dmfp: Annotated[str | None, _length("The same before 5.1, a diffuse one.")] = None,
+    cycles_burley_radius: Annotated[
+        str | None, _length("Radius x scale of Christensen-Burley in Blender 3.0+.")
+    ] = None,
+    cycles_skin_radius: Annotated[
+        str | None, _length("Radius x scale of Random Walk (Skin) in Blender 4.0+, Random Walk in 3.x.")
+    ] = None,
+    hdrp_distance: Annotated[str | None, _length("Scattering Color x Multiplier in Unity HDRP.")] = None,
+    hdrp_radius: Annotated[str | None, _length("Max Radius in Unity HDRP.")] = None,
+    unreal_mfp: Annotated[str | None, _length("Mean free path color x distance in Unreal 5.1+, rasteriser.")] = None,
+    unreal_dmfp: Annotated[str | None, _length("Diffuse mean free path color x distance in Unreal before 5.1.")] = None,
     sources: Annotated[
-        bool, typer.Option("--sources", help="List fields, formulas, sources and checks of renderers, too.")
+        bool, typer.Option("--sources", help="List fields, formulas, sources and checks of renderers.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Convert a colour and a length into every convention.
+    """Convert a colour and a length between conventions.
 
-    Prints the medium's own quantities, then the colour and the length to type into each renderer, by version. Channels
-    are separated by commas; a length may have a unit. --json prints a list of channels for each name.
+    Prints the medium's optical properties, then the colour and length to type into each renderer, by version. Commas
+    separate channels, and a length may have a unit, for example 1.2mm. --json prints a list of channels for each name.
 
     \b
-    Examples:
+    Example:
       profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm
-      profilefit convert --alpha 0.95 --dmfp 3mm --json
-      profilefit convert --alpha 0.95 --n 1.4 --g 0.8 --mfp 1mm --sources
     """
     from mcml_sim.cli.screen import print_json, put, screen
     from profilefit.convert import Optical, alpha_of
@@ -116,7 +118,7 @@ def convert(
 
 
 def _shares(option: str, text: str) -> Floats:
-    """Return numbers between commas, none of them a percent."""
+    """Return numbers between commas; InputError on a percentage."""
     for word in text.split(","):
         if hint := percent(word):
             raise refused(option, "numbers in [0, 1], between commas", word.strip(), hint)
@@ -124,7 +126,7 @@ def _shares(option: str, text: str) -> Floats:
 
 
 def _numbers(option: str, text: str, units: tuple[str, ...] = ()) -> tuple[Floats, str]:
-    """Numbers between commas, and the one unit of them all; units are `units`, or none."""
+    """Return numbers between commas, and their common unit, one of `units` or none."""
     import numpy as np
 
     numbers, found = [], set()

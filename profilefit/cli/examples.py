@@ -1,4 +1,4 @@
-"""profilefit examples: files to try the commands on."""
+"""profilefit examples: copies of the files that examples of commands read."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ OUT = Path("examples")
 
 
 def examples(
-    out: Annotated[Path, typer.Option(help="Folder to copy them into; what is there is never replaced.")] = OUT,
+    out: Annotated[Path, typer.Option(help="Folder for the copies; existing files are never replaced.")] = OUT,
 ) -> None:
-    """Copy the files that other commands' examples read.
+    """Copy the example files of other commands.
 
-    A measured profile, a scene, a layered medium, simulated half spaces; the name of each is printed.
+    Copies a measured profile, scenes, layered media and simulated media, and prints their names.
 
     \b
-    Examples:
-      profilefit examples --out .
+    Example:
       profilefit examples --out trial
     """
     from mcml_sim.cli.screen import screen

@@ -1,4 +1,4 @@
-"""profilefit export: a law as source for a shader or a program, or as JSON."""
+"""profilefit export: a profile model as source for a shader or a program, or as JSON."""
 
 from __future__ import annotations
 
@@ -16,47 +16,47 @@ def export(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A record (hazard-diffuse), law (burley), map (chiang), stack (skin), phase (petzold), sea-segment or "
-            "fur.",
+            help="Record (hazard-diffuse), profile model (burley), albedo inversion (chiang), stack (skin), phase "
+            "function (petzold), sea's file (SEA.toml), sea-segment or fur.",
             autocompletion=options.exported,
         ),
     ],
     lang: Annotated[
-        str, typer.Option(help=f"One of {', '.join(options.LANGUAGES)}.", autocompletion=options.languages)
+        str, typer.Option(help=f"Language, one of {', '.join(options.LANGUAGES)}.", autocompletion=options.languages)
     ] = "glsl",
     constants: Annotated[
         str | None,
         typer.Option(
-            help="Of a law: regenerated, a printed set (published, corrected), or a record's path.",
+            help="Set of constants: regenerated, published, corrected, or a record's path.",
+            show_default="regenerated where there are any, else published",
             autocompletion=options.constants,
         ),
     ] = None,
     n: Annotated[
         float | None,
-        typer.Option("--n", help="Refractive index of the surface, if not that of the record: 1 to 1.6 for hazard."),
+        typer.Option("--n", help="Refractive index, 1 to 1.6 for hazard.", show_default="the record's"),
     ] = None,
     g: Annotated[
-        float | None, typer.Option("--g", help="Mean cosine of the scattering angle: 0 to 0.95 for hazard, n near 1.4.")
+        float | None,
+        typer.Option("--g", help="Anisotropy, 0 to 0.95 for hazard with n near 1.4.", show_default="the record's"),
     ] = None,
     name: Annotated[
         str | None,
-        typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
+        typer.Option(help="Prefix of the functions, one per medium of a shader.", show_default="the model's name"),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File to write; without it the source is printed.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File to write.", show_default="printed to stdout")] = None,
     fits: options.Fits = None,
 ) -> None:
-    """Write a law as one file for a shader or a program.
+    """Write a profile model as shader source, or as JSON.
 
-    Its functions, every constant with its errors, units, illumination, range and digests. Without --constants a law or
-    map that was not regenerated has its printed ones. Of a stack: the law of its three colours with the first layer's
-    thickness as an argument, and light scattered once. Of a phase function: its best sum of terms, with its sampler.
-    sea-segment: what a beam brings to a view ray in water. Of a sea's file, SEA.toml: the blur of light on its floor.
-    fur: what cones of fur hide, their discs on shells, and where a ray comes into one.
+    The file contains the functions, every constant with its errors, units, illumination, range and digests. A stack's
+    model takes the first layer's thickness as an argument and includes single scattering. A phase function is written
+    as its best sum of terms, with a sampler. The name sea-segment gives the light that a beam adds to a view ray in
+    water, SEA.toml the blur on a sea's floor, and fur the coverage of cones.
 
     \b
-    Examples:
+    Example:
       profilefit export hazard-diffuse --n 1.4 --g 0.9 --lang hlsl --out skin.hlsl
-      profilefit export hazard-diffuse --n 1.37
     """
     from mcml_sim.files.whole_file import write_whole
     from profilefit.scenes import SOURCES

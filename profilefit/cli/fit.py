@@ -1,4 +1,4 @@
-"""profilefit fit: one's own data, and the medium that explains them."""
+"""profilefit fit: measured data, and the medium that fits them."""
 
 from __future__ import annotations
 
@@ -33,92 +33,95 @@ PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 def fit(
     context: typer.Context,
-    data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
-    kind: Annotated[str, typer.Option(help="profile, or phase: a phase function.")] = PROFILE,
+    data: Annotated[
+        Path, typer.Argument(help="Table (.csv, .tsv, .txt), MCML output (.mco) or mcml-sim output (.npz).")
+    ],
+    kind: Annotated[str, typer.Option(help="Kind of data: profile, or phase for a phase function.")] = PROFILE,
     law: Annotated[
-        str, typer.Option(help=f"exact, or one of {', '.join(PROFILES)}.", autocompletion=options.fitted)
+        str, typer.Option(help=f"Profile model: exact, or one of {', '.join(PROFILES)}.", autocompletion=options.fitted)
     ] = options.EXACT,
     constants: Annotated[
         str,
         typer.Option(
-            help="regenerated, a printed set (published, corrected) or a record's path (.json).",
+            help="Set of constants: regenerated, published, corrected, or a record's path (.json).",
             autocompletion=options.constants,
         ),
     ] = "regenerated",
     fix: Annotated[
-        list[str] | None, typer.Option(help="Hold l=1.2mm, alpha=.9 or A=.8 (total reflectance); may be repeated.")
+        list[str] | None, typer.Option(help="Fixed value, for example l=1.2mm, alpha=.9 or A=.8; may be repeated.")
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Unit of r, if the header has none: nm, um, mm, cm, m, inch.")
+        str | None, typer.Option(help="Unit of r, if the header has none, one of nm, um, mm, cm, m, inch.")
     ] = None,
-    colour: Annotated[str | None, typer.Option(help="Of a TLS850's records: red, green or blue.")] = None,
+    colour: Annotated[str | None, typer.Option(help="Colour of a TLS850's file: red, green or blue.")] = None,
     scale: Annotated[
-        str, typer.Option(help="The values are light times this: a number, 1.0+-0.02 if known so well, or free.")
+        str, typer.Option(help="Values divided by R_d: a number, a number with its error (1.0+-0.02), or free.")
     ] = "1",
     total: Annotated[
-        str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
+        str | None,
+        typer.Option(
+            help="Measured total diffuse reflectance A with its error, for example 0.52+-0.01.", metavar="A+-ERROR"
+        ),
     ] = None,
     oblique: Annotated[
         str | None,
         typer.Option(
-            help="Of a beam aslant: its angle in air, a circle's radius, and how far the circle's centre lies from the "
-            "entry, such as 45:4mm:0.52mm+-0.01mm.",
+            help="Oblique beam's angle in air in degrees, a circle's radius, and the distance of the circle's centre "
+            "from the entry, for example 45:4mm:0.52mm+-0.01mm.",
             metavar="ANGLE:R:D",
         ),
     ] = None,
     light: Annotated[
-        str | None, typer.Option(help=f"{options.LIGHTS_HELP}.", show_default=f"the file's, else {options.LIGHTS[0]}")
+        str | None,
+        typer.Option(
+            help=f"Illumination: {options.LIGHTS_HELP}.", show_default=f"the file's, else {options.LIGHTS[0]}"
+        ),
     ] = None,
     beam: Annotated[
         str | None,
         typer.Option(
-            help="1/e² radius of a Gaussian beam (0.5mm), its range (0.3mm:0.7mm), fwhm:0.6mm, tophat:0.5mm, a .csv.",
+            help="1/e² radius of a Gaussian beam (0.5mm), its range (0.3mm:0.7mm), fwhm:0.6mm, tophat:0.5mm or a .csv.",
             show_default="a pencil beam",
         ),
     ] = None,
-    fibre: Annotated[str | None, typer.Option(help="Core radius of the fibre that a point is seen by.")] = None,
+    fibre: Annotated[str | None, typer.Option(help="Core radius of the detecting fibre, for example 0.2mm.")] = None,
     n: Annotated[
         str | None,
-        typer.Option(help="Refractive index of the medium, or a range: 1.33:1.45.", show_default="the file's, else 1"),
+        typer.Option(help="Refractive index, or its range 1.33:1.45.", show_default="the file's, else 1"),
     ] = None,
     g: Annotated[
         str | None,
-        typer.Option(help="Mean cosine of scattering, or a range: 0.7:0.95.", show_default="the file's, else 0"),
+        typer.Option(help="Anisotropy, or its range 0.7:0.95.", show_default="the file's, else 0"),
     ] = None,
     layers: Annotated[
-        Path | None, typer.Option(help="STACK.toml of layers to fit in place of a half space: minutes.")
+        Path | None,
+        typer.Option(help="File STACK.toml of layers to fit, in place of a semi-infinite medium (minutes)."),
     ] = None,
     free: Annotated[
-        str | None, typer.Option(help="What is free in the layers: d1, mu_a2, mu_s2, ...", metavar="NAME,NAME")
+        str | None, typer.Option(help="Free values of the layers: d1, mu_a2, mu_s2, ...", metavar="NAME,NAME")
     ] = None,
-    r_min: Annotated[str | None, typer.Option(help="Leave out what is nearer to the beam, such as 0.5mm.")] = None,
-    r_max: Annotated[str | None, typer.Option(help="Leave out what is farther.")] = None,
+    r_min: Annotated[str | None, typer.Option(help="Smallest radius that is fitted, for example 0.5mm.")] = None,
+    r_max: Annotated[str | None, typer.Option(help="Largest radius that is fitted, for example 20mm.")] = None,
     angles: Annotated[
-        str | None, typer.Option(help="Angles of a phase function that count, such as 1:180 degrees.", metavar="A:B")
+        str | None,
+        typer.Option(help="Range of fitted angles in degrees, with --kind phase, for example 1:180.", metavar="A:B"),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for fit.json and the figures.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the posterior's walkers, >= 0.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder for fit.json and figures.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the Markov chains, >= 0.")] = 0,
     fits: Fits = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fit A, alpha and l to your own data, with errors.
+    """Fit A, alpha and l to measured data, with errors.
 
-    That is mu_s' and mu_a, from a measured or simulated profile; and what the data do not identify. A table has columns
-    r, value, sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over
-    annuli. Values are reflected light per area and per incident light, unless the scale is free. Comments such as
-    "# n = 1.4" may state light, n, g, beam, fibre and unit. Exit status 1 if the fit fails.
-
-    With --kind phase a table has columns angle (degrees), value and, if known, sigma; one to four terms of Henyey
-    and Greenstein, Haltrin's form, and Fournier and Forand's are fitted to it, moments free or held: a minute. The one
-    named petzold is shipped.
+    Also reports mu_s', mu_a, and values that the data do not identify. A table has columns r, value and sigma. Columns
+    value1, value2, ... are replicates, and r_in, r_out in place of r are annuli. Values are light per area and per
+    incident light. Comments such as "# n = 1.4" state light, n, g, beam, fibre or unit. With --kind phase the columns
+    are angle (degrees), value and sigma, and phase functions are fitted (a minute). Exit status 1 if the fit fails.
 
     \b
-    Examples, on the files of profilefit examples:
+    Example, on a file of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
-      profilefit fit examples/phantom.csv --law burley --scale free --json
-      profilefit fit examples/phantom.csv --n 1.4 --g 0.8:0.95
-      profilefit fit petzold --kind phase
     """
     from mcml_sim.cli.screen import answer
     from mcml_sim.files.whole_file import require_folder
@@ -241,7 +244,7 @@ def _fit_layers(
 
 
 def _medium(file: Path, unit: str) -> Medium:
-    """Return the stack of a file, in the data's unit of length."""
+    """Return the stack of a file, converted to the data's unit of length."""
     from dataclasses import replace
 
     from mcml_sim.files.whole_file import read_toml
@@ -262,7 +265,7 @@ def _medium(file: Path, unit: str) -> Medium:
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:
-    """Return what `--fix` holds: alpha or A, and l."""
+    """Return the values that `--fix` sets: alpha or A, and l."""
     from profilefit.measured.data import length
 
     held: dict[str, float] = {}

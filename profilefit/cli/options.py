@@ -1,6 +1,6 @@
-"""Options and folders that several subcommands have, and the words that a shell completes: names of laws and records.
+"""Options and folders of several subcommands, and shell completion: names of laws and records.
 
-Words are written out where their owner takes seconds to import; a test holds them against it.
+Words are repeated here where their module takes seconds to import; a test compares both.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ from profilefit.recipes import kinds
 from profilefit.recipes.folder import EVIDENCE, fits_folder, known_folder
 
 Fits = Annotated[
-    Path | None, typer.Option(help="Folder of the records: ./fits if it has any, which is said, else the ones shipped.")
+    Path | None,
+    typer.Option(help="Folder of the records.", show_default="./fits if it has records, else the shipped folder"),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print all of it as JSON instead.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes: the result only.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the result only, without progress and notes.")]
 
 EXACT = "exact"  # light that is solved, in place of a law
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
-LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
+LIGHTS_HELP = "searchlight (a pencil beam) or diffuse"
 PARTS = ("truth", "laws", "samplers", "fits", "sea", "fur")
 FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
@@ -53,7 +54,7 @@ ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
 
 
 def require_left_out(context: typer.Context, names: Iterable[str], where: str) -> None:
-    """Raise InputError on an option that was given although it says nothing there."""
+    """Raise InputError on an option that was given but has no effect."""
     for name in names:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
@@ -61,21 +62,21 @@ def require_left_out(context: typer.Context, names: Iterable[str], where: str) -
 
 
 def refused(option: str, accepted: str, got: object, hint: str = "") -> InputError:
-    """Return the error of an option whose value is none that is accepted."""
+    """Return the error of an option whose value is not accepted."""
     from mcml_sim.media.arrays import shown
 
     return InputError(f"{option} must be {accepted}, got {shown(got)}{hint}")
 
 
 def percent(text: str) -> str:
-    """Return a hint for the end of a message, where a share was written as a percent; else an empty text."""
+    """Return a hint for a message if a share was written as a percentage, else an empty text."""
     match = PERCENT.match(text.strip())
     is_one = match is not None and (match[2] or 2 < float(match[1]) <= 100)
     return f" (a share: {float(match[1]) / 100:g} for {match[1]} %)" if match is not None and is_one else ""
 
 
 def in_options(text: Any) -> Any:
-    """Return a text of the library, or content with such texts, with options in place of arguments."""
+    """Return texts of the library with names of options in place of arguments."""
     if isinstance(text, str):
         return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), text)
     if isinstance(text, Mapping):
@@ -86,8 +87,8 @@ def in_options(text: Any) -> Any:
 def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
     """Return the folder requested, or ./fits if it has records, or the one shipped.
 
-    One that is not the shipped one is named by an OtherRecords warning, since constants of a strange folder look like
-    ours; one that was requested is not, if `quiet`. InputError if it is no folder.
+    An OtherRecords warning names a folder that is not the shipped one, unless it was requested with `quiet`, because
+    constants of other records look like the shipped ones. InputError if it is no folder.
     """
     if requested is not None and not requested.is_dir():
         raise InputError(f"--fits must be a folder of records, got {str(requested)!r}, which is none")
@@ -101,7 +102,7 @@ def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
 def evidence_folder(records: Path, requested: Path | None = None) -> Path:
     """Return the folder requested, or ./evidence if it is there, or the one beside the records.
 
-    One that was not requested is named by an OtherRecords warning. InputError if one was requested and is no folder.
+    An OtherRecords warning names ./evidence. InputError if the requested folder does not exist.
     """
     if requested is not None and not requested.is_dir():
         raise InputError(f"--evidence must be a folder, got {str(requested)!r}, which is none")
@@ -112,12 +113,12 @@ def evidence_folder(records: Path, requested: Path | None = None) -> Path:
 
 
 def _among(known: Iterable[str]) -> Callable[[str], Iterator[str]]:
-    """Return the completion of a word that is one of those known."""
+    """Return the completion of a word from known ones."""
     return lambda incomplete: _starting(incomplete, known)
 
 
 def _named(kind: Callable[[kinds.Kind], object] = bool, forms: bool = True) -> Callable[..., Iterator[str]]:
-    """Return the completion by names of some kinds, in the folder that the command has been given so far."""
+    """Return the completion by names of some kinds of records, in the folder of --fits if given."""
 
     def offered(ctx: typer.Context, incomplete: str) -> Iterator[str]:
         requested = ctx.params.get("fits")
@@ -128,12 +129,12 @@ def _named(kind: Callable[[kinds.Kind], object] = bool, forms: bool = True) -> C
 
 
 def recipes(incomplete: str) -> Iterator[str]:
-    """Return the names of what ships to regenerate records from."""
+    """Return the names of shipped recipes, stacks and phase functions."""
     return _starting(incomplete, sorted({name for kind in kinds.KINDS for name in kind.requests()}))
 
 
 def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Return what `stability` takes: laws, maps, their records, and functions."""
+    """Return the names that `stability` accepts: laws, maps, their records, and functions."""
     yield from subjects(ctx, incomplete)
     yield from _starting(incomplete, FUNCTIONS)
 
@@ -147,7 +148,7 @@ parts = _among(PARTS)
 
 
 def constants(incomplete: str) -> Iterator[str]:
-    """Return the sets of constants, of whatever law."""
+    """Return the names of all sets of constants."""
     from profilefit.laws.published import SETS
 
     return _starting(incomplete, dict.fromkeys(("regenerated", *(one.name for one in SETS))))

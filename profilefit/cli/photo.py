@@ -19,10 +19,10 @@ SEVERAL = ("--card", "--grey", "--dark")
 
 
 class SeveralFiles(TyperCommand):
-    """A command some of whose options take every file that follows, as a shell writes out card-*.dng."""
+    """Command with options that take several files, as a shell expands card-*.dng."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse with the option before each of its files."""
+        """Parse arguments with the option repeated before each of its files."""
         written: list[str] = []
         option: str | None = None
         for at, one in enumerate(args):
@@ -41,41 +41,47 @@ class SeveralFiles(TyperCommand):
 def photo(
     context: typer.Context,
     shots: Annotated[
-        list[Path] | None, typer.Argument(help="Exposures of a bracket: raw files, or 16-bit linear TIFF or EXR.")
+        list[Path] | None,
+        typer.Argument(metavar="SHOT", help="Exposures of a bracket: raw files, linear 16-bit TIFF or EXR."),
     ] = None,
     card: Annotated[list[Path] | None, typer.Option(help="Exposures of the beam on a white opaque card.")] = None,
     grey: Annotated[
-        list[Path] | None, typer.Option(help="Exposures of it on a grey card, timed as the spot's.")
+        list[Path] | None, typer.Option(help="Exposures of the beam on a grey card, with the spot's exposure times.")
     ] = None,
     dark: Annotated[list[Path] | None, typer.Option(help="Frames with the lens covered.")] = None,
     scale: Annotated[
-        str | None, typer.Option(help="0.05mm/px, a ruler's two points X,Y:X,Y=10mm, or aruco:20mm, a marker's side.")
+        str | None,
+        typer.Option(help="Image scale: 0.05mm/px, two points of a ruler X,Y:X,Y=10mm, or a marker's side aruco:20mm."),
     ] = None,
-    beam: Annotated[str | None, typer.Option(help="1/e² radius, or fwhm:, as far as known: 0.5mm+-0.05mm.")] = None,
-    surface: Annotated[str, typer.Option(help="Share of the light that the surface scatters.")] = "0.01+-0.01",
-    glare: Annotated[str, typer.Option(help="Share of the light that the lens scatters.")] = "0.02+-0.02",
-    reflectance: Annotated[str, typer.Option(help="Of the grey card.")] = "0.18+-0.005",
+    beam: Annotated[
+        str | None, typer.Option(help="1/e² radius of the beam with its error (0.5mm+-0.05mm), or fwhm:0.6mm+-0.06mm.")
+    ] = None,
+    surface: Annotated[
+        str, typer.Option(help="Share of the light that the surface scatters, with its error.")
+    ] = "0.01+-0.01",
+    glare: Annotated[
+        str, typer.Option(help="Share of the light that the lens scatters, with its error.")
+    ] = "0.02+-0.02",
+    reflectance: Annotated[str, typer.Option(help="Reflectance of the grey card, with its error.")] = "0.18+-0.005",
     n: Annotated[float, typer.Option(help="Refractive index of the medium.")] = 1.4,
-    g: Annotated[float, typer.Option(help="Mean cosine of its scattering.")] = 0.8,
+    g: Annotated[float, typer.Option(help="Anisotropy of the medium.")] = 0.8,
     simulate: Annotated[
-        Path | None, typer.Option(help="SETUP.toml: write its photographs into --out, and what they could tell.")
+        Path | None,
+        typer.Option(help="File SETUP.toml of photographs to simulate into --out, with Cramér-Rao bounds."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for page, photo.json, medium.glsl and figures.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the page, photo.json, medium.glsl and figures.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure a medium by photographs of a laser spot.
+    """Measure a medium from photographs of a laser spot.
 
-    A bracket of exposures is merged, and rings about the spot are fitted by exact light under the beam, with what
-    surface and lens add; red, green and blue apart. Cards tell what the spot alone does not: a white one beam and
-    glare, a grey one the scale. The answer names the errors that such photographs have at best. Exit status 1 if a fit
-    fails. From a clone, pip install ".[photo]".
+    Merges a bracket of exposures, and fits radial bins about the spot by the exact solution, each colour separately. A
+    white card gives beam and glare, a grey card the scale. The result includes the Cramér-Rao bound of each error. Exit
+    status 1 if a fit fails. In a clone, pip install ".\\[photo]" installs the libraries.
 
     \b
-    Examples:
-      profilefit photo --simulate SETUP.toml --out shots
-      profilefit photo shots/spot-*.dng --scale 0.04mm/px --beam 0.5mm+-0.05mm
-      profilefit photo spot-*.dng --card card-*.dng --scale aruco:20mm
+    Example, on a file of profilefit examples:
+      profilefit photo --simulate examples/photo.toml --out shots
     """
     from mcml_sim.cli.screen import answer
     from mcml_sim.files.whole_file import require_folder, write_whole
@@ -146,7 +152,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
 
 
 def _known(option: str, text: str, lengths: bool = False) -> Known:
-    """Return a value and its error, 0.18+-0.005; of lengths, in mm, where fwhm: may stand before."""
+    """Return a value and its error from 0.18+-0.005, or from a length [mm] with optional fwhm: before it."""
     from profilefit.cli.fit import WITH_ERROR
     from profilefit.measured import Known
     from profilefit.measured.data import BY_FWHM, FWHM, length

@@ -17,11 +17,11 @@ PHOTON_STORE = ".photons"
 SEED = 1
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
 ROOM = 2**25  # bytes: more than all that is shipped
-PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
+PRESETS = "Number of photons per setting, 2.1e7 (quick, minutes) or 4.2e8 (full), fewer where n is not 1."
 
 
 class Preset(StrEnum):
-    """Number of photons: quick is enough for four digits of most constants, full for five."""
+    """Preset number of photons; quick gives four digits of most constants, full five."""
 
     QUICK = "quick"
     FULL = "full"
@@ -32,39 +32,34 @@ def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of recipes, stacks, phase functions, or their files (.toml, .csv); all shipped ones if none.",
+            metavar="RECIPE",
+            help="Names of recipes, stacks or phase functions, or their files (.toml, .csv).",
+            show_default="all shipped recipes",
             autocompletion=options.recipes,
         ),
     ] = None,
     preset: Annotated[Preset, typer.Option(help=PRESETS)] = Preset.QUICK,
     out: Annotated[
-        Path, typer.Option(help="Folder for the records, and for the photons that a rerun resumes.")
+        Path, typer.Option(help="Folder for the records, its folders stacks, gaussians and phases, and kept photons.")
     ] = LOCAL,
-    seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, 0 to 4294967295.")] = SEED,
+    seed: Annotated[int, typer.Option(help="Seed of photons and Markov chains, 0 to 4294967295.")] = SEED,
     photons: Annotated[
-        int | None, typer.Option(help="Number of photons in each setting instead of the preset's.")
+        int | None, typer.Option(help="Number of photons per setting.", show_default="by --preset")
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print what was written as JSON: constants, errors, quality.")
+        bool, typer.Option("--json", help="Print constants, errors and quality of the records as JSON.")
     ] = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate light, refit the laws, write the records.
+    """Refit profile models and write their records.
 
-    Each record takes seconds to minutes, and as many are fitted side by side as there are cores. After Ctrl-C the same
-    command resumes: photons that are traced stay. The table at the end compares each record with the shipped one: how
-    far its constants moved, in units of their stated error. The command ends with status 1 where a constant moves by
-    more than 0.05 of its error, or an interval by more than the Monte Carlo error of its chain.
-
-    A file of layers is a stack. Its law is fitted to exact light in one to three minutes, longer where a layer scatters
-    forward, and its record goes to OUT/stacks. The record of its sums of Gaussians, half a minute more, goes to
-    OUT/gaussians. A table of a phase function is fitted by every form in a minute, and its record goes to OUT/phases.
+    Each record takes seconds to minutes, and several are fitted in parallel. After Ctrl-C the same command resumes. The
+    final table compares each record with the shipped one. Exit status 1 if a constant moves by more than 0.05 of its
+    stated error, or an interval by more than the Monte Carlo error of its chain.
 
     \b
-    Examples, the last on a file of profilefit examples:
+    Example:
       profilefit regenerate hazard --out mine
-      profilefit regenerate albedo-liang --photons 100000 --out mine
-      profilefit regenerate examples/layers-head.toml --out mine
     """
     from mcml_sim.cli.screen import notes, print_json, put
     from mcml_sim.files.whole_file import require_folder

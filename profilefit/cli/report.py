@@ -26,48 +26,47 @@ def report(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of records, of stacks as well; a summary of all if none is named.",
+            metavar="NAME",
+            help="Names of records or stacks.",
+            show_default="a summary of all",
             autocompletion=options.records,
         ),
     ] = None,
     quality: Annotated[
-        bool, typer.Option("--quality", help="Measure every law against the exact half space instead (a minute).")
+        bool,
+        typer.Option("--quality", help="Measure all models, inversions and samplers, or the named ones (a minute)."),
     ] = False,
     claims: Annotated[
-        bool, typer.Option("--claims", help="Print what is promised of accuracy and speed, beside what was measured.")
+        bool, typer.Option("--claims", help="Print claims of accuracy and speed with measured values.")
     ] = False,
     figures_to: Annotated[
-        Path | None, typer.Option("--figures", help="Folder for the figures; without it none are drawn.")
+        Path | None, typer.Option("--figures", help="Folder for figures.", show_default="none drawn")
     ] = None,
     markdown: Annotated[
-        Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
+        Path | None, typer.Option(help="Markdown file whose tables between marks <!-- name --> are filled in.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Write all of it as one HTML page, with figures and an explorer: two minutes.")
+        Path | None, typer.Option(help="File for one HTML page with tables, figures and an explorer (two minutes).")
     ] = None,
     evidence: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that check, stability and tradeoff wrote into with --out, for the page and --claims: "
-            "./evidence if it is there, else the one beside the records."
+            help="Folder of results of check, stability and tradeoff, for --html and --claims.",
+            show_default="./evidence if present, else beside the records",
         ),
     ] = None,
     fits: options.Fits = None,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show constants, their errors, and how good they are.
+    """Show constants, their errors and the models' quality.
 
-    Also quality by albedo, or by thickness of a stack of layers and by number of Gaussians, and the state of fits and
-    chains. --quality prints instead how good every law, map and sampler is, printed ones too; or those of the records
-    named.
+    The tables also give quality by albedo, by thickness of a stack or by number of Gaussians, and the state of fits and
+    chains.
 
     \b
-    Examples:
+    Example:
       profilefit report hazard
-      profilefit report skin
-      profilefit report liang-whole --figures figures
-      profilefit report --html report.html
     """
     from mcml_sim.cli.screen import notes, print_json, screen, show
     from mcml_sim.files.whole_file import require_folder
@@ -140,7 +139,7 @@ def report(
 
 
 def _require_together(chosen: Sequence[Chosen], folder: Path, given: Sequence[str]) -> None:
-    """Name the folder of records that are of another one; InputError on an option that says nothing of a kind."""
+    """Warn of records from another folder; InputError on an option that has no effect on a kind."""
     seen: set[str] = set()
     for kind, name, path in chosen:
         if option := next((option for option in given if option in kind.apart), None):

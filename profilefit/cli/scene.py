@@ -1,4 +1,4 @@
-"""profilefit scene: draw a scene by a technique, beside its truth, with its error and cost."""
+"""profilefit scene: draw a scene by a technique, beside its reference, with its error and cost."""
 
 from __future__ import annotations
 
@@ -21,23 +21,22 @@ def scene(
         str,
         typer.Argument(
             metavar="FILE.toml",
-            help=f"What is drawn, and how; with --example the name of a scene: {', '.join(SCENES)}.",
+            help=f"File of a scene, or its name with --example: {', '.join(SCENES)}.",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,
-    example: Annotated[bool, typer.Option("--example", help="Print an example of a scene's file instead.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for pictures (PNG) and numbers (JSON).")] = OUT,
+    example: Annotated[bool, typer.Option("--example", help="Print an example file of a scene.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw a scene beside its truth (a minute).
+    """Draw a scene beside its reference (a minute).
 
-    NAME.png of FILE NAME.toml is the picture by the technique that the file names, NAME-truth.png the
-    reference, NAME-error.png the error of each pixel; NAME.json has error and cost in numbers, which are printed, too.
-    Times are of this machine's OpenGL, a GPU or a software rasteriser.
+    For a file NAME.toml, the picture by its technique is NAME.png, and NAME-error.png shows the error of each pixel.
+    NAME.json contains error and cost, which are also printed. Times belong to this machine's OpenGL, which is a GPU or
+    a software rasteriser.
 
     \b
-    Examples, the second on a file of profilefit examples:
-      profilefit scene skin --example
+    Example, on a file of profilefit examples:
       profilefit scene examples/skin-head.toml --out pictures
     """
     from mcml_sim.cli.screen import notes, print_json, screen, typed
@@ -64,7 +63,7 @@ def scene(
     stem = out / Path(file).stem
     for end in (".json", ".png", "-truth.png", "-error.png"):
         require_writable(Path(f"{stem}{end}"))
-    with working("drawing, and summing the truth", quiet), opened() as context:
+    with working("drawing the scene and its reference", quiet), opened() as context:
         drawn, device = home.draw(context, request), renderer(context)
     figures = report.scene_figures(drawn, device.partition(",")[0])
     files: dict[Path, bytes | str] = {Path(f"{stem}{end}.png"): png for end, png in figures.items()}

@@ -1,4 +1,4 @@
-"""profilefit schema: what a file may say, for editors."""
+"""profilefit schema: keys and values of a file, for editors."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import typer
 FILES = ("scene", "stack", "recipe", "photo")
 
 
-def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of the file: {', '.join(FILES)}.")]) -> None:
+def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help=f"Kind of file: {', '.join(FILES)}.")]) -> None:
     """Print the JSON Schema of a file.
 
-    Editors complete and check keys by it. Limits that join several keys are checked by the commands alone.
+    Editors use it to complete and check keys. Limits that join several keys are checked by the commands only.
 
     \b
-    Examples:
+    Example:
       profilefit schema scene
-      profilefit schema stack
     """
     from mcml_sim.files.whole_file import as_json
     from profilefit.errors import InputError

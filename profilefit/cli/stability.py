@@ -16,31 +16,31 @@ def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Laws, maps, records, or exact, convert, solver, stacks, heart, sea, fur; none: all but heart "
-            "(OpenGL), sea and fur.",
+            metavar="NAME",
+            help="Names of models, inversions or records, or exact, convert, solver, stacks, heart, sea, fur.",
+            show_default="all but heart, sea and fur",
             autocompletion=options.tested,
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder for the atlas: figures (PNG, SVG), every region as CSV, stability.json (as --json prints)."
-        ),
+        typer.Option(help="Folder for figures (PNG, SVG), regions (CSV) and stability.json, the output of --json."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Seconds: the paper's laws and one of this project.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Test the paper's models and one of this project (seconds).")
+    ] = False,
     fits: options.Fits = None,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Find where everything fails, and why (two minutes).
+    """Find inputs at which methods fail (two minutes).
 
-    Ends, denormals, huge numbers and NaN, in float16, 32 and 64. Exit status 1 if a law, map or solver of this project
-    has a red cell inside its stated range.
+    Tests range ends, denormals, huge numbers and NaN in float16, float32 and float64. Exit status 1 if a model,
+    inversion or solver of this project fails inside its stated range.
 
     \b
-    Examples:
+    Example:
       profilefit stability --quick --out atlas
-      profilefit stability liang
     """
     from mcml_sim.cli.screen import answer, typed
     from mcml_sim.files.whole_file import write_whole
@@ -53,7 +53,7 @@ def stability(
     todo = jobs(names or [], folder, quick)
     if out is not None:
         require_apart(out, folder, "stability.json", "stability.csv")
-    parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
+    parts = list(tracked(run(todo), "testing", "subjects", len(todo), quiet))
     origin = {"made": measurement_origin(typed(), folder), "of": names or ("quick" if quick else "all")}
     fitted = [one for part in parts for one in part.fits]
     shown = [tables.region_table(part) for part in parts if part.regions] if names else []

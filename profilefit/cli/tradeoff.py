@@ -1,4 +1,4 @@
-"""profilefit tradeoff: speed against accuracy of truths, laws, samplers and fits, measured and charted in one run."""
+"""profilefit tradeoff: speed against accuracy of references, laws, samplers and fits, measured and charted."""
 
 from __future__ import annotations
 
@@ -19,24 +19,21 @@ def tradeoff(
         list[str] | None,
         typer.Argument(
             metavar="PART",
-            help=f"{', '.join(options.PARTS)}; none: all but sea and fur (OpenGL).",
+            help="Parts to measure; sea and fur need OpenGL.",
+            show_default=" ".join(options.PARTS[:4]),
             autocompletion=options.parts,
         ),
     ] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the figures (PNG, SVG), their data (CSV), and tradeoff.json.")
-    ] = OUT,
-    quick: Annotated[bool, typer.Option("--quick", help="Less of everything: under a minute, and noisy.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for figures (PNG, SVG), their data (CSV) and tradeoff.json.")] = OUT,
+    quick: Annotated[bool, typer.Option("--quick", help="Measure fewer points (under a minute, noisy).")] = False,
     fits: options.Fits = None,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Measure and chart speed against accuracy (5 minutes).
 
-    Truths, laws, samplers and fits, light under the sea, and layers of fur, with the spread of both and the Pareto
-    front; all on one core, in turns. Times are meaningful on an idle machine only; each CSV says how idle it was. Every
-    part is written as soon as it is measured; tradeoff.json keeps those it has of the same records, version and
-    machine. --json prints what was measured now.
+    Reports the spread of error and time, and the Pareto front, on one core. Times are valid on an idle machine only,
+    and each CSV states the load. tradeoff.json keeps earlier parts of the same records, version and machine.
 
     \b
     Example:
@@ -57,7 +54,7 @@ def tradeoff(
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": measurement_origin(typed(), folder)}
     if file.exists() and not is_comparable(read(file), origin):
-        said.print(f"{file} is of other records, another version or machine: written afresh", markup=False)
+        said.print(f"{file} of other records, version or machine is replaced", markup=False)
 
     def track(turns: range, title: str) -> Iterable[int]:
         return tracked(turns, title, "turns", quiet=quiet)

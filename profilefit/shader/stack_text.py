@@ -53,7 +53,7 @@ def stack_text(
     return emit.filled(texts, name, constants, count, lang, remarks or {})
 
 
-def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME}_once") -> str:
+def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = NAME + "_once") -> str:
     """Return single scattering in a stack, NAME_radiance(channel, thickness, cos_in, cos_out, turned) [1/sr].
 
     media  of red, green, blue: two layers or more, the last infinite, of one index >= that above; InputError else

@@ -99,7 +99,7 @@ def test_a_part_is_written_beside_those_of_the_same_records(command, tmp_path):
     assert list(read(file)) == ["made", "machine", "laws", "samplers"]
     assert read(file)["laws"] == laws
     status, out, err = command("tradeoff", "laws", *words, "--fits", str(fits_folder()))
-    assert err.splitlines()[0] == "charts/tradeoff.json is of other records, another version or machine: written afresh"
+    assert err.splitlines()[0] == "charts/tradeoff.json of other records, version or machine is replaced"
     assert file.read_text(encoding="utf-8") == out
 
 
@@ -197,7 +197,7 @@ def test_a_mistake_is_one_line(refused):
 @pytest.mark.parametrize("kind", ["heart", "sea", "fur"])
 def test_only_skin_has_a_cost_to_measure(refused, kind):
     file = EXAMPLES[f"{kind}.toml"]
-    said = f"profilefit: {file}: --measure must be left out of a {kind}'s file, of which no cost is asked\n"
+    said = f"profilefit: {file}: --measure must be left out with a {kind}'s file, which has no cost ratios\n"
     assert refused(f"choose {kind}.toml --measure", "--measure") == said
 
 

@@ -37,7 +37,6 @@ LINES, COLUMNS = 24, 80
 CHEAP = (
     "profilefit examples --out trial",
     "profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm",
-    "profilefit convert --alpha 0.95 --dmfp 3mm --json",
     "profilefit export hazard-diffuse --n 1.4 --g 0.9 --lang hlsl --out skin.hlsl",
     "profilefit report hazard",
 )

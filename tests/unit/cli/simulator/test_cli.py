@@ -406,7 +406,7 @@ OUTSIDE = "../y.mco", "/dev/null", "a/../../y.mco", "a/../y.mco"
         ("two.mci", (), "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
         ("run two.mci --workers 0", (), "workers must be a whole number >= 1 and <= 4096, got 0"),
         ("run two.mci --precision nan", (), "precision must be .*, got nan"),
-        ("run two.mci --quantity absorbed", (), "quantity is what --precision looks at, got 'absorbed' .*"),
+        ("run two.mci --quantity absorbed", (), "quantity must be left out without --precision, got 'absorbed'"),
         ("run two.mci --out two.mci", (), "cannot write into two.mci: .*"),
         ("run two.mci --out a/folder", (), "cannot write a/folder/first.mco: it is a folder"),
         ("run two.mci", ("two.mci",), "cannot write two.mci for two.mci: it belongs to the input file .*"),
@@ -478,7 +478,7 @@ def test_version_and_help(command, done):
     assert command("--version") == (0, f"mcml-sim {__version__}\n", "")
     out = done("run", "--help", said=None)
     assert "--precision" in out
-    assert "[default: (one a core)]" in out
+    assert "[default: (one per core)]" in out
     assert "[default: (diffuse_reflectance)]" in out
     assert re.search(r"first at\s+(│\s+│\s+)?2.1 million", out)
     assert command()[0] == 2

@@ -205,7 +205,7 @@ def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
             "small: a fault of this program, please report it: KeyError in <string>:41: 'first line\\nsecond line' "
             "(PYTHONDEVMODE=1 shows where)\n",
         ),
-        ("overflow", 2, "small: no answer: a number on the way is beyond double precision; check units and sizes\n"),
+        ("overflow", 2, "small: no result: an intermediate number overflows double precision; check units and sizes\n"),
         ("library", 0, "small: a batch is damaged\n"),
         ("wrnog", 2, "small: No such command 'wrnog'. Did you mean 'wrong'? (--help shows what is accepted)\n"),
     ],
