@@ -21,7 +21,7 @@ COLUMNS = "| keys | accepted values | default |\n|---|---|---|"
 HEAD = """# Keys of every file
 
 Files of `profilefit` accept these keys. Comments in the files of `profilefit examples` explain them, with units.
-`profilefit schema KIND` prints JSON Schema, with which editors complete and check keys of TOML files.
+The command `profilefit schema KIND` prints JSON Schema, with which editors complete and check keys of TOML files.
 """
 
 
