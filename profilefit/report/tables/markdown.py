@@ -29,8 +29,12 @@ DISTANCES = ("constant_distance", "curve_distance")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
+AS_PUBLISHED = "-as-published"  # ends the name of a record of the paper's protocol
+OF_MAPS = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)")
+OF_MAPS += ("monotone", "α at A = 1", "A at the fold")
+
 # Headers of columns that stand to the left.
-NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
+NAMES = frozenset({"record", "equation", "constant", "constants", "constants found"})
 NAMES |= {"verdict", "law", "profile model", "model", "map", "source", "illumination", "light", "sampler", "measure"}
 NAMES |= {"claim", "noise", "held against", "command", "stack", "channel"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
@@ -40,27 +44,25 @@ SHORT |= {("hazard-refracting", "regenerated")}
 
 
 def markdown_constants(contents: Mapping[str, Content]) -> str:
-    """Return every constant of every record: printed, regenerated, and its errors; a failed fit has no row."""
-    known = records.known_errors(one for content in _fits(contents).values() for one in content["constants"].values())
-    header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
-    rows: list[Sequence[str]] = []
+    """Return every constant as published and as refitted by both protocols; a failed fit has no value."""
+    rows: dict[tuple[str, str], list[str]] = {}
     failures = []
     for name, content in _fits(contents).items():
+        stem = name.removesuffix(AS_PUBLISHED).removesuffix("-whole")
         if not converged(content):
             failures.append(f"{_text(name)} has no constants to show: {_text(content['fit']['result'])}.")
             continue
         for constant, values in content["constants"].items():
-            errors = [significant(values.get(key)) for key in known]
-            if not values.get("free", True):
-                errors = ["held", *[ABSENT] * (len(known) - 1)]
-            published = values.get("published")
-            rows.append((
-                name, EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT, constant,
-                ABSENT if published is None else f"{published:g}",
-                to_error(values["regenerated"], largest_error(values)), *errors,
-            ))  # fmt: skip
-    note = "Digits end where the largest error does; constants are correlated, so compute with the record's own."
-    return "\n\n".join([markdown_table(header, rows), *failures, note])
+            value, error = values["regenerated"], records.total_error(values) or largest_error(values)
+            published = ABSENT if values.get("published") is None else f"{values['published']:g}"
+            equation = EQUATION.get(constant, stem) if content["law"] == "liang" else stem
+            row = rows.setdefault((stem, constant), [equation, constant, published, ABSENT, ABSENT])
+            text = (
+                f"{to_error(value, error)} ± {significant(error)}" if values.get("free", True) else f"{value:g} (fixed)"
+            )
+            row[-2 if name.endswith(AS_PUBLISHED) else -1] = text
+    table = markdown_table(("equation", "constant", "published", "paper's protocol", "whole profile"), [*rows.values()])
+    return "\n\n".join([table, *failures])
 
 
 def _hazard(contents: Mapping[str, Content]) -> str:
@@ -78,30 +80,27 @@ def _hazard(contents: Mapping[str, Content]) -> str:
 
 
 def _readings(contents: Mapping[str, Content]) -> str:
-    """Return the reading nearest to print of each equation: its choices, its result, and the verdict."""
-    header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
-    readings = [r for content in contents.values() for r in content.get("readings") or ()]
+    """Return the reading nearest to print of each equation: its constants, their distance, and the verdict."""
     best: dict[str, Content] = {}
+    readings = [r for content in contents.values() for r in content.get("readings") or ()]
     for reading in sorted(readings, key=lambda r: inf if r["curve_distance"] is None else r["curve_distance"]):
         best.setdefault(reading["equation"], reading)
     rows = [
         (
             equation,
-            best[equation]["choices"],
             ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
-            ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
-            *(ABSENT if (far := best[equation][key]) is None else f"{far:.1%}" for key in DISTANCES),
+            *(ABSENT if (far := best[equation][key]) is None else f"{far:.1%}".replace("%", " %") for key in DISTANCES),
             best[equation]["verdict"],
         )
         for equation in dict.fromkeys(reading["equation"] for reading in readings)
     ]
+    header = ("equation", "constants found", "worst constant", "curve, rms", "verdict")
     return markdown_table(header, rows) if rows else ""
 
 
 def sections(contents: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
     paper = {name: c for name, c in contents.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
-    of_maps = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
     sets = _measured(contents, "delta_A")
     maps = [(owner, which, *(albedo_number(name, values[name]) for name in OF_MAP)) for owner, which, values in sets]
     tables = {
@@ -111,7 +110,7 @@ def sections(contents: Mapping[str, Content]) -> dict[str, str]:
         "hazard": _hazard(contents),
         "readings": _readings(contents),
         "inversion": _quality(_measured(contents, of := "inversion_error"), (f"mean {of}", f"largest {of}")),
-        "maps": markdown_table(of_maps, maps) if maps else "",
+        "maps": markdown_table(OF_MAPS, maps) if maps else "",
     }
     return {name: text for name, text in tables.items() if text}
 
