@@ -32,7 +32,7 @@ PLACES = {
     "short": README,
     **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/explanation/models.md"),
     **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/validation/paper.md"),
-    "check": ROOT / "docs/howto/engine.md",
+    "check": ROOT / "docs/validation/checks.md",
     "claims": ROOT / "docs/validation/claims.md",
 }
 MEASURED = ("laws", "check", "claims")
