@@ -31,7 +31,7 @@ PLACES = {
     "short": README,
     **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/explanation/models.md"),
     **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/validation/paper.md"),
-    "check": ROOT / "docs/howto/engine.md",
+    "check": ROOT / "docs/validation/checks.md",
     "claims": ROOT / "docs/validation/claims.md",
 }
 MEASURED = ("laws", "check", "claims")
@@ -82,7 +82,7 @@ def test_the_readme_is_two_screens_and_its_numbers_are_the_records_own():
     assert len(lines) <= 110
     shown = {(row[0], row[1]): row[2:] for row in rows_of("short")}
     burley = shown["burley", "published"]
-    assert f"is {100 * float(burley[1]):.0f} %, and {100 * float(burley[0]):.1f} % on average" in words
+    assert f"is {float(burley[1]):.0f} %, and {float(burley[0]):.1f} % on average" in words
 
 
 def test_figures_in_prose_are_the_bounds_of_the_claims_they_link_to():

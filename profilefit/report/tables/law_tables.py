@@ -226,18 +226,19 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
-    """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    of_measures = (f"{measure} {which}" for measure in ("rel", "ks") for which in ("mean", "worst"))
-    header = ("law", "constants", "light", "n", "number", *of_measures)
+    """Return a line a law: where it belongs, its constants, and its errors over alpha [%]."""
+    header = ("model", "constants", "illumination", "n", "mean error of R_d [%]", "largest [%]")
     rows = [
         (
             *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
-            str(len(one.law.constant_names())),
-            *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
+            *(
+                significant(PERCENT * float(of))
+                for of in (np.mean(quality.rel), np.max(quality.rel), np.max(quality.ks))
+            ),
         )
         for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
     ]
-    return markdown_table(header, rows)
+    return markdown_table((*header, "largest error of cumulative energy [%]"), rows)
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
