@@ -24,7 +24,7 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
 NAMES |= {"verdict", "law", "light", "sampler", "measure", "claim", "noise"}
-NAMES |= {"held against", "command", "stack", "channel"}
+NAMES |= {"held against", "command", "stack", "channel", "table", "phase function", "moments"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
 SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
@@ -180,12 +180,10 @@ def _text(cell: str) -> str:
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a GitHub table, names to the left and numbers to the right, every line filled to the same width.
+    """Return a GitHub table, names to the left and numbers to the right, without padding.
 
     What is in its cells begins no element and no further column.
     """
-    header, rows = [_text(cell) for cell in header], [[_text(cell) for cell in row] for row in rows]
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
-    lines = [header, rule, *rows]
-    return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)
+    rule = [":--" if name in NAMES else "--:" for name in header]
+    lines = [[_text(cell) for cell in header], rule, *([_text(cell) for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
