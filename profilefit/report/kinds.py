@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -193,7 +193,7 @@ def _sum_errors(sums: Mapping[str, Content]) -> Rows:
         errors = [max(max(of[count - 1]["rel"]) for of in both) for count in gaussians.COUNTS[1::2]]
         errors.append(max(max(of[DEFAULT - 1]["alone"]) for of in both))
         rows.append((name, *(f"{significant(100.0 * error)} %" for error in errors)))
-    return ("stack", *map(str, gaussians.COUNTS[1::2]), f"{DEFAULT}, variances per channel"), rows
+    return ("stack", *(f"{n} Gaussians" for n in gaussians.COUNTS[1::2]), f"{DEFAULT}, variances per channel"), rows
 
 
 def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
@@ -267,7 +267,7 @@ def phase_table(folder: Path) -> RenderableType | None:
 def _phase_fits(phases: Mapping[str, Content]) -> Rows:
     rows = [(name, *_measures(*one)) for name, content in phases.items() for one in _each(content)]
     bands = (f"{band}°" for band in OF_BANDS)
-    return ("table", "phase function", "moments", "all angles", *bands, "mean cosine", "backscattered"), rows
+    return ("table", "fit", "moments", "all angles", *bands, "mean cosine", "backscattered"), rows
 
 
 def _each(content: Content) -> list[tuple[str, str, Content]]:

@@ -24,7 +24,7 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
 NAMES |= {"verdict", "law", "light", "sampler", "measure", "claim", "noise"}
-NAMES |= {"held against", "command", "stack", "channel", "table", "phase function", "moments"}
+NAMES |= {"held against", "command", "stack", "channel", "table", "fit", "moments"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
 SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
