@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -186,12 +186,14 @@ def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
 
 
 def _sum_errors(sums: Mapping[str, Content]) -> Rows:
+    """Return the relative error of 2, 4, 6, 8 Gaussians [%], the largest of both illuminations and three channels."""
     rows: list[Row] = []
-    for (name, content), light in product(sums.items(), ILLUMINATIONS):
-        by_count = content["sums"][light]["by_count"]
-        worst = (*(max(one["rel"]) for one in by_count), max(by_count[DEFAULT - 1]["alone"]))
-        rows.append((name, light, *map(significant, worst)))
-    return ("stack", "light", *map(str, gaussians.COUNTS), f"{DEFAULT} each its own"), rows
+    for name, content in sums.items():
+        both = [content["sums"][light]["by_count"] for light in ILLUMINATIONS]
+        errors = [max(max(of[count - 1]["rel"]) for of in both) for count in gaussians.COUNTS[1::2]]
+        errors.append(max(max(of[DEFAULT - 1]["alone"]) for of in both))
+        rows.append((name, *(f"{significant(100.0 * error)} %" for error in errors)))
+    return ("stack", *(f"{n} Gaussians" for n in gaussians.COUNTS[1::2]), f"{DEFAULT}, variances per channel"), rows
 
 
 def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
@@ -264,16 +266,8 @@ def phase_table(folder: Path) -> RenderableType | None:
 
 def _phase_fits(phases: Mapping[str, Content]) -> Rows:
     rows = [(name, *_measures(*one)) for name, content in phases.items() for one in _each(content)]
-    return ("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows
-
-
-def _phase_errors(phases: Mapping[str, Content]) -> Rows:
-    rows = [
-        (name, *place, *_value_and_errors(one, ()), significant(largest_error(one)))
-        for name, content in phases.items()
-        for place, one in _phase_constants(content)
-    ]
-    return ("table", "form", "moments", "constant", "value", "error"), rows
+    bands = (f"{band}°" for band in OF_BANDS)
+    return ("table", "fit", "moments", "all angles", *bands, "mean cosine", "backscattered"), rows
 
 
 def _each(content: Content) -> list[tuple[str, str, Content]]:
@@ -340,9 +334,7 @@ TABLES: Mapping[str, KindTables] = {
             *map(Text, premise_lines(content)),
         ],
         lambda _, folder: phase_table(folder),
-        lambda _, folder: _sections(
-            phase.read, record.available(folder / PHASES), phase_fits=_phase_fits, phase_constants=_phase_errors
-        ),
+        lambda _, folder: _sections(phase.read, record.available(folder / PHASES), phase_fits=_phase_fits),
     ),
 }
 

@@ -36,7 +36,7 @@ OF_MAPS += ("monotone", "α at A = 1", "A at the fold")
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "constants found"})
 NAMES |= {"verdict", "law", "profile model", "model", "map", "source", "illumination", "light", "sampler", "measure"}
-NAMES |= {"claim", "noise", "held against", "command", "stack", "channel"}
+NAMES |= {"claim", "noise", "held against", "command", "stack", "channel", "table", "fit", "moments"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # Profile models of the README: the one in use, the best sum of Gaussians, and those of the lowest error.
 SHORT = {("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
