@@ -3,7 +3,6 @@
 import copy
 import io
 import math
-import re
 from collections import Counter
 
 import numpy as np
