@@ -43,7 +43,7 @@ def report(
         Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Write all of it as one HTML page, with figures and an explorer: two minutes.")
+        Path | None, typer.Option(help="Write one HTML page with an explorer and all tables; named records have their figures there.")
     ] = None,
     evidence: Annotated[
         Path | None,

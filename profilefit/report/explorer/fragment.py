@@ -45,15 +45,16 @@ _asset = partial(text_beside, __name__)
 SCRIPTS = ("exact", "laws", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")
 LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the ends of its slider
 ABOUT = (
-    "Each law runs here as the source that <code>profilefit export --lang glsl-es</code> writes, on this machine's "
-    "graphics processor, against the exact half space, isotropic, under a surface of refractive index n. The law "
-    "hazard follows n, by the source that <code>--n</code> writes; all others are of n = 1, and beside another n "
-    "show what that leaves out."
+    "Choose a material, for example skin1, or move the sliders. The balls and curves follow. Each colour channel has its "
+    "own reflectance A and mean free path l."
 )
 MEASURES = (
-    "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the reflected light; ks: largest error "
-    "of the cdf; edge: largest error within 3.5 l of an edge of light, as a share of A. The exact solution is a table, "
-    "right to 1e-5 where n = 1, to 5e-4 from n = 1.1 up, and to 3e-3 between."
+    "Errors are relative to the exact solution of a semi-infinite medium with isotropic scattering. Error of "
+    "R<sub>d</sub>: mean relative error for r from 0.01 l to 99.5 % of the reflected light. Error of cdf: largest "
+    "absolute error. Error at edge: largest error within 3.5 l of an edge of light, as a share of A. The exact "
+    "solution is read from a table. Its relative error is 1e-5 at n = 1, 5e-4 from n = 1.1 on, and 3e-3 between. "
+    "The graphics processor runs the source that <code>profilefit export --lang glsl-es</code> writes. Only hazard "
+    "follows n. All other models are made for n = 1."
 )
 
 

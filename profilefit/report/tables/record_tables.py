@@ -334,15 +334,15 @@ SUMMARIES = {
 }
 
 
-def summary(contents: Records) -> RenderableType:
-    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+def summary(contents: Records, glyphs: bool = True) -> RenderableType:
+    """Return profile laws, inverse cdfs, maps, and comparisons of readings, each kind in a table, errors as glyphs too."""
     groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
     readings = {name: content for name, content in contents.items() if content["pipeline"] == "evidence"}
     for name, content in contents.items():
         if name not in readings:
             is_of = (measure for measure in ("delta_A", "rel") if records.measures(content, measure))
             groups[next(is_of, "inversion_error")][name] = content
-    shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
+    shown = [_summary_table(measure, group, glyphs) for measure, group in groups.items() if group]
     if readings:
         lines = []
         for content in readings.values():
@@ -357,7 +357,7 @@ def summary(contents: Records) -> RenderableType:
     return Group(*parts, *failures, Text(CAPTION, style="dim"))
 
 
-def _summary_table(measure: str, contents: Records) -> RenderableType:
+def _summary_table(measure: str, contents: Records, glyphs: bool) -> RenderableType:
     """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
     title, headers = SUMMARIES[measure]
     columns = {
@@ -368,7 +368,7 @@ def _summary_table(measure: str, contents: Records) -> RenderableType:
     }
     if measure == "rel":
         columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in contents.values()]
-    if measure != "delta_A":
+    if glyphs and measure != "delta_A":
         rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in contents.values()]
         columns["over α"] = [cells.spark(row, cells.span(rows), SPARK) for row in rows]
     return column_table(title, columns, left=("record", "over α"))
