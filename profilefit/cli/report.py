@@ -43,7 +43,7 @@ def report(
         Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Write one HTML page with an explorer and all tables; named records have their figures there.")
+        Path | None, typer.Option(help="Write one page with an explorer and all tables; with figures of named records.")
     ] = None,
     evidence: Annotated[
         Path | None,

@@ -47,11 +47,11 @@ def section(id_: str, title: str, parts: Iterable[str]) -> str:
 
 def gallery(drawings: Mapping[str, str], group: str) -> str:
     """Return thumbnails by their titles: a click, or the space bar, enlarges one of them and shrinks the others."""
-    shown = (
-        details(f'<span class="wide">{drawn}</span><span class="dim">{escape(title)}</span>', "", "", False, group, "thumb")
-        for title, drawn in drawings.items()
-    )
-    return element("div", "\n".join(shown), class_="gallery") if drawings else ""
+    shown = []
+    for title, drawn in drawings.items():
+        small = element("span", drawn, class_="wide") + element("span", escape(title), class_="dim")
+        shown.append(details(small, "", group=group, class_="thumb"))
+    return element("div", "\n".join(shown), class_="gallery") if shown else ""
 
 
 def figure(drawn: str, title: str, on_paper: bool = False) -> str:

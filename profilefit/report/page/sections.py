@@ -72,7 +72,7 @@ def _remake_lines(contents: Mapping[str, Content], named: bool = True) -> list[s
 
 # What a figure shows, by how its name begins.
 CAPTIONS = {
-    "liang-7-profile": "Equation (7): r R_d by photons, by the exact solution, by the printed and by the fitted constants.",
+    "liang-7-profile": "Equation (7): r R_d by photons, by the exact solution, by printed and by fitted constants.",
     "liang-7-error": "Relative error of R_d by equation (7). The band holds photon noise and model error.",
     "liang-8-albedo": "The albedo inversion, equation (8), and its errors to the right.",
     "liang-11-a": "Coefficient a of equation (7) over the albedo: printed, and fitted again.",
@@ -81,7 +81,7 @@ CAPTIONS = {
     "liang-19-inverse": "The inverse cdf, equations (19) and (20): printed, fitted again, and exact.",
     "inversion-error": "Largest error of inverse cdfs, as a share of the reflected light, over the albedo.",
     "constants": "Each constant as printed and as fitted again. z is the difference, divided by its standard error.",
-    "quality": "Errors of profile models over the reduced albedo, at albedos that were not fitted.",
+    "quality": "Errors of profile models over the reduced albedo, at held-out albedos.",
     "residuals": "Residuals of the fit: the model divided by the data, minus 1, with the standard errors of the data.",
 }
 WHOLE = {"quality": "Errors of all records by albedo", "constants": "Printed constants and fitted ones"}
@@ -94,11 +94,18 @@ FITTED = (
     "mean free path 1 / (mu_s' + mu_a). R_d(r) is the reflected light per area at the distance r. The cdf is the share "
     "of the reflected light within r. n is the refractive index, and g the mean cosine of scattering.",
 )
-RECORDS = "Each line opens one record: its constants with standard errors, the fit, and its errors by albedo."
-PROMISES = (
-    "The documentation states figures of accuracy and speed. Each row compares one figure with its last measurement. "
-    "The rows are grouped by the command that measures them again."
-)
+INTRO = {  # of sections, in words
+    "records": "Each line opens one record: its constants with standard errors, the fit, and its errors by albedo.",
+    "quality": "Each curve is one model. Its errors are relative to the exact solution, at held-out albedos.",
+    "stacks": "These records describe media of two or three layers, for example skin. A click enlarges a picture.",
+    "tradeoff": "Each chart compares techniques by error and time. Techniques on the lower left are accurate and fast.",
+    "stability": "Each model was evaluated at many albedos and radii, in several arithmetics, for example float32. Red "
+    "cells mark values that fail.",
+    "check": "Exported shader sources ran on the device below. The tables compare their values with the reference.",
+    "claims": "The documentation states figures of accuracy and speed. Each row compares one figure with its last "
+    "measurement. Each line below is the command that measures again.",
+    "provenance": "Checksums and seeds identify the data of each record.",
+}
 KINDS = {"delta_A": "albedo inversion", "rel": "profile model", "inversion_error": "inverse cdf"}  # by their measures
 LIGHT = {"searchlight": "pencil beam", "diffuse": "diffuse illumination"}
 
@@ -166,9 +173,9 @@ def fitted(source: Source) -> str:
     """Return what the records are, in words, and all of them in tables, folded."""
     contents = {name: source.content(name) for name in source.paths}
     kinds = Counter(in_words(one).partition(",")[0] for one in contents.values())
-    listed = "".join(element("li", f"{escape(kind)}: {count}") for kind, count in kinds.items())
+    listed = ", ".join(f"{kind} ({count})" for kind, count in kinds.items())
     table = details("Largest errors of every record", markup(summary(contents, glyphs=False)))
-    return "".join(map(paragraph, FITTED)) + element("ul", listed) + table
+    return "".join(map(paragraph, (*FITTED, f"Records by kind: {listed}."))) + table
 
 
 ALL = "all"
@@ -187,7 +194,8 @@ class EvidenceFolder:
 
     def section(self, name: str, parts: Callable[[EvidenceFolder, Content], Iterator[str]]) -> str:
         """Return the parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
-        missing = paragraph("Not measured here. This command measures it:", "dim") + command(f"profilefit {name} --out evidence")
+        line = command(f"profilefit {name} --out evidence")
+        missing = paragraph("Not measured here. This command measures it:", "dim") + line
         try:
             content = self.content(name)
             shown: Iterable[str] = [missing] if content is None else parts(self, content)
@@ -287,12 +295,12 @@ def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
-    for key, (title, measures) in GROUPS.items():
-        errors = (f"{MEASURES[name].symbol}\n{of}" for name in measures for of in ("model", "float32"))
+    for key, (title, names) in GROUPS.items():
+        errors = (f"{MEASURES[name].symbol}\n{of}" for name in names for of in ("model", "float32"))
         header, rows = ("law", "result", "light", "n", *errors, "bad\ninside", "bad\noutside"), []
         for one in content[key]:
             setting = (one["setting"]["illumination"], f"{one['setting']['n']:g}")
-            known = (of.get(name) for name in measures for of in (one["model"]["values"], one["rounding"]))
+            known = (of.get(name) for name in names for of in (one["model"]["values"], one["rounding"]))
             bad = (sum(v for v in one[place].values() if isinstance(v, int)) for place in ("inside", "outside"))
             result = "FAIL" if one["broken"] else "pass"
             rows.append((_label(one), result, *setting, *map(significant, known), *map(str, bad)))
@@ -305,7 +313,8 @@ def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
         columns = {"source": list(costs)}
         for work in next(iter(costs.values()))["ns"]:
             columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
-        yield details("Time of one evaluation", markup(column_table("", columns, COSTS, left=("source",))), group="shader")
+        table = column_table("", columns, COSTS, left=("source",))
+        yield details("Time of one evaluation", markup(table), group="shader")
 
 
 def _label(content: Content) -> str:
@@ -333,7 +342,7 @@ def speed(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     for name in CHARTS:
         if name in content:  # parts may have been measured on different days
             numbers = evidence.origin({"made": content["made"], **content[name]}) + _numbers(content[name])
-            yield details(f"Numbers: {name}", numbers, group="tradeoff")
+            yield details(f"Numbers: {CHARTS[name].partition(':')[0].lower()}", numbers, group="tradeoff")
 
 
 def _numbers(part: Content) -> str:
@@ -384,7 +393,6 @@ def promises(evidence: EvidenceFolder) -> Iterator[str]:
     if (evidence.folder / FILE).exists():
         made, claims = read_claims(evidence.folder)
         yield evidence.origin({"made": made})
-        yield paragraph(PROMISES)
         commands = dict.fromkeys(one.command for one in claims)
         for line, table in zip(commands, claim_tables(claims), strict=True):
             yield details(element("code", escape(line)), markup(table), group="claims")

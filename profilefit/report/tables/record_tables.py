@@ -335,7 +335,7 @@ SUMMARIES = {
 
 
 def summary(contents: Records, glyphs: bool = True) -> RenderableType:
-    """Return profile laws, inverse cdfs, maps, and comparisons of readings, each kind in a table, errors as glyphs too."""
+    """Return profile laws, inverse cdfs, maps, and comparisons of readings, each kind in a table, `glyphs` too."""
     groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
     readings = {name: content for name, content in contents.items() if content["pipeline"] == "evidence"}
     for name, content in contents.items():
