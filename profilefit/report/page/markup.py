@@ -49,7 +49,7 @@ def gallery(drawings: Mapping[str, str], group: str) -> str:
     """Return thumbnails by their titles: a click, or the space bar, enlarges one of them and shrinks the others."""
     shown = []
     for title, drawn in drawings.items():
-        small = element("span", drawn, class_="wide") + element("span", escape(title), class_="dim")
+        small = element("span", drawn, class_="wide paper") + element("span", escape(title), class_="dim")
         shown.append(details(small, "", group=group, class_="thumb"))
     return element("div", "\n".join(shown), class_="gallery") if shown else ""
 

@@ -234,14 +234,14 @@ class EvidenceFolder:
         """Return when, where and by which command it was measured, and whether the records have changed since."""
         made = content["made"]
         machine = made.get("machine") or {}
-        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
+        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by:"
         parts = [paragraph(when, "dim"), command(str(made.get("command")))]
         if content.get("of", ALL) != ALL:
             of = content["of"]
             listed = ", ".join(of) if isinstance(of, list) else str(of)
             parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
         if stale(made, self.records):
-            parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
+            parts.append(paragraph("Records or version have changed since then: run it again.", "red"))
         return "\n".join(parts)
 
 
@@ -292,7 +292,7 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
 def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     """Yield the parts of its section."""
     yield evidence.origin(content)
-    counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
+    counts = " and ".join(f"{len(content[key])} {title.split(' in ')[0].lower()}" for key, (title, _) in GROUPS.items())
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, names) in GROUPS.items():
@@ -376,12 +376,12 @@ def failures(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
         groups.setdefault(sentence or UNKNOWN, []).append(region)
     rows = dict(sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]})))
     columns = {
-        "laws": [str(len({one["law"] for one in group})) for group in rows.values()],
+        "models": [str(len({one["law"] for one in group})) for group in rows.values()],
         "cells": [str(sum(int(one["count"]) for one in group)) for group in rows.values()],
-        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows.values()],
+        "result": [", ".join(sorted({one["class"] for one in group})) for group in rows.values()],
         "what helps": list(rows),
     }
-    yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
+    yield markup(column_table("Where cells are red, and what helps", columns, left=("result",), fold=("what helps",)))
     paths = {path: path.stem.removeprefix(ATLAS).replace("-", " ") for path in evidence.folder.glob(f"{ATLAS}*.svg")}
     titles = {f"Arithmetic: {words}": path for path, words in sorted(paths.items())}
     yield paragraph("One map for each arithmetic. One cell is one albedo and one radius (or share of the light).")

@@ -112,7 +112,7 @@ def _derived_table(derived: Content, surface: str = "") -> RenderableType:
         rows.append((f"{alpha:g}", to_error(value, largest), *map(significant, errors)))
     quantity, title = DERIVED[derived["quantity"]]
     header = ("α", quantity, "± photons", "± model")
-    caption = "model: how far the law is from the truth; one standard error each"
+    caption = "model: error of the profile model relative to the reference; each is one standard error"
     return row_table(title + surface, header, rows, caption, ("α",), aligned=header[1:])
 
 
@@ -197,7 +197,7 @@ def title_of(content: Content) -> RenderableType:
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
-        ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
+        ("reference", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
     if a := protocol.get("albedos"):
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
@@ -320,17 +320,16 @@ REPRODUCED_CAPTION = (
     f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
 )
 CAPTION = (
-    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
-    "regenerated. "
-    "`profilefit report NAME` has constants, errors and quality by α."
+    "Each error is the largest over the albedo α, and over n where a record holds for several. Two or three errors "
+    "belong to printed, corrected and regenerated constants. `profilefit report NAME` prints constants and errors by α."
 )
 
 
 # Measure that a kind of records has, by which one knows them -> title, and measures by their headers.
 SUMMARIES = {
-    "rel": ("Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)", {"rel": "rel"}),
-    "inversion_error": ("Inverse cdfs: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
-    "delta_A": ("Maps between A and α", {"max error of A": "delta_A", "of √(1 − α)": "largest_s"}),
+    "rel": ("Profile models: mean relative error of R_d (rel), largest error of the cdf (ks)", {"rel": "rel"}),
+    "inversion_error": ("Inverse cdfs: largest error |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
+    "delta_A": ("Albedo inversions: largest errors", {"of A": "delta_A", "of √(1 − α)": "largest_s"}),
 }
 
 
@@ -350,7 +349,7 @@ def summary(contents: Records, glyphs: bool = True) -> RenderableType:
             good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
             lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
         columns = {"record": list(readings), "found": lines}
-        shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
+        shown.append(column_table("Readings of a paper where it leaves a choice", columns, left=("record", "found")))
     failed = {name: content["fit"]["result"] for name, content in contents.items() if "fit" in content}
     failures = [Text(f"{name}: {text}", style="red") for name, text in failed.items() if text != "converged"]
     parts = [part for table in shown for part in (table, Text())]
