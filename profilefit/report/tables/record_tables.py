@@ -112,7 +112,7 @@ def _derived_table(derived: Content, surface: str = "") -> RenderableType:
         rows.append((f"{alpha:g}", to_error(value, largest), *map(significant, errors)))
     quantity, title = DERIVED[derived["quantity"]]
     header = ("α", quantity, "± photons", "± model")
-    caption = "model: how far the law is from the truth; one standard error each"
+    caption = "model: error of the profile model relative to the reference; each is one standard error"
     return row_table(title + surface, header, rows, caption, ("α",), aligned=header[1:])
 
 
@@ -197,7 +197,7 @@ def title_of(content: Content) -> RenderableType:
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
-        ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
+        ("reference", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
     if a := protocol.get("albedos"):
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
@@ -320,29 +320,28 @@ REPRODUCED_CAPTION = (
     f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
 )
 CAPTION = (
-    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
-    "regenerated. "
-    "`profilefit report NAME` has constants, errors and quality by α."
+    "Each error is the largest over the albedo α, and over n where a record holds for several. Two or three errors "
+    "belong to printed, corrected and regenerated constants. `profilefit report NAME` prints constants and errors by α."
 )
 
 
 # Measure that a kind of records has, by which one knows them -> title, and measures by their headers.
 SUMMARIES = {
-    "rel": ("Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)", {"rel": "rel"}),
-    "inversion_error": ("Inverse cdfs: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
-    "delta_A": ("Maps between A and α", {"max error of A": "delta_A", "of √(1 − α)": "largest_s"}),
+    "rel": ("Profile models: mean relative error of R_d (rel), largest error of the cdf (ks)", {"rel": "rel"}),
+    "inversion_error": ("Inverse cdfs: largest error |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
+    "delta_A": ("Albedo inversions: largest errors", {"of A": "delta_A", "of √(1 − α)": "largest_s"}),
 }
 
 
-def summary(contents: Records) -> RenderableType:
-    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+def summary(contents: Records, glyphs: bool = True) -> RenderableType:
+    """Return profile laws, inverse cdfs, maps, and comparisons of readings, each kind in a table, `glyphs` too."""
     groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
     readings = {name: content for name, content in contents.items() if content["pipeline"] == "evidence"}
     for name, content in contents.items():
         if name not in readings:
             is_of = (measure for measure in ("delta_A", "rel") if records.measures(content, measure))
             groups[next(is_of, "inversion_error")][name] = content
-    shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
+    shown = [_summary_table(measure, group, glyphs) for measure, group in groups.items() if group]
     if readings:
         lines = []
         for content in readings.values():
@@ -350,14 +349,14 @@ def summary(contents: Records) -> RenderableType:
             good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
             lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
         columns = {"record": list(readings), "found": lines}
-        shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
+        shown.append(column_table("Readings of a paper where it leaves a choice", columns, left=("record", "found")))
     failed = {name: content["fit"]["result"] for name, content in contents.items() if "fit" in content}
     failures = [Text(f"{name}: {text}", style="red") for name, text in failed.items() if text != "converged"]
     parts = [part for table in shown for part in (table, Text())]
     return Group(*parts, *failures, Text(CAPTION, style="dim"))
 
 
-def _summary_table(measure: str, contents: Records) -> RenderableType:
+def _summary_table(measure: str, contents: Records, glyphs: bool) -> RenderableType:
     """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
     title, headers = SUMMARIES[measure]
     columns = {
@@ -368,7 +367,7 @@ def _summary_table(measure: str, contents: Records) -> RenderableType:
     }
     if measure == "rel":
         columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in contents.values()]
-    if measure != "delta_A":
+    if glyphs and measure != "delta_A":
         rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in contents.values()]
         columns["over α"] = [cells.spark(row, cells.span(rows), SPARK) for row in rows]
     return column_table(title, columns, left=("record", "over α"))
