@@ -1,4 +1,4 @@
-"""A profile and its colour: how much red, green and blue leaves skin at each distance from a point of light.
+"""Profile and colour: red, green and blue light that leaves skin at each distance from its entry.
 
 python examples/01_profile_and_colour.py
 """
@@ -8,7 +8,7 @@ import numpy as np
 import profilefit
 from mcml_sim import Setting
 
-light = Setting("diffuse", n=1.4)  # light from everywhere, as a renderer blurs it, on skin
+light = Setting("diffuse", n=1.4)  # diffuse illumination of skin
 colour = np.array([0.65, 0.40, 0.30])  # total reflectance of red, green, blue [-]
 mfp = np.array([1.2, 0.8, 0.55])  # transport mean free path [mm]
 

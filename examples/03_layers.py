@@ -1,11 +1,11 @@
-"""Layers with error bars: light that leaves two layers of skin, traced, with a standard error for each annulus.
+"""Layers: trace light through two layers of skin, with a standard error for each annulus.
 
 python examples/03_layers.py
 """
 
 from mcml_sim import Grid, Layer, Medium, simulate
 
-epidermis = Layer(n=1.4, mu_a=0.3, mu_s=5.0, g=0.8, thickness=0.1)  # 1/mm and mm
+epidermis = Layer(n=1.4, mu_a=0.3, mu_s=5.0, g=0.8, thickness=0.1)  # coefficients in 1/mm, thickness in mm
 dermis = Layer(n=1.4, mu_a=0.03, mu_s=10.0, g=0.9, thickness=2.0)
 grid = Grid(dr=0.25, nr=8)
 tally = simulate(Medium((epidermis, dermis)), grid, photons=50_000, seed=1)

@@ -1,4 +1,4 @@
-"""Your own data: the medium that explains a measured profile, with intervals.
+"""Your own data: fit a medium to a measured profile, with 95 % intervals.
 
 python examples/04_own_data.py [phantom.csv]
 """

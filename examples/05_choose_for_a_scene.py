@@ -1,4 +1,4 @@
-"""A choice for a scene: the cheapest way to scatter light within its tolerance and its budget.
+"""Choose the cheapest scattering technique within the tolerance and budget of a scene.
 
 python examples/05_choose_for_a_scene.py [skin.toml]
 """
@@ -9,7 +9,7 @@ from pathlib import Path
 from profilefit.studies.choose import choose, read, shipped
 
 scene = read(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "skin.toml")
-choice = choose(scene, shipped())  # with costs as they were measured for this release
+choice = choose(scene, shipped())  # with costs measured for this release
 
 one = choice.chosen
 if one is None:

@@ -4,6 +4,6 @@
 #SBATCH --mem=2G
 #SBATCH --time=04:00:00
 #SBATCH --requeue
-# sbatch array.sh, and when all tasks have ended: python share.py
+# Submit: sbatch array.sh. After all tasks: python share.py
 set -eu
 python share.py "$SLURM_ARRAY_TASK_ID" "$SLURM_ARRAY_TASK_COUNT"

@@ -1,4 +1,4 @@
-"""A cluster of two processes on this machine, to try: python local_cluster.py."""
+"""Run on a cluster of two processes on this machine: python local_cluster.py."""
 
 from distributed import LocalCluster
 

@@ -1,4 +1,4 @@
-"""One run on the workers of a Dask scheduler: python on_a_cluster.py tcp://host:8786 [photons]."""
+"""Run on the workers of a Dask scheduler: python on_a_cluster.py tcp://host:8786 [photons]."""
 
 import sys
 
@@ -6,10 +6,10 @@ from mcml_sim import Grid, Setting, simulate_orders
 
 address, photons = sys.argv[1], int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000_000
 light = simulate_orders(
-    Grid(dr=0.05, nr=400),  # rings [mfp]
+    Grid(dr=0.05, nr=400),  # annuli [1 / (mu_s + mu_a)]
     photons,
     setting=Setting("diffuse", n=1.4),
-    store="skin.photons",  # each finished batch; the same command goes on from here
+    store="skin.photons",  # finished batches; the same command resumes
     scheduler=address,
 )
 found = light.reflectance(0.9)

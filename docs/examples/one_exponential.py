@@ -10,7 +10,7 @@ from profilefit.laws.rational import Rational
 
 class OneExponential(EscapeLaw):
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)  # the map to A, held
+    albedo: Rational = eqx.field(static=True)  # albedo inversion, fixed
     q0: float
     q1: float
     q2: float
@@ -25,7 +25,7 @@ class OneExponential(EscapeLaw):
     def scaled_cdf(self, x, alpha):
         return -jnp.expm1(-self.rate(alpha) * x)
 
-    def source_strength(self, alpha):  # EscapeLaw's is the exact one, which this form does not have
+    def source_strength(self, alpha):  # this form lacks the exact one of EscapeLaw
         return self.albedo.reflectance(alpha) * self.rate(alpha)
 
     @property

@@ -1,26 +1,27 @@
-// Light scattered in layers, by samples of a stack's law. Include the text of skin before it.
-uniform sampler2D irradiance; // cosine-weighted light that arrives at each point, red, green, blue [any unit]
-uniform sampler2D thickness;  // of the first layer at each point [the record's unit, mm]
-uniform vec2 texel;           // the length of one texture coordinate [mm]
+// Subsurface scattering in layers, by samples of a stack's profile model.
+// Include the source of skin before it.
+uniform sampler2D irradiance; // diffuse irradiance in red, green and blue [any unit]
+uniform sampler2D thickness;  // of the first layer at each point [mm]
+uniform vec2 texel;           // length of one texture coordinate [mm]
 
 const int SAMPLES = 32;
 
 vec3 radiance(vec2 uv) {
     vec3 found = vec3(0.0);
     for (int c = 0; c < 3; c++) {
-        skin_Shape s = skin_shape(float(c), texture(thickness, uv).r); // once a point and channel
+        skin_Shape s = skin_shape(float(c), texture(thickness, uv).r); // once per point and channel
         float light = 0.0;
         float weights = 0.0;
         for (int i = 0; i < SAMPLES; i++) {
-            float x = skin_radius((float(i) + 0.5) / float(SAMPLES), s); // r / l, l that of the first layer, s.mfp
-            float turn = 2.39996323 * float(i);                          // the golden angle spreads them around
+            float x = skin_radius((float(i) + 0.5) / float(SAMPLES), s); // r / s.mfp
+            float turn = 2.39996323 * float(i);                          // golden angle
             vec2 there = uv + s.mfp * x * vec2(cos(turn), sin(turn)) / texel;
-            // 2 pi x R_d / A over the density of this very map: 1 in the mean, since the law also takes light away
+            // weight: 2 pi x R_d / A over the density of the sampler, 1 on average
             float weight = skin_density(x, s) / skin_radius_density(x, s);
             light += weight * texture(irradiance, there)[c];
             weights += weight;
         }
-        found[c] = skin_reflectance(s) * light / (3.14159265 * weights); // so that even light gives A / pi exactly
+        found[c] = skin_reflectance(s) * light / (3.14159265 * weights); // uniform light gives exactly A / pi
     }
     return found;
 }

@@ -5,8 +5,8 @@
 #SBATCH --mem-per-cpu=2G
 #SBATCH --time=04:00:00
 #SBATCH --requeue
-# sbatch slurm.sh COMMAND ... runs the command once; @ in it becomes the address
-# of a scheduler that has the tasks of this job for workers.
+# sbatch slurm.sh COMMAND ... runs the command once. It replaces @ with the address
+# of a scheduler whose workers are the tasks of this job.
 set -eu
 port=$((20000 + ${SLURM_JOB_ID:-0} % 20000))
 address=tcp://$(hostname):$port

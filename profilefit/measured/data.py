@@ -121,12 +121,12 @@ class Facts(Declared):
         spellings="g, anisotropy, anisotropy g, anisotropy factor, anisotropy factor g, mean cosine, asymmetry",
     )] = (0.0, 0.0)  # fmt: skip
     beam: Annotated[Beam, BeforeValidator(_beam), words(
-        "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or a range of it (0.3mm:0.7mm), fwhm:0.6mm, its "
-        f"full width at half maximum, tophat:0.5mm, a radius, or a .csv file (units: {KNOWN_UNITS})",
-        spellings="beam, beam radius, spot radius, 1/e^2 radius, 1/e2 radius, 1/e² radius", unit="that of r or its own",
+        "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or its range (0.3mm:0.7mm), fwhm:0.6mm, its full "
+        f"width at half maximum, tophat:0.5mm, the radius of a disc, or a .csv file (units: {KNOWN_UNITS})",
+        spellings="beam, beam radius, spot radius, 1/e^2 radius, 1/e2 radius, 1/e² radius", unit="by default that of r",
     )] = ("", ())  # fmt: skip
     fibre: Annotated[float, BeforeValidator(_size), words(
-        f"a length > 0 such as 1.2mm (units: {KNOWN_UNITS})", unit="that of r or its own",
+        f"a length > 0 such as 1.2mm (units: {KNOWN_UNITS})", unit="by default that of r",
         spellings="fibre, fibre radius, fibre core radius, fiber, fiber radius, fiber core radius, core radius",
     )] = 0.0  # fmt: skip
     unit: Annotated[Unit, words(spellings="unit, units, unit of r, units of r, unit of length, length unit")] = ""

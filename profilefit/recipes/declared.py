@@ -78,8 +78,8 @@ class NumberRange:
     @property
     def words(self) -> str:
         """Accepted values in words."""
-        limits = f" and >= {self.least:g}" * (self.least > 0) + f" and <= {self.most:.3g}" * (self.most < inf)
-        return f"a number > 0{limits}, or two of them, the smaller first"
+        limits = f"in {self.least:g} ... {self.most:g}" if self.least else f"> 0 and <= {self.most:.3g}"
+        return f"a number {limits.removesuffix(' and <= inf')}, or two of them, the smaller first"
 
     def read(self, value: Any) -> Range:
         """Return both ends; Refused on any other value."""
@@ -205,15 +205,13 @@ def accepted(schema: Table) -> str:
     if kind == "boolean":
         return "true or false"
     if kind == "string":
-        most = schema.get("maxLength")
-        return f"a text of {most} characters at most" if most else "a text"
+        return f"a text of {schema['maxLength']} characters at most" if "maxLength" in schema else "a text"
     if kind == "array":
         items = schema["prefixItems"]
         return accepted(items[0]).replace("a ", f"{COUNTS[len(items)]} ", 1).replace("number", "numbers", 1)
     noun = "a number" if kind == "number" else "a whole number"
     least, above, most = (schema.get(key) for key in ("minimum", "exclusiveMinimum", "maximum"))
-    bounds = [(">=", least), (">", above), ("<=", most)]
-    told = [(sign, f"{bound:.10g}") for sign, bound in bounds if bound is not None]
+    told = [(sign, f"{at:.10g}") for sign, at in ((">=", least), (">", above), ("<=", most)) if at is not None]
     if least is not None and most is not None:
         return f"{noun} in {told[0][1]} ... {told[1][1]}"
     if not told and kind == "number":

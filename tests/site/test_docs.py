@@ -1,6 +1,8 @@
 """The documentation: every name has its place, examples run as they are printed, the site needs no network."""
 
 import importlib
+import io
+import json
 import os
 import re
 import runpy
@@ -10,6 +12,7 @@ import sys
 from itertools import product
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import typer
@@ -21,7 +24,7 @@ from profilefit import cli
 from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.folder import STACKS
 from profilefit.recipes.kinds import stack
-from profilefit.shader.law_file import export
+from profilefit.shader.law_file import export, export_subject
 from profilefit.shader.stack_text import export_stack
 from tests.site.test_wheel import run
 
@@ -154,6 +157,19 @@ def test_the_shader_that_is_printed_compiles(tmp_path, printed, call):
     path = tmp_path / "scatter.frag"
     path.write_text(f"#version 330\n{law}{(EXAMPLES / f'{printed}.glsl').read_text()}{main}", encoding="utf-8")
     run("glslangValidator", path)
+
+
+@pytest.mark.slow
+def test_the_first_page_draws_light_that_bleeds_into_the_shadow(tmp_path, open_page):
+    law = export_subject("hazard-diffuse", "glsl-es", fits=FITS, n=1.4)
+    text = (EXAMPLES / "edge.html").read_text(encoding="utf-8")
+    assert text.count('await (await fetch("skin.glsl")).text()') == 1
+    page = text.replace('await (await fetch("skin.glsl")).text()', json.dumps(law))
+    (tmp_path / "edge.html").write_text(page, encoding="utf-8")
+    drawn = plt.imread(io.BytesIO(open_page(tmp_path / "edge.html").locator("canvas").screenshot()))[..., :3]
+    shadow, bleeding = drawn[75, 500], drawn[225, 500]
+    assert not shadow.any()
+    assert bleeding[0] > bleeding[1] > bleeding[2] > 0.01, "red travels farthest"
 
 
 def test_the_recipe_that_is_printed_is_one():

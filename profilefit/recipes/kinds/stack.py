@@ -47,7 +47,7 @@ TRACED_NOTE = (
 BY_THICKNESS = ("thickness", "rel", "ks", "delta_A")  # errors of an interface where none was fitted
 EQUAL = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
-STARTS = f"lists of {', '.join(StackLaw.constant_names())}, one an interface: w in (0, 1), all but u > 0"
+STARTS = f"lists of {', '.join(StackLaw.constant_names())}, one per interface: w in (0, 1), all but u > 0"
 OF_SCENES = ("scene", "surface", "uneven", "pose", "technique", "camera", "light", "choose")  # tables and keys
 
 
@@ -153,7 +153,7 @@ class ShownStack(WholeRecord, LawRecord):
         for channel, tables in self.interfaces.items():
             for key, rows in tables.items():
                 if len(rows) != count:
-                    raise Refused(f"{count}, one an interface", len(rows), "interfaces", channel, key)
+                    raise Refused(f"{count}, one per interface", len(rows), "interfaces", channel, key)
             for number, row in enumerate(tables["quality"]):
                 if len(set(map(len, row.values()))) > 1:
                     raise Refused("lists of one length", row, "interfaces", channel, "quality", number)

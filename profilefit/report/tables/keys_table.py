@@ -17,16 +17,16 @@ from profilefit.scenes import SCENES
 from profilefit.studies.choose.requirements import ChooseFile
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-Key = tuple[str, str, str, object]
+COLUMNS = "| keys | accepted values | default |\n|---|---|---|"
 HEAD = """# Keys of every file
 
-What each file of `profilefit` may say, from the models that check it. `profilefit schema KIND` prints those of TOML
-files as JSON Schema, by which editors complete and check keys. Tables of data have columns, and facts in comments.
+Files of `profilefit` accept these keys. Comments in the files of `profilefit examples` explain them, with units.
+The command `profilefit schema KIND` prints JSON Schema, with which editors complete and check keys of TOML files.
 """
 
 
 def models() -> dict[str, tuple[type[Declared], ...]]:
-    """Return the models of each kind of file: of a scene those of `SCENES`, of "choose" what it reads besides."""
+    """Return the models of each kind of file: for a scene one per kind, for "choose" its further table."""
     scenes = tuple(import_module(home).read.__self__ for home, _ in SCENES.values())
     return {"scene": scenes, "stack": (StackRequest,), "recipe": (Recipe,), "photo": (Setup,), "choose": (ChooseFile,)}
 
@@ -38,47 +38,49 @@ def schema_of(kinds: Sequence[type[Declared]]) -> Table:
     return {"$schema": DIALECT, **(one_of[0] if len(one_of) == 1 else {"oneOf": one_of}), **known}
 
 
-def keys(model: type[Declared]) -> Iterator[Key]:
-    """Yield table, key, accepted values and default of each key of a file; the default is None where there is none."""
-    whole = model.model_json_schema()
+def tables(model: type[Declared]) -> Iterator[tuple[str, str]]:
+    """Yield each table of a file, its name and itself in Markdown; keys with equal values and default share a row."""
+    whole, rows = model.model_json_schema(), dict[tuple[str, str, str], list[str]]()
 
-    def within(table: str, schema: Table) -> Iterator[Key]:
+    def within(table: str, schema: Table) -> None:
         for key, value in schema["properties"].items():
-            inner = resolved(value, whole.get("$defs", {}), True)
-            name = f"{table}.{key}".removeprefix(".")
-            if "properties" in inner:
-                yield from within(name, inner)
-            elif "properties" in inner.get("items", {}):
-                yield from within(f"[{name}]", inner["items"])
-            plain = resolved(value, whole.get("$defs", {}), False)
-            if "properties" not in plain and "properties" not in plain.get("items", {}):
-                yield table, key, accepted(plain), value.get("default")
+            inner, plain = (resolved(value, whole.get("$defs", {}), is_table) for is_table in (True, False))
+            name = f"{table.strip('[]')}.{key}".removeprefix(".")
+            for label, below in ((name, inner), (f"[{name}]", inner.get("items", {}))):
+                if "properties" in below:
+                    within(label, below)
+            if "properties" not in {*plain, *plain.get("items", {})}:
+                rows.setdefault((table, accepted(plain), code(value.get("default"))), []).append(code(key))
 
-    yield from within("", whole)
+    within("", whole)
+    for table in dict.fromkeys(at for at, *_ in rows):
+        lines = (f"| {', '.join(names)} | {row[1]} | {row[2]} |" for row, names in rows.items() if row[0] == table)
+        yield code(table and f"[{table}]") or "Top of the file", "\n".join([COLUMNS, *lines, ""])
 
 
-def data_rows() -> Iterator[str]:
-    """Yield a row for each fact and column of tables of data: name, accepted spellings, accepted values and unit."""
-    for of, model in (("fact", Facts), ("column", ProfileColumns), ("phase function's column", PhaseColumns)):
-        for name, schema in model.model_json_schema()["properties"].items():
-            spellings = ", ".join(map(code, schema["spellings"].split(", ")))
-            unit = accepted(schema) if "cells" in schema else schema.get("unit", "")
-            yield f"| {of} {code(name)} | {spellings} | {schema.get('cells', accepted(schema))} | {unit} |"
+def data_names() -> Iterator[str]:
+    """Yield the facts and columns of tables of data, as definitions: accepted spellings, values and unit."""
+    for title, model in (("Facts", Facts), ("Columns", ProfileColumns), ("Columns of a phase function", PhaseColumns)):
+        yield f"**{title}**\n"
+        for schema in model.model_json_schema()["properties"].values():
+            unit = (accepted(schema) if "cells" in schema else schema.get("unit", "")).removeprefix("in ")
+            names = ", ".join(map(code, schema["spellings"].split(", ")))
+            yield f"{names}\n: {schema.get('cells', accepted(schema))}{unit and f'; unit: {unit}'}\n"
 
 
 def code(value: object) -> str:
     """Return a value as code, nothing for none."""
-    return "" if value in (None, "") else f"`{value}`"
+    return "" if value in (None, "") else f"`{str(value).lower() if isinstance(value, bool) else value}`"
 
 
 def page() -> str:
-    """Return the page: a table for each kind of file."""
-    parts = [HEAD]
+    """Return the page: a section for each kind of file; a table that an earlier section has is a reference to it."""
+    parts, first = [HEAD], dict[str, str]()
     for kind, each in models().items():
         for name, model in zip(SCENES if kind == "scene" else ("",), each, strict=True):
-            row = "| {} | {} | {} | {} |".format
-            rows = [row(code(table), code(key), words, code(default)) for table, key, words, default in keys(model)]
-            title = f"## {kind.capitalize()}{f': {name}' * bool(name)}"
-            parts.append("\n".join([title, "", "| table | key | accepted | default |", "|---|---|---|---|", *rows, ""]))
-    head = "## Data\n\n| name | accepted spellings | accepted values | unit |\n|---|---|---|---|"
-    return "\n".join([*parts, head, *data_rows(), ""])
+            title = f"{kind.capitalize()}{f': {name}' * bool(name)}"
+            parts.append(f"## {title}\n")
+            for table, rows in tables(model):
+                parts.append(f"{table}: as {first[rows]}.\n" if rows in first else f"{table}\n\n{rows}")
+                first.setdefault(rows, f"{table} of *{title}*")
+    return "\n".join([*parts, "## Data\n", *data_names()])

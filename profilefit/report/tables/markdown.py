@@ -144,13 +144,8 @@ def _short(contents: Mapping[str, Content]) -> str:
     searchlight = {name: c for name, c in contents.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    rows = []
-    for owner, which, values in chosen:
-        ends = (end for key in ("rel", "ks") for end in (np.mean(values[key]), max(values[key])))
-        rows.append([owner + records.at_index(contents.get(owner, {})), which, *(f"{100 * end:.2g} %" for end in ends)])
-    return markdown_table(
-        ("profile model", "constants", "R_d, mean", "R_d, worst", "energy, mean", "energy, worst"), rows
-    )
+    named = [(owner + records.at_index(contents.get(owner, {})), which, values) for owner, which, values in chosen]
+    return _quality(named, ("mean rel", "largest rel"), "profile model")
 
 
 def _measured(contents: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:

@@ -159,7 +159,7 @@ def test_a_damaged_stack_is_no_report(refused, mine):
     content = json.loads(path.read_text(encoding="utf-8"))
     content["interfaces"]["red"]["quality"] = []
     path.write_text(json.dumps(content), encoding="utf-8")
-    said = "heart.json: is damaged: [interfaces.red] quality must be 1, one an interface, got 0; regenerate it\n"
+    said = "heart.json: is damaged: [interfaces.red] quality must be 1, one per interface, got 0; regenerate it\n"
     for words in ("report heart", "report heart --json", "report"):
         refused(f"{words} --fits mine --quiet", said)
 

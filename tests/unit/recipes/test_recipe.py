@@ -321,7 +321,7 @@ class House(Declared):
         return self
 
 
-WORDS = "a number > 0 and >= 0.5 and <= 4, or two of them, the smaller first"
+WORDS = "a number in 0.5 ... 4, or two of them, the smaller first"
 IN_A_HOUSE = [
     ({"floors": ...}, "floors must be a whole number in 1 ... 9, got nothing"),
     ({"floors": True}, "floors must be a whole number in 1 ... 9, got True"),

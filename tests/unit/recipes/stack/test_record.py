@@ -217,7 +217,7 @@ NOT_SHOWN = [
     ("interfaces/green", GONE, r"table \[interfaces.green\] is missing"),
     ("interfaces/blue/quality/0/rel", GONE, r"\[interfaces.blue.quality 1\] rel must be a list of numbers, got noth"),
     ("interfaces/blue/quality/0/ks", [0.1, 0.2], r"\[interfaces.blue\] quality 1 must be lists of one length, got"),
-    ("interfaces/red/fit/0", GONE, r"\[interfaces.red\] fit must be 1, one an interface, got 0"),
+    ("interfaces/red/fit/0", GONE, r"\[interfaces.red\] fit must be 1, one per interface, got 0"),
     ("interfaces/red/starts/0/count", 0.5, r"\[interfaces.red.starts 1\] count must be a whole number, got 0.5"),
     ("layers/1/mu_a", 1, r"\[layers 2\] mu_a must be a list of numbers, got 1"),
     ("constants/green.1.k0", GONE, r"\[constants\] green.1.k0 must be a table, got nothing"),
@@ -259,7 +259,7 @@ def test_what_is_a_stack_and_what_its_file_says(file, tmp_path):
 LIGHT, TITLE = 'illumination = "diffuse"', '"Muscle under its skin"'
 IN_START = [
     ("violet = [[1]]", "keys must be of red, green, blue, got 'violet'"),
-    ("red = [[1, 2]]", r"red must be lists of w, u, .* one an interface.*, got \[\[1.0, 2.0\]\]"),
+    ("red = [[1, 2]]", r"red must be lists of w, u, .* one per interface.*, got \[\[1.0, 2.0\]\]"),
     ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", "red must be .* all but u > 0, got"),
     ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"red must be .* w in \(0, 1\)"),
     ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", "green must be .*, got nothing"),
