@@ -100,7 +100,7 @@ def test_errors_that_do_not_apply_have_no_column():
         one["statistical_error"], one["discretisation_error"] = 1e-3, None
     assert rows_of(stack_tables(content)[2])[0][4:] == ["±", "photons", "±", "misfit", "±", "jackknife"]
     text = rendered(stack_tables(content), 400)
-    assert "photons: noise of the simulation" in text
+    assert "photons: photon noise" in text
     assert "nodes" not in text
 
 

@@ -103,7 +103,7 @@ def test_a_failed_fit_says_why_wherever_it_is_shown():
     detail = " ".join(rendered(record_tables.record_tables(broken), 100).split())
     stages = record_tables.stage_tables(content["stages"]) if "stages" in content else []
     assert detail.count("FAILED") == 1 + rendered(stages, 100).count("FAILED")
-    assert [one for one in (REASON, "No credible intervals", "no law") if one not in detail] == []
+    assert [one for one in (REASON, "No credible intervals", "no model") if one not in detail] == []
     shown = words(record_tables.summary({name: broken}), 200)
     assert [one for one in (REASON, "→ FAILED") if one not in shown] == []
     assert "FAILED" not in rendered([record_tables.constants_table(content)], 100)
@@ -116,7 +116,7 @@ def test_z_is_the_distance_in_the_errors_that_add():
     errors = (b0[f"{of}_error"] for of in ("statistical", "discretisation", "model"))
     apart = (b0["published"] - b0["regenerated"]) / math.hypot(*errors)
     assert next(line.split()[-1] for line in lines if line.startswith("b0 ")) == f"{apart:+.0f}"
-    assert "z: published less regenerated" in " ".join(" ".join(lines).split())
+    assert "z: published minus regenerated" in " ".join(" ".join(lines).split())
     assert "z" not in rendered([record_tables.constants_table(FITS["hazard"])], 80).splitlines()[2].split()
 
 
@@ -247,7 +247,7 @@ def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
     assert ("every n in (1.3, 1.5]" if has_g else "every n in (1, 1.6]") in text
     assert ("every g in (0, 0.95]" in text) == has_g
     ends = ", n = 1.4, g = 0.9" if has_g else ", n = 1.4"
-    assert any(line.startswith("Quality") and line.rstrip().endswith(ends) for line in lines)
+    assert any(line.startswith("Errors") and line.rstrip().endswith(ends) for line in lines)
     worst = quality_tables.worst_measures(content)[keys[0]]["regenerated"]
     assert worst == max(*found[keys[0]], *np.atleast_1d(content["quality"]["regenerated"][keys[0]]))
 
