@@ -3,7 +3,7 @@
     python -m benchmarks.claims [--only NAME ...] [--quick] [--out FOLDER]
 
 Two hours on two idle cores; with --quick less, and noisier. A promise is a row below, read from the numbers of
-a command that prints it. Prose that states its bound links to the table by its name, [1.5](claims.md "hazard-time"),
+a command that prints it. Prose that states its bound links to the table by its name, [1.5](claims.md#hazard-time),
 and a test compares them. Exit status 1 if what was measured breaks a bound.
 """
 
