@@ -181,6 +181,6 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
     What is in its cells begins no element and no further column.
     """
-    rule = [":--" if name in NAMES else "--:" for name in header]
-    lines = [[_text(cell) for cell in header], rule, *([_text(cell) for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    rule = "|".join(":--" if name in NAMES else "--:" for name in header)
+    lines = [f"| {' | '.join(map(_text, cells))} |" for cells in (header, *rows)]
+    return "\n".join([lines[0], f"|{rule}|", *lines[1:]])
