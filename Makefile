@@ -16,7 +16,7 @@ ARGS ?=
 # Records that `make fits` makes: never the shipped ones, which tests and pages read.
 MADE := build/fits
 # Pages with tables of what was fitted, between marks.
-TABLES := README.md docs/explanation/models.md docs/validation/paper.md docs/explanation/layers.md docs/explanation/phases.md docs/howto/engine.md
+TABLES := README.md docs/explanation/models.md docs/validation/paper.md docs/explanation/layers.md docs/explanation/phases.md docs/validation/checks.md
 
 .DEFAULT_GOAL := help
 .PHONY: help fits records evidence claims docs test test-all benchmark programs lint format wheel clean

@@ -3,7 +3,7 @@
     python -m benchmarks.claims [--only NAME ...] [--quick] [--out FOLDER]
 
 Two hours on two idle cores; with --quick less, and noisier. A promise is a row below, read from the numbers of
-a command that prints it. Prose that states its bound links to the table by its name, [1.5](claims.md "hazard-time"),
+a command that prints it. Prose that states its bound links to the table by its name, [1.5](claims.md#hazard-time),
 and a test compares them. Exit status 1 if what was measured breaks a bound.
 """
 
@@ -39,11 +39,16 @@ WIDTH = 160  # of the tables
 class Run(NamedTuple):
     """Command whose numbers hold figures; what they are held against; what their spread is; what --quick adds to it.
 
+    subject   title and caption of the table that its claims belong to
+    subject   title and caption of the table that its claims belong to
+    subject   title and caption of the table that its claims belong to
+    subject   title and caption of the table that its claims belong to
     promises  name, bound, place of the figure in the numbers or a function of them, what it is of, and its noise where
               that is not the run's: a figure is a value, or value, low and high
     fitted    whether it reads fits/: what does not stays as it was measured when a record is made again
     """
 
+    subject: str
     command: str
     quick: str
     truth: str
@@ -199,198 +204,230 @@ def pictured(read):
     return figure
 
 
+# Subjects of claims, and the caption of their table.
+MODELS = "Profile models: Largest errors of R_d (mean over radii) and A, and times over normalized diffusion"
+DATA = "Fits and uncertainties: Deviation from simulated constants, and intervals that cover too seldom or too often"
+TRACING = "Photon tracing: Ratios to a scalar tracer, and memory"
+EXACT_SOLUTIONS = "Exact solutions: Largest relative differences, p-values and times"
+RENDERING = "Rendering: Errors of images, and of irradiance beside an edge"
+LAYERS = "Layers: Errors of the stack model relative to exact R_d (mean over radii) and A"
+SEA = "Sea: Errors of phase functions, closed forms and caustic maps"
+FUR = "Fur: Errors of shells and swept slabs, and numbers of layers"
 # fmt: off
 TURNS = "least and most of the turns"
 RECORDS = Run(
-    "profilefit report hazard albedo-rational albedo-liang", "", "exact half space, where nothing was fitted", EXACT, (
+    MODELS, "profilefit report hazard albedo-rational albedo-liang", "",
+    "exact solution, n = 1, 24 albedos from 0.05 to 0.995, none of them fitted", EXACT, (
         ("hazard-error", "≤ 0.25 %", worst("records.hazard.quality.regenerated.rel", 0.01),
-         "error of R_d by hazard, mean over radii, worst of 24 albedos from 0.05 to 0.995"),
+         "error of R_d, hazard, n = 1"),
         ("map-error", "≤ 5e-06", "records.albedo-rational.quality.regenerated.delta_A",
-         "largest error of A by the rational map"),
+         "error of A, rational inversion, n = 1"),
         ("map-nearer", "≥ 10000", times("records.albedo-liang.quality.published.delta_A",
                                         "records.albedo-rational.quality.regenerated.delta_A"),
-         "largest error of A by the printed map (8) over that by the rational one"),
+         "error of A, equation (8) over rational inversion"),
     ))
-SCALAR = "compiled scalar tracers in MCML's manner, one core with AVX-512"
+SCALAR = "ratios to compiled scalar tracers in the manner of MCML on one core with AVX-512"
 RUNS = (
     RECORDS,
-    Run("profilefit report hazard-refracting hazard-diffuse-refracting albedo-rational-refracting "
-        "albedo-rational-diffuse-refracting", "", "exact half space under surfaces of n = 1.001 to 1.6", EXACT, (
+    Run(MODELS, "profilefit report hazard-refracting hazard-diffuse-refracting albedo-rational-refracting "
+        "albedo-rational-diffuse-refracting", "",
+        "exact solution, 10 indices from 1.001 to 1.6, 24 albedos, both illuminations", EXACT, (
         ("refracting-error", "≤ 0.6 %", by_index("rel", 0.01),
-         "error of R_d by hazard where n > 1, mean over radii, worst of 24 albedos, 10 indices and both lights"),
+         "error of R_d, hazard, n > 1"),
         ("refracting-map-error", "≤ 4e-05", by_index("delta_A"),
-         "largest error of A by the rational map where n > 1, 10 indices and both lights"),
+         "error of A, rational inversion, n > 1"),
     )),
-    Run("profilefit report hazard-forward hazard-diffuse-forward albedo-rational-forward "
-        "albedo-rational-diffuse-forward", "", "exact half space of n = 1.37 to 1.45, g = 0.05 to 0.95", EXACT, (
+    Run(MODELS, "profilefit report hazard-forward hazard-diffuse-forward albedo-rational-forward "
+        "albedo-rational-diffuse-forward", "",
+        "exact solution, 3 indices from 1.37 to 1.45, 6 g from 0.05 to 0.95, 24 albedos, both illuminations", EXACT, (
         ("forward-error", "≤ 2.5 %", by_index("rel", 0.01),
-         "error of R_d by hazard where g > 0, mean over radii, worst of 24 albedos, 3 indices, 6 g and both lights"),
+         "error of R_d, hazard, g > 0"),
         ("forward-map-error", "≤ 0.003", by_index("delta_A"),
-         "largest error of A by the rational map where g > 0, 3 indices, 6 g and both lights"),
+         "error of A, rational inversion, g > 0"),
     )),
-    Run("python -m benchmarks.laws", "", "exact half space; time of normalized diffusion, exact inverse", TURNS, (
+    Run(MODELS, "python -m benchmarks.laws", "",
+        "exact solution, and times over normalized diffusion with its exact inverse on one core", TURNS, (
         ("hazard-nearer", "≥ 50", times("normalized diffusion.rel.worst", "hazard.rel.worst"),
-         "worst error of R_d by normalized diffusion over that by hazard"),
+         "error of R_d, normalized diffusion over hazard"),
         ("quantile-nearer", "≥ 20", times("normalized diffusion.rel.worst", "quantile.rel.worst"),
-         "worst error of R_d by normalized diffusion over that by quantile"),
-        ("hazard-time", "≤ 1.5", "hazard.time_ratio.both", "time of a radius and R_d there by hazard, on a core"),
-        ("quantile-time", "≤ 0.6", "quantile.time_ratio.both", "time of a radius and R_d there by quantile, on a core"),
-        ("hazard-profile-time", "≤ 3", "hazard.time_ratio.profile", "time of R_d alone by hazard, on a core"),
+         "error of R_d, normalized diffusion over quantile"),
+        ("hazard-time", "≤ 1.5", "hazard.time_ratio.both",
+         "CPU time of a radius and R_d, hazard"),
+        ("quantile-time", "≤ 0.6", "quantile.time_ratio.both",
+         "CPU time of a radius and R_d, quantile"),
+        ("hazard-profile-time", "≤ 3", "hazard.time_ratio.profile",
+         "CPU time of R_d alone, hazard"),
     )),
-    Run("profilefit check", "", "float64 and the exact half space; time of normalized diffusion", EXACT, (
-        ("shader-time", "≤ 3", "costs.hazard.ratio.both", "time of a radius and R_d there by hazard, in a shader",
+    Run(MODELS, "profilefit check", "", "float64, the exact solution, and times over normalized diffusion", EXACT, (
+        ("shader-time", "≤ 3", "costs.hazard.ratio.both",
+         "shader time of a radius and R_d, hazard",
          "median of 7 turns"),
-        ("shader-rounding", "≤ 10 %", rounding, "error that float32 adds to an exported text, over the law's own"),
+        ("shader-rounding", "≤ 10 %", rounding, "float32 error, relative to the model error"),
         ("shader-faults", "≤ 0", lambda n: sum(len(one["broken"]) for kind in ("laws", "maps") for one in n[kind]),
-         "bounds that exported texts of regenerated laws and maps break"),
+         "bounds that refitted shader sources break"),
     )),
-    Run("profilefit fit examples/half_space.mco", "", "medium of the simulation", EXACT, (
-        ("own-data", "≤ 2", recovered, "distance of fitted from simulated alpha, l, mu_a and mu_s', in stated errors",
-         "stated errors: statistical and model"),
+    Run(DATA, "profilefit fit examples/half_space.mco", "", "alpha, l, mu_a and mu_s' of the simulated medium", EXACT, (
+        ("own-data", "≤ 2", recovered, "deviation of a fitted constant [stated errors]",
+         "statistical and model error as stated"),
     )),
-    Run("python benchmarks/tracer.py", "--quick", SCALAR, TURNS, (
+    Run(DATA, "python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",
+        "constants of the model or the exact solution in simulated repeats", EXACT, (
+        ("coverage", "≤ 0", uncovered, "68 % and 95 % intervals of wrong coverage",
+         "binomial 99 % band, Šidák over constants and levels"),
+    )),
+    Run(TRACING, "python benchmarks/tracer.py", "--quick", SCALAR, TURNS, (
         ("orders-speed", "≥ 20", ratio("simulate_orders, live events/s, over the yardstick"),
-         "live events a second of simulate_orders, over a scalar tracer with r-z tally"),
+         "live events per second, simulate_orders with bins"),
         ("half-space-speed", "≥ 30", ratio("half space, photons/s"),
-         "photons a second in a half space, alpha 0.9, reflectance only"),
+         "photons per second, semi-infinite medium, R only"),
         ("half-space-tally-speed", "≥ 15", ratio("half space, r-z, photons/s"),
-         "photons a second with an r-z tally of absorption at every event"),
+         "photons per second, semi-infinite medium, r-z tally"),
         ("layers-speed", "≥ 6", ratio("three layers, r and angle, photons/s, over the layered twin"),
-         "photons a second through MCML's three layers, by radius and angle"),
+         "photons per second, three layers, by radius and angle"),
         ("layers-tally-speed", "≥ 5", ratio("three layers, r-z tally too, over the layered twin"),
-         "photons a second through MCML's three layers, with an r-z tally"),
+         "photons per second, three layers, r-z tally"),
         ("half-space-efficiency", "≥ 20", "efficiency.half space, Rd",
-         "variance x time over ours, reflectance of the half space", "variances of 400 blocks: 7 %"),
+         "1 / (variance × time), semi-infinite medium, R", "variances of 400 blocks, 7 %"),
         ("layers-efficiency", "≥ 6", lambda n: min(v for key, v in n["efficiency"].items() if key.startswith("three")),
-         "variance x time over ours, three layers, least of R, T and A", "variances of 400 blocks: 7 %"),
+         "1 / (variance × time), three layers, least of R, T, A", "variances of 400 blocks, 7 %"),
         ("accuracy-time", "≥ 800", "time to accuracy, 32 albedos.median",
-         "time of 32 scalar runs over one order-resolved run, to 1 % in each of 100 rings", "extrapolated"),
-        ("threads", "≥ 1.6", ratio("two threads over one pinned worker, orders"), "speed of two threads over one"),
+         "speed to 1 % in each of 100 radial bins at 32 albedos", "extrapolated"),
+        ("threads", "≥ 1.6", ratio("two threads over one pinned worker, orders"), "speed, two threads over one"),
         ("processes", "≥ 1.9", ratio("two processes over one pinned worker, orders"),
-         "speed of two processes over one"),
-        ("memory", "≤ 1", lambda n: max(n["peak_memory_gib"].values()), "memory of a process [GiB]", "one run each"),
+         "speed, two processes over one"),
+        ("memory", "≤ 1", lambda n: max(n["peak_memory_gib"].values()), "memory per process [GiB]", "one run each"),
     ), fitted=False),
-    Run("profilefit tradeoff truth", "--quick", "exact half space with twice the nodes; simulate_orders",
+    Run(EXACT_SOLUTIONS, "profilefit tradeoff truth", "--quick", "exact solution with twice the nodes",
         "ends of the spreads of time and error", (
-        ("exact-error", "≤ 1e-09", exact_error, "largest relative error of exact, 28 rings at 5 albedos"),
-        ("orders-over-simulate", "≥ 10", less_work("simulate"), "time of simulate over ours, at equal error"),
+        ("exact-error", "≤ 1e-09", exact_error, "error of exact, 28 radial bins, 5 albedos"),
+        ("orders-over-simulate", "≥ 10", less_work("simulate"), "time at equal error, simulate over simulate_orders"),
         ("orders-over-scalar", "≥ 300", less_work("scalar tracer"),
-         "time of one photon after another over ours, at equal error"),
+         "time at equal error, scalar tracer over simulate_orders"),
     ), fitted=False),
-    Run("python -m benchmarks.refracting", "--quick", "photons, more nodes, closed forms and each other", TURNS, (
+    Run(EXACT_SOLUTIONS, "python -m benchmarks.refracting", "--quick",
+        "1e8 photons in 40 radial bins, more nodes and closed forms, n = 1.3 to 1.5, both illuminations", TURNS, (
         ("exact-totals", "≤ 1e-07", "totals",
-         "relative difference of A under n = 1.3 to 1.5 from the integral equation of a stack", EXACT),
+         "A, difference from a stack's integral equation", EXACT),
         ("exact-nodes", "≤ 1e-10", "doubled nodes",
-         "relative change of A, and of the transform up to 7 / mfp, with twice the nodes, n = 1.3 to 1.5", EXACT),
+         "A and transform, change with 2 × the nodes", EXACT),
         ("exact-profile", "≤ 1e-05", "profile",
-         "relative change of the profile with half as many nodes again, n = 1.3 to 1.5, both lights", EXACT),
+         "R_d, change with 1.5 × the nodes", EXACT),
         ("exact-matched", "≤ 1e-06", "matched",
-         "relative difference of the profile under n = 1 + 1e-12 from the closed form at n = 1", EXACT),
+         "R_d, difference between n = 1 + 1e-12 and n = 1", EXACT),
         ("exact-derivatives", "≤ 1e-06", "derivatives",
-         "relative difference of slopes by alpha, r, mfp and n from differences", EXACT),
+         "derivatives, difference from finite differences", EXACT),
         ("exact-cut", "≤ 1e-06", "cut",
-         "relative difference of the profile of a half space cut into three layers from the exact one", EXACT),
+         "R_d, difference of one medium cut into three layers", EXACT),
         ("exact-photons", "≥ 0.001", "half space, photons",
-         "p-value of 40 rings of 1e8 photons under n = 1.4, both lights, three albedos", EXACT),
+         "p-value of photons, semi-infinite medium, n = 1.4", EXACT),
         ("stack-photons", "≥ 0.001", "stack, photons",
-         "p-value of 40 rings of 1e8 photons in three layers of n = 1.4, both lights", EXACT),
-        ("exact-time", "≤ 5", "new index, seconds", "256 radii at 32 albedos under a new index, compiled [s]"),
-        ("stack-time", "≤ 5", "stack, seconds", "three layers of n = 1.4 solved, and 256 radii [s]"),
+         "p-value of photons, three layers, n = 1.4", EXACT),
+        ("exact-time", "≤ 5", "new index, seconds", "time of 256 radii, 32 albedos, new index, compiled [s]"),
+        ("stack-time", "≤ 5", "stack, seconds", "time of three layers, n = 1.4, 256 radii [s]"),
     ), fitted=False),
-    Run("python -m benchmarks.step_edge", "--quick", "exact step response; radii by the exact quantile", EXACT, (
+    Run(RENDERING, "python -m benchmarks.step_edge", "--quick",
+        "exact step response within 4 transport mean free paths, and radii by the exact quantile", EXACT, (
         ("edge-bias", "≤ 0.02 %", edge("bias", scale=0.01),
-         "bias of hazard within 4 mean free paths of an edge of light, share of A"),
-        ("edge-nearer", "≥ 10", edge_nearer, "bias of normalized diffusion there over that of hazard, at least"),
-        ("edge-noise", "≤ 1.01", edge("random", "lattice"), "noise of 64 samples of hazard there",
-         "4096 trials, 256 if quick; the same points for both"),
+         "bias at an edge of illumination, hazard, share of A"),
+        ("edge-nearer", "≥ 10", edge_nearer, "bias at the edge, normalized diffusion over hazard"),
+        ("edge-noise", "≤ 1.01", edge("random", "lattice"), "noise of 64 samples, hazard over exact quantile",
+         "trials at equal points, 4096 or 256 with --quick"),
     )),
-    Run("python -m benchmarks.render errors", "", "exact profile over the visible surface", "extremes of four seeds", (
-        ("flip", "≤ 0.006", flip, "FLIP of a head by 256 samples of hazard"),
-        ("flip-nearer", "≥ 1.7", flip_nearer, "FLIP of normalized diffusion, refitted, over that of hazard"),
+    Run(RENDERING, "python -m benchmarks.render errors", "", "exact profile over the visible surface",
+        "extremes of four seeds", (
+        ("flip", "≤ 0.006", flip, "FLIP error of a head, 256 samples of hazard"),
+        ("flip-nearer", "≥ 1.7", flip_nearer, "FLIP error, refitted normalized diffusion over hazard"),
     )),
-    Run("python -m benchmarks.choose", "--quick", "pictures rendered through OpenGL against the exact profile", EXACT, (
-        ("choose-error", "≤ 1.1", apart(True), "predicted and rendered error of what choose takes, larger over smaller",
-         "worst scene; each rendered to 3 %"),
-        ("choose-errors", "≤ 1.2", apart(False), "predicted and rendered error of every option, larger over smaller",
-         "worst of all; each rendered to 3 %"),
+    Run(RENDERING, "python -m benchmarks.choose", "--quick", "pictures rendered by OpenGL, and the exact profile",
+        EXACT, (
+        ("choose-error", "≤ 1.1", apart(True), "predicted and rendered error, ratio, chosen option",
+         "worst scene, each rendered to 3 %"),
+        ("choose-errors", "≤ 1.2", apart(False), "predicted and rendered error, ratio, every option",
+         "worst of all, each rendered to 3 %"),
     )),
-    Run("python -m benchmarks.stacks", "", "exact light of stacks, at thicknesses not fitted and their own", EXACT, (
+    Run(LAYERS, "python -m benchmarks.stacks", "",
+        "exact stacks, first layers of 0.03 to 8 mm, both illuminations, thicknesses not fitted", EXACT, (
         ("stack-error", "≤ 3 %", lambda n: 100 * n["rel"],
-         "error of R_d by the law of a stack, mean over 12 stacks and colours, both lights, first layers 0.03 to 8 mm"),
-        ("stack-worst", "≤ 10 %", lambda n: 100 * n["worst"], "the same, the worst stack, light and thickness"),
-        ("stack-own-worst", "≤ 8 %", lambda n: 100 * n["own"]["worst"], "the same, the worst at its own thickness"),
-        ("stack-ks", "≤ 0.02", "own.ks", "largest error of the law of a stack's cdf, at its own thickness"),
-        ("stack-energy", "≤ 1 %", lambda n: 100 * n["A"], "largest relative error of its reflectance"),
+         "error of R_d, mean of 12 stacks and colours"),
+        ("stack-worst", "≤ 10 %", lambda n: 100 * n["worst"], "error of R_d, worst stack, illumination, thickness"),
+        ("stack-own-worst", "≤ 8 %", lambda n: 100 * n["own"]["worst"],
+         "error of R_d, worst stack, own thickness"),
+        ("stack-ks", "≤ 0.02", "own.ks", "error of the cdf, own thickness"),
+        ("stack-energy", "≤ 1 %", lambda n: 100 * n["A"], "error of A"),
     )),
-    Run("python -m benchmarks.stacks --random 20", "", "exact light of 20 random stacks of 2 to 4 layers", EXACT, (
+    Run(LAYERS, "python -m benchmarks.stacks --random 20", "", "exact solution of 20 random stacks of 2 to 4 layers",
+        EXACT, (
         ("random-stacks", "≤ 10 %", lambda n: 100 * n["own"]["worst"],
-         "error of R_d by the law of a stack, mean over radii, worst of the stacks"),
+         "error of R_d, worst random stack"),
     )),
-    Run("python -m benchmarks.stacks --forward 0.9 --light searchlight --stack heart", "", "3e7 photons a colour",
-        "photons, taken off in quadrature", (
+    Run(LAYERS, "python -m benchmarks.stacks --forward 0.9 --light searchlight --stack heart", "",
+        "3e7 photons per colour, radial bins from 0.1 mean free paths",
+        "photons, subtracted in quadrature", (
         ("forward-stack", "≤ 5 %", lambda n: 100 * n["rel"],
-         "error of R_d by the law of a stack with g = 0.9, mean over rings from 0.1 mean free paths, three colours"),
-        ("forward-worst", "≤ 12 %", lambda n: 100 * n["worst"], "the same, the worst colour"),
+         "error of R_d, g = 0.9, mean of three colours"),
+        ("forward-worst", "≤ 12 %", lambda n: 100 * n["worst"], "error of R_d, g = 0.9, worst colour"),
     )),
-    Run("python -m benchmarks.stack_source", "", "the text in float64; the text of hazard", EXACT, (
+    Run(LAYERS, "python -m benchmarks.stack_source", "",
+        "the source in float64 within 99.5 % of the energy, and the source of hazard", EXACT, (
         ("stack-rounding", "≤ 3e-05", lambda n: max(one["rounding"]["profile"] for one in n.values()),
-         "largest relative error of float32 in R_d by a stack's text, within 99.5 % of its light"),
+         "float32 error of R_d, shader source"),
         ("stack-text-time", "≤ 2.5", "skimmilk-on-marble.cost.both",
-         "time of a radius and R_d there by the text of two layers over that of hazard, in a shader",
+         "shader time of a radius and R_d, two layers over hazard",
          "median of 7 turns"),
-        ("deep-stack-text-time", "≤ 3.5", "skin.cost.both", "the same of three layers", "median of 7 turns"),
+        ("deep-stack-text-time", "≤ 3.5", "skin.cost.both", "shader time of a radius and R_d, three layers over hazard",
+         "median of 7 turns"),
     )),
-    Run("python -m benchmarks.layers", "", "surface integral with the exact stack at each point", EXACT, (
+    Run(LAYERS, "python -m benchmarks.layers", "",
+        "surface integral with the exact stack at each point, least of three poses", EXACT, (
         ("head-nearer", "≥ 5", pictured(lambda n: min(one["dipole"] / one["stack"] for one in n.values())),
-         "error of a head of layers by the first layer's dipole over that by the stack's law, least of three poses"),
+         "error of a head, dipole of layer 1 over stack model"),
     )),
-    Run("profilefit report petzold", "", "Petzold's mean particle phase function, 55 angles", EXACT, (
+    Run(SEA, "profilefit report petzold", "",
+        "mean particle phase function of Petzold, 55 angles, with its mean cosine and backscattered share", EXACT, (
         ("phase-three", "≤ 0.17", of_phase("3-terms"),
-         "rms of ln(law / data), three terms, mean cosine and backscattered share held"),
-        ("phase-four", "≤ 0.07", of_phase("4-terms"), "the same of four terms"),
+         "rms of ln(form / data), three terms"),
+        ("phase-four", "≤ 0.07", of_phase("4-terms"), "rms of ln(form / data), four terms"),
     )),
-    Run("python -m benchmarks.sea --only beam segment shafts exact hits splats", "",
-        "photons; float64; quadrature; exact light of ridges; dense steps; 2048 x 2048 photons", EXACT, (
+    Run(SEA, "python -m benchmarks.sea --only beam segment shafts exact hits splats", "",
+        "photons (omega to 0.8, c t to 4), float64, quadrature, exact irradiance of ridges and dense steps", EXACT, (
         ("beam-share", "≤ 2 %", lambda n: 100 * max(one["within"] for one in n["beam"]),
-         "largest relative error of the share of a beam, omega to 0.8, ct to 4, c w to 1", "300000 photons"),
+         "error of a beam's share within 1 / c", "photons, 300000"),
         ("beam-plane", "≤ 1 %", lambda n: 100 * max(one["all the plane"] for one in n["beam"]),
-         "the same of all the plane", "300000 photons"),
+         "error of a beam's share in the whole plane", "photons, 300000"),
         ("sea-segment", "≤ 5e-07", lambda n: max(one["as here"] for one in n["segment"]),
-         "largest relative error of a segment's integral in float32, in any direction"),
+         "error of a segment's integral, float32"),
         ("sea-slices", "≤ 1 %", lambda n: 100 * next(one["slices"] for one in n["shafts"] if one["samples"] == 64),
-         "rms error of shafts by 64 slices, over twenty views"),
+         "rms error of shafts, 64 slices, 20 views"),
         ("caustic-photons", "≤ 1 %", lambda n: 100 * max(one["worst"] for one in n["exact"]),
-         "worst pixel of 6.7e7 photons against exact light"),
+         "error of a pixel, 6.7e7 photons"),
         ("sea-hits", "≤ 0.2 %", lambda n: 100 * max(n["hits"][-1][s] for s in ("0.5", "0.9", "1.5", "3", "5")),
-         "hits off by more than 1 % of the depth, 16 steps and 3 iterations, S to 5", "3000 rays each"),
-        ("caustics-before", "≤ 0.008", splat_of(0.32, 70_000, "rms"), "rms of a caustic map, F 0.32, 70 k fragments"),
-        ("caustics-beyond", "≤ 0.1", splat_of(1.18, 300_000, "rms"), "the same beyond folds, F 1.18, 300 k fragments"),
+         "hits with errors over 1 % of depth, 16 steps, 3 iterations, S to 5", "rays, 3000 each"),
+        ("caustics-before", "≤ 0.008", splat_of(0.32, 70_000, "rms"),
+         "rms error of a caustic map, F = 0.32, 70,000 fragments"),
+        ("caustics-beyond", "≤ 0.1", splat_of(1.18, 300_000, "rms"),
+         "rms error beyond folds, F = 1.18, 300,000 fragments"),
         ("caustics-bias", "≤ 0.5 %", lambda n: 100 * max(splat_of(1.18, 300_000, key)(n) for key in ("bright", "dark")),
-         "bias of that map where it is bright, and where it is dark"),
-        ("caustics-energy", "≤ 1e-06", splat_of(1.18, 300_000, "energy"), "energy that it gains or loses"),
+         "bias of this map, bright and dark parts"),
+        ("caustics-energy", "≤ 1e-06", splat_of(1.18, 300_000, "energy"), "energy error of this map"),
     )),
-    Run("python -m benchmarks.fur --only closed third exponent least union", "",
-        "rays against cones; each fur's own best; the union of discs in closed form", EXACT, (
+    Run(FUR, "python -m benchmarks.fur --only closed third exponent least union", "",
+        "rays against cones from 0 to 85 degrees, the best of each L / r0 from 10 to 50, discs in closed form", EXACT, (
         ("fur-seen", "≤ 0.01", lambda n: max(abs(one["difference"]) for one in n["closed"]),
-         "visibility of random cones, largest error, 0 to 85 degrees, upright and leaning", "160000 rays each"),
+         "error of the visibility of random cones", "rays, 160000 each"),
         ("fur-discs", "≤ 0.2 %", lambda n: 100 * max(abs(one["off"]) for one in n["union"]),
-         "discs of a strand drawn by OpenGL, largest error of their shadow"),
+         "error of the shadow of discs by OpenGL"),
         ("fur-third", "≤ 15 %", lambda n: 100 * factor_of(n, "heights, to the cone")["+-"],
-         "linear shells for a quadratic one at equal error, half its 95 % interval", "63 furs and angles"),
+         "linear shells per quadratic one, half 95 % interval", "furs and angles, 63"),
         ("fur-exponent", "≤ 10 %", lambda n: 100 * max(one["worst"] for one in n["exponent"]),
-         "the threshold's exponent against the best of each L / r0, 10 to 50"),
-        ("fur-swept", "≤ 16", least_of("swept"), "swept slabs for an rms of 0.02 at 45 degrees", "10000 rays"),
-        ("fur-swept-two", "≤ 12", least_of("swept, two strands"), "the same, two strands tested", "10000 rays"),
+         "threshold exponent, difference from the best"),
+        ("fur-swept", "≤ 16", least_of("swept"), "swept slabs for rms 0.02 at 45 degrees, one strand", "rays, 10000"),
+        ("fur-swept-two", "≤ 12", least_of("swept, two strands"), "swept slabs for rms 0.02 at 45 degrees, two strands",
+         "rays, 10000"),
     )),
-    Run("python -m benchmarks.fur_choose", "", "fresh rays of 50 random furs", EXACT, (
+    Run(FUR, "python -m benchmarks.fur_choose", "", "new rays through 50 random furs", EXACT, (
         ("fur-chosen", "≥ 90 %", lambda n: 100 * n["summary"]["within"],
-         "furs whose chosen number of layers meets the tolerance", "50 furs"),
-        ("fur-over", "≤ 1.25", "summary.mean ratio", "that number over the least that meets it, mean", "50 furs"),
-    )),
-    Run("python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",
-        "constants of the law, or of the exact half space, in runs drawn anew", EXACT, (
-        ("coverage", "≤ 0", uncovered, "68 and 95 % intervals of constants that cover too seldom or too often",
-         "99 % band, binomial, Šidák over constants and levels"),
+         "furs whose chosen number of layers meets the tolerance", "furs, 50"),
+        ("fur-over", "≤ 1.25", "summary.mean ratio", "chosen number of layers over the least, mean", "furs, 50"),
     )),
 )
 # fmt: on
@@ -422,7 +459,8 @@ def claimed(run: Run, command: str, told: Any, date: str = "", load: str = "unkn
         sense, most, *unit = bound.split()
         spread = noise[0] if noise else EXACT if low == high else run.noise
         yield Claim(
-            name, says, value, low, high, spread, sense, float(most), "".join(unit), run.truth, command, date, load
+            *(name, run.subject, says, value, low, high, spread, sense, float(most), "".join(unit)),
+            *(run.truth, command, date, load),
         )
 
 

@@ -46,7 +46,7 @@ def report(
         Path | None, typer.Option(help="Markdown file whose tables between marks <!-- name --> are filled in.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="File for one HTML page with tables, figures and an explorer (two minutes).")
+        Path | None, typer.Option(help="File for one HTML page with an explorer, tables and charts.")
     ] = None,
     evidence: Annotated[
         Path | None,

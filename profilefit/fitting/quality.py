@@ -67,14 +67,14 @@ class Measure:
 
 
 _ALL = (
-    Measure("rel", "mean |law / exact − 1| of R_d", "mean relative error of R_d", symbol="rel"),
+    Measure("rel", "mean |model / exact − 1| of R_d", "mean relative error of R_d", symbol="rel"),
     Measure("ks", "max |cdf − exact cdf|", "error of the cdf", symbol="ks"),
     Measure("l1", "share of misplaced energy"),
     Measure("mse", "of r R_d", unit="1/mfp²"),
     Measure("r2", "of r R_d", is_high=True),
     Measure("mse near", "of the nearer half of the trimmed range", unit="1/mfp²"),
     Measure("mse far", "of the farther half"),
-    Measure("largest", "max |law / exact − 1| of R_d", "largest error of R_d at a radius"),
+    Measure("largest", "max |model / exact − 1| of R_d", "largest error of R_d at a radius"),
     Measure("r2 near", "of the nearer half of the trimmed range", is_high=True),
     Measure("r2 far", "of the farther half", is_high=True),
     Measure("inversion_error", "max |cdf(r(ξ)) − ξ|", "error in xi", short="error", symbol="xi"),
@@ -83,7 +83,7 @@ _ALL = (
     Measure("largest_s", "max |√(1 − α) / exact − 1|"),
     Measure("monotone", "rises all the way"),
     Measure("at_one", "α at A = 1"),
-    Measure("fold", "A where it turns"),
+    Measure("fold", "A at the fold"),
 )
 MEASURES: dict[str, Measure] = {one.name: one for one in _ALL}
 # Measures in records: errors by albedo, and those of a map as a whole.

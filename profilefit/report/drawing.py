@@ -35,7 +35,7 @@ POINTED_AT = re.compile(r"#([^)]+)")
 DIGITS = re.compile(r"-?\d+\.\d+")
 PLACES = ("x", "y", "width", "height")  # attributes whose digits beyond a tenth of a point nobody sees
 MARKER = 1000  # letters of a path that is a marker, drawn often and so with one digit more
-QUALITY = 80  # of a photograph as WebP
+QUALITY, WIDEST = 75, 1000  # of a photograph as WebP, and its most pixels in a row
 UNTURNED = re.compile(r"rotate\(-?0(?: [^)]*)?\)")
 # Neighbours that are one element: letters of a formula, each at its place, and lines of one style; definitions of none.
 TSPANS = r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">'
@@ -177,6 +177,8 @@ def address(png: bytes, loss: bool = False) -> str:
     files = []
     try:
         with Image.open(io.BytesIO(png), formats=["png"]) as picture:
+            if loss:
+                picture.thumbnail((WIDEST, picture.height))
             for settings in ({"lossless": True}, {"quality": QUALITY})[: 1 + loss]:
                 picture.save(file := io.BytesIO(), "webp", **settings)
                 files.append(file.getvalue())

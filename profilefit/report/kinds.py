@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,15 +57,15 @@ def _sections(load: Callable[[Path], Content], paths: Paths, **tables: RowsOf) -
 
 # Stacks: their layers, the errors of their laws, and each one with all its constants.
 
-MEASURES = "rel: mean relative error of R_d over radii, ks: error of the cdf, A: relative error of the reflectance"
-CAPTION = f"{MEASURES}, each the worst of three colours and of the thicknesses between those that were fitted"
+MEASURES = "R_d: mean relative error over radii, cdf: largest error, A: relative error"
+CAPTION = f"{MEASURES}. Worst of three colours and of thicknesses between the fitted ones"
 OF_THICKNESS = f"{MEASURES}; those of a deeper interface are of the stack from its upper layer down"
 OF_STACK = MEANING_OF_ERROR | {
-    "dr": "exact light of fewer nodes",
-    "model": "the law's misfit, as a random function",
-    "jackknife": "leaving out one thickness after the other",
+    "dr": "exact solution with fewer nodes",
+    "model": "misfit of the model, as a random function",
+    "jackknife": "spread of fits that leave out one thickness",
 }
-OF_FIT = "Constants that trade against each other do not converge, and may be good all the same: see their errors above"
+OF_FIT = "Correlated constants may not converge, but can still be accurate: see their errors above"
 LEFT = ("layer", "channel", "interface", "constant", "result")
 
 
@@ -82,8 +82,8 @@ def stack_table(folder: Path) -> RenderableType | None:
         "light": [str(one["setting"]["illumination"]) for one in stacks],
         "n": [f"{one['setting']['n']:g}" for one in stacks],
         "g": [", ".join(f"{g:g}" for g in sorted({layer["g"] for layer in one["layers"]})) for one in stacks],
-        "rel": [significant(max(one["rel"])) for one in worst],
-        "ks": [significant(max(one["ks"])) for one in worst],
+        "R_d": [significant(max(one["rel"])) for one in worst],
+        "cdf": [significant(max(one["ks"])) for one in worst],
         "A": [significant(one["delta_A"]) for one in worst],
     }
     return column_table("Stacks of layers", columns, CAPTION, left=("stack", "light"))
@@ -101,12 +101,13 @@ def stack_tables(content: Content) -> list[RenderableType]:
         columns[f"{key} [1/{unit}]"] = [" ".join(f"{each:g}" for each in one[key]) for one in layers]
     meaning = _meaning(known_errors(content["constants"].values(), numbered=True), OF_STACK)
     tables = {
-        "Errors at thicknesses of an interface's upper layer that were not fitted": (_stack_errors(of), OF_THICKNESS),
-        "Constants of each colour and interface, none with a unit": (_stack_constants(of), meaning),
+        "Errors at unfitted thicknesses of the upper layer of an interface": (_stack_errors(of), OF_THICKNESS),
+        "Constants of each colour and interface, without unit": (_stack_constants(of), meaning),
         "Fits": (_stack_fits(content), OF_FIT),
     }
     parts = [column_table("Layers, from the surface down; red, green, blue", columns, left=LEFT, fold=("layer",))]
     for title, ((header, rows), caption) in tables.items():  # without the name of the stack, which stands above
+        header = tuple({"rel": "R_d", "ks": "cdf"}.get(name, name) for name in header)
         aligned = [name for name in header if name not in LEFT]
         parts.append(row_table(title, header[1:], [row[1:] for row in rows], caption, LEFT, aligned=aligned))
     return list(parts)
@@ -152,9 +153,9 @@ def _stack_fits(content: Content) -> Rows:
 # Sums of Gaussians of a stack: their errors over their number, and the constants of six of them.
 
 OF_NUMBER = (
-    "red, green, blue: mean relative error of R_d, in rings even in ln r from 0.01 mean free paths to 99.5 % of the "
-    "light; the worst of the three: rms: its root mean square, ks: error of the cdf, alone: the first again where each "
-    "colour has variances of its own"
+    "red, green, blue: mean relative error of R_d, in radial bins even in ln r from 0.01 mean free paths to 99.5 % of "
+    "the energy; worst of the three: rms: root mean square error, ks: error of the cdf, alone: mean error if each "
+    "colour has separate variances"
 )
 PUBLISHED = "; published: the six Gaussians of d'Eon and Luebke (GPU Gems 3, ch. 14), in mm, of a skin"
 OF_SUM = OF_STACK | {"model": "the misfit as a random function", "jackknife": "leaving out a sixth of the rings"}
@@ -186,12 +187,14 @@ def sum_tables(sums: gaussians.SumRecord) -> list[RenderableType]:
 
 
 def _sum_errors(sums: Mapping[str, Content]) -> Rows:
+    """Return the relative error of 2, 4, 6, 8 Gaussians [%], the largest of both illuminations and three channels."""
     rows: list[Row] = []
-    for (name, content), light in product(sums.items(), ILLUMINATIONS):
-        by_count = content["sums"][light]["by_count"]
-        worst = (*(max(one["rel"]) for one in by_count), max(by_count[DEFAULT - 1]["alone"]))
-        rows.append((name, light, *map(significant, worst)))
-    return ("stack", "light", *map(str, gaussians.COUNTS), f"{DEFAULT} each its own"), rows
+    for name, content in sums.items():
+        both = [content["sums"][light]["by_count"] for light in ILLUMINATIONS]
+        errors = [max(max(of[count - 1]["rel"]) for of in both) for count in gaussians.COUNTS[1::2]]
+        errors.append(max(max(of[DEFAULT - 1]["alone"]) for of in both))
+        rows.append((name, *(f"{significant(100.0 * error)} %" for error in errors)))
+    return ("stack", *(f"{n} Gaussians" for n in gaussians.COUNTS[1::2]), f"{DEFAULT}, variances per channel"), rows
 
 
 def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
@@ -208,7 +211,7 @@ def published(sums: gaussians.SumRecord) -> dict[str, list[dict[str, float]]]:
 MOMENT_DIGITS = 4
 OF_FORMS = (
     "rms: root mean square of ln(form / table), over all angles and between those given; cosine: mean cosine; back: "
-    "share turned by more than 90 degrees"
+    "backscattered share, beyond 90 degrees"
 )
 OF_PHASE = MEANING_OF_ERROR | {
     "photons": "the table's sigma",
@@ -231,7 +234,7 @@ def phase_tables(content: Content) -> list[RenderableType]:
     meaning = _meaning(known, OF_PHASE)
     return [
         row_table(title, header, rows, OF_FORMS, left, ("form",)),
-        row_table("Constants, none with a unit", names, constants, meaning, left, ("form",), ("value",)),
+        row_table("Constants, without unit", names, constants, meaning, left, ("form",), ("value",)),
     ]
 
 
@@ -258,22 +261,14 @@ def phase_table(folder: Path) -> RenderableType | None:
         "rows": [str(one["data"]["rows"]) for one in contents],
         **{form: [significant(one["phases"][form][phase.HELD]["rms"]) for one in contents] for form in FORMS},
     }
-    caption = "root mean square of ln(form / table), mean cosine and backscattered share those of the table"
-    return column_table("Phase functions", columns, f"{caption} where a form has numbers for it", ("table",))
+    caption = "Root mean square of ln(form / table) over angles, with mean cosine and backscattered share of the table"
+    return column_table("Phase functions", columns, f"{caption}, if a form can have them", ("table",))
 
 
 def _phase_fits(phases: Mapping[str, Content]) -> Rows:
     rows = [(name, *_measures(*one)) for name, content in phases.items() for one in _each(content)]
-    return ("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows
-
-
-def _phase_errors(phases: Mapping[str, Content]) -> Rows:
-    rows = [
-        (name, *place, *_value_and_errors(one, ()), significant(largest_error(one)))
-        for name, content in phases.items()
-        for place, one in _phase_constants(content)
-    ]
-    return ("table", "form", "moments", "constant", "value", "error"), rows
+    bands = (f"{band}°" for band in OF_BANDS)
+    return ("table", "fit", "moments", "all angles", *bands, "mean cosine", "backscattered"), rows
 
 
 def _each(content: Content) -> list[tuple[str, str, Content]]:
@@ -340,9 +335,7 @@ TABLES: Mapping[str, KindTables] = {
             *map(Text, premise_lines(content)),
         ],
         lambda _, folder: phase_table(folder),
-        lambda _, folder: _sections(
-            phase.read, record.available(folder / PHASES), phase_fits=_phase_fits, phase_constants=_phase_errors
-        ),
+        lambda _, folder: _sections(phase.read, record.available(folder / PHASES), phase_fits=_phase_fits),
     ),
 }
 

@@ -10,6 +10,7 @@ import shutil
 import numpy as np
 import pytest
 
+from benchmarks import explorer_tables
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
@@ -227,6 +228,12 @@ def test_the_index_is_a_slider_and_part_of_the_address(open_page, file):
         assert darker < bright
     page.locator("#explorer-n").press("End")
     page.wait_for_function("explorer.values.channels[0].reflectance < 0.9 && location.hash.includes('n=1.6&')")
+
+
+def test_the_picture_is_that_of_the_record(fragment):
+    """Its curves and words; digits may differ by rounding. `python -m benchmarks.explorer_tables` draws it again."""
+    shown = re.search(r'<div class="wide" tabindex="0">(<svg.*</svg>)</div>', fragment)[1]
+    assert len({re.sub(r"[-.\d ]+", "#", one) for one in (shown, explorer_tables.still())}) == 1
 
 
 def test_without_webgl_a_picture_stands_in(open_page, file):

@@ -32,11 +32,11 @@ PLACES = {
     "short": README,
     **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/explanation/models.md"),
     **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/validation/paper.md"),
-    "check": ROOT / "docs/howto/engine.md",
+    "check": ROOT / "docs/validation/checks.md",
     "claims": ROOT / "docs/validation/claims.md",
 }
 MEASURED = ("laws", "check", "claims")
-CLAIM = re.compile(r'\[([^\]]+)\]\([\w./-]*claims\.md "([\w-]+)"\)')
+CLAIM = re.compile(r"\[([^\]]+)\]\([\w./-]*claims\.md#([\w-]+)\)")
 WRITTEN = [README, *sorted(path for path in ROOT.glob("docs/**/*.md") if not {"laws", "_build"} & {*path.parts})]
 
 
@@ -91,7 +91,7 @@ def test_figures_in_prose_are_the_bounds_of_the_claims_they_link_to():
     found = [(page, name, text) for page in WRITTEN for text, name in CLAIM.findall(text_of(page))]
     assert [one for one in found if float(one[2].split()[0].replace(",", "")) != bounds[one[1]]] == []
     assert {name for page, name, _ in found if page == README} >= {"hazard-error", "hazard-time", "shader-time"}
-    assert len(found) == sum(text_of(page).count('claims.md "') for page in WRITTEN), "a link of another form"
+    assert len(found) == sum(text_of(page).count("claims.md#") for page in WRITTEN), "a link of another form"
 
 
 def test_every_record_has_its_recipe_and_ended_well():

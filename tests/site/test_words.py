@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import nbformat
 import pytest
 import typer
 
@@ -32,7 +33,9 @@ def helps() -> str:
     return "\n\n".join(block for block in blocks if not block.lstrip("\b\n ").startswith(("profilefit ", "mcml-sim ")))
 
 
+NOTEBOOKS = {path.stem: nbformat.read(path, 4).cells for path in sorted((ROOT / "notebooks").glob("*.ipynb"))}
 TEXTS = {name: path.read_text(encoding="utf-8") for name, path in zip(NAMES, PAGES, strict=True)} | {"help": helps()}
+TEXTS |= {name: "\n\n".join(c.source for c in cells if c.cell_type == "markdown") for name, cells in NOTEBOOKS.items()}
 
 
 def test_sentences_are_short():

@@ -10,7 +10,7 @@ class Ball {
     new IntersectionObserver((found) => {
       this.seen = found[found.length - 1].isIntersecting;
       this.go();
-    }).observe(device.canvas);
+    }, { rootMargin: "100%" }).observe(device.canvas); // drawn before it is scrolled to
     this.resize();
   }
 

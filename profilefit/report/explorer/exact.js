@@ -15,9 +15,15 @@ function lagrange(place, count, weights) {
   return first;
 }
 
-function floatsOf(base64) {
-  const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-  return new Float32Array(bytes.buffer);
+function bytesOf(base64) {
+  return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+}
+
+// Numbers of three bytes, in steps from -32.
+function fixedOf(base64) {
+  const bytes = bytesOf(base64);
+  return Float64Array.from({ length: bytes.length / 3 }, (_, i) =>
+    4e-6 * (bytes[3 * i] + 256 * bytes[3 * i + 1] + 65536 * bytes[3 * i + 2]) - 32);
 }
 
 // kappa, the root of alpha artanh(kappa) = kappa [1/mfp]: kappa = tanh t, alpha t = tanh t.
@@ -81,8 +87,8 @@ class ExactTable {
 // The tables of one light: of n = 1, and of every other n, by a polynomial over mu_c = sqrt(1 - 1/n^2) through knots.
 class ExactTables {
   constructor({ grids, knots }, [matched, ...refracting]) {
-    Object.assign(this, { grids, knots, matched: new ExactTable(grids.matched, floatsOf(matched)) });
-    this.refracting = refracting.map(floatsOf);
+    Object.assign(this, { grids, knots, matched: new ExactTable(grids.matched, new Float32Array(bytesOf(matched).buffer)) });
+    this.refracting = refracting.map(fixedOf);
     this.found = [1, this.matched]; // the last that was asked for
   }
 

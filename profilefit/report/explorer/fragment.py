@@ -15,28 +15,16 @@ Where a browser cannot run it, a picture stands in: skin's profile, cdf and edge
 from __future__ import annotations
 
 import base64
-import io
 import json
 import re
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
+from importlib import resources
 from string import Template
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import NullLocator
-
-from mcml_sim import Setting, exact
-from mcml_sim.media.arrays import Floats
-from profilefit.laws.base import ProfileLaw
-from profilefit.materials import BY_NAME, CHANNELS, MATERIALS
-from profilefit.recipes.catalogue import LoadedLaw, find, load, profile_laws
+from profilefit.materials import CHANNELS, MATERIALS
+from profilefit.recipes.catalogue import LoadedLaw, find, profile_laws
 from profilefit.recipes.record import Folder, Records
-from profilefit.report.drawing import inline
-from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
-from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
-from profilefit.scenes.stage.judge import srgb_codes
-from profilefit.scenes.stage.step_edge import step_response
 from profilefit.shader.emit import text_beside
 from profilefit.shader.law_file import export
 
@@ -45,15 +33,16 @@ _asset = partial(text_beside, __name__)
 SCRIPTS = ("exact", "laws", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")
 LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the ends of its slider
 ABOUT = (
-    "Each law runs here as the source that <code>profilefit export --lang glsl-es</code> writes, on this machine's "
-    "graphics processor, against the exact half space, isotropic, under a surface of refractive index n. The law "
-    "hazard follows n, by the source that <code>--n</code> writes; all others are of n = 1, and beside another n "
-    "show what that leaves out."
+    "Choose a material, for example skin1, or move the sliders. The balls and curves follow. Each colour channel has "
+    "its own reflectance A and mean free path l."
 )
 MEASURES = (
-    "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the reflected light; ks: largest error "
-    "of the cdf; edge: largest error within 3.5 l of an edge of light, as a share of A. The exact solution is a table, "
-    "right to 1e-5 where n = 1, to 5e-4 from n = 1.1 up, and to 3e-3 between."
+    "Errors are relative to the exact solution of a semi-infinite medium with isotropic scattering. Error of "
+    "R<sub>d</sub>: mean relative error for r from 0.01 l to 99.5 % of the reflected light. Error of cdf: largest "
+    "absolute error. Error at edge: largest error within 3.5 l of an edge of light, as a share of A. The exact "
+    "solution is read from a table. Its relative error is 1e-5 at n = 1, 5e-4 from n = 1.1 on, and 3e-3 between. "
+    "The graphics processor runs the source that <code>profilefit export --lang glsl-es</code> writes. Only hazard "
+    "follows n. All other models are made for n = 1."
 )
 
 
@@ -67,7 +56,7 @@ def explorer_section(folder: Folder) -> str:
         style=_asset("explorer.css"),
         about=ABOUT,
         measures=MEASURES,
-        still=still(),
+        still=_asset(STILL),
         index=_slider("n", "", 1, INDICES[-1], STEP, "n"),
         reflectances="\n".join(_slider("A", channel, 0, 1, 0.001) for channel in CHANNELS),
         paths="\n".join(_slider("l", channel, LOWEST, HIGHEST, 0.01) for channel in CHANNELS),
@@ -100,7 +89,7 @@ def _data(folder: Folder) -> str:
         "grids": {"matched": asdict(GRID), "refracting": asdict(COARSE)},
         "knots": KNOTS,
         "indices": INDICES,
-        "tables": {light: [baked(Setting(light, n)) for n in (1.0, *KNOTS)] for light in LIGHTS},
+        "tables": tables(),
         "lines": list(lines),
         "laws": offers,
         "materials": [{"name": one.name, "alpha": one.alpha, "mfp": one.mfp} for one in MATERIALS],
@@ -187,110 +176,34 @@ def _refracting(named: LoadedLaw, records: Records) -> Refracting | None:
 
 LIGHTS = ("searchlight", "diffuse")
 KNOTS = (1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)  # n, denser where the light changes fastest with it
-FAINT = 1e-9  # x^2 R_d l^2 / A below which the quadrature of a refracting surface leaves no digits
+EXACT, STILL = "exact.bin", "still.svg"  # `python -m benchmarks.explorer_tables` makes them
 
 
 @dataclass(frozen=True)
 class TableGrid:
-    """rows of albedos, columns of radii; low, high the first and last x [mfp]."""
+    """rows of albedos, columns of radii; low, high the first and last x [mfp]; bytes of a number."""
 
     rows: int
     columns: int
+    bytes: int
     low: float = 1e-4
     high: float = 1e4
 
-
-GRID, COARSE = TableGrid(65, 111), TableGrid(49, 89)  # coarser under a refracting interface
-
-
-@lru_cache(maxsize=len(LIGHTS) * (1 + len(KNOTS)))
-def baked(setting: Setting) -> str:
-    """Return A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64."""
-    grid, own = (GRID, log_profile) if setting.n == 1.0 else (COARSE, _refracted)
-    s = 1.0 - (1.0 - np.linspace(0.0, 1.0, grid.rows) ** 3) ** 2
-    alpha = np.maximum((1.0 - s) * (1.0 + s), LEAST_ALPHA)
-    y = np.linspace(np.log(grid.low), np.log(grid.high), grid.columns)
-    reflectance = np.asarray(exact.reflectance(alpha, setting))
-    profile = own(y, alpha, setting) - np.log(reflectance)[:, None]
-    cdf = np.log(np.asarray(exact.cdf(np.exp(y), alpha[:, None], setting=setting))) - y
-    numbers = np.concatenate([reflectance / alpha, profile.ravel(), cdf.ravel()])
-    return base64.b64encode(numbers.astype("<f4").tobytes()).decode("ascii")
+    @property
+    def size(self) -> int:
+        """Bytes of A / alpha (rows,) and of both tables (rows, columns)."""
+        return self.bytes * self.rows * (1 + 2 * self.columns)
 
 
-def _refracted(y: Floats, alpha: Floats, setting: Setting) -> Floats:
-    """Return ln(R_d l^2) + kappa x (albedos, radii), continued as x^-2 from where R_d is `FAINT` [-]."""
-    x = np.exp(y)
-    profile = np.asarray(exact.profile(x, alpha[:, None], setting=setting))
-    reflectance = np.asarray(exact.reflectance(alpha, setting))
-    seen = np.logical_and.accumulate(x**2 * profile > FAINT * reflectance[:, None], axis=1)
-    held = np.minimum(np.arange(y.size), np.sum(seen, axis=1)[:, None] - 1)
-    path = np.asarray(exact.decay_rate(alpha))[:, None] * x[held]
-    return np.log(np.take_along_axis(profile, held, axis=1)) + path - 2.0 * (y - y[held])
+GRID, COARSE = TableGrid(65, 111, 4), TableGrid(49, 89, 3)  # coarser under a refracting interface
 
 
-MATERIAL, LAW, SETTING = "skin1", "hazard", Setting("diffuse")
-COLOURS = (VERMILION, GREEN, BLUE)
-WHITE = "#ffffff"
-DECADES = (0.01, 0.1, 1.0, 10.0)  # of r [mm], labelled
-REACH = 5.0  # of the edge, to both sides [mm]
-TITLE = f"Law {LAW} (colours) on the exact half space (dashed): {MATERIAL} under diffuse light"
-# A colour of the figure -> the explorer's variable for it, so that it is read on dark pages too.
-VARIABLES = {
-    BLACK: "--x-fg",
-    WHITE: "--x-bg",
-    VERMILION: "--x-red",
-    GREEN: "--x-green",
-    BLUE: "--x-blue",
-    RC["grid.color"]: "--x-line",
-}
-
-
-@styled
-def still() -> str:
-    """Return the picture as SVG, by the shipped record: what it shows is the same in every report."""
-    law = load(LAW, setting=SETTING)
-    figure = canvas(3.2)
-    profile, cdf, edge = figure.subplots(1, 3)
-    alpha, mfp = (np.array(one)[:, None] for one in (BY_NAME[MATERIAL].alpha, BY_NAME[MATERIAL].mfp))
-    r = np.geomspace(0.01, 30.0, 120)
-    _pairs(profile, r, r * law.profile(r, alpha, mfp), r * np.asarray(exact.profile(r, alpha, mfp, SETTING)))
-    _pairs(cdf, r, law.cdf(r, alpha, mfp), np.asarray(exact.cdf(r, alpha, mfp, SETTING)))
-    profile.set(ylabel="$r\\,R_d$ [1/mm]")
-    profile.legend()
-    cdf.set(ylabel="cdf [-]", ylim=(0.0, 1.0))
-    for ax in (profile, cdf):
-        ax.set(xlabel="r [mm]", xscale="log")
-        ax.set_xticks(DECADES, [f"{value:g}" for value in DECADES])
-        ax.xaxis.set_minor_locator(NullLocator())
-    _edge(edge, law, alpha, mfp)
-    figure.suptitle(TITLE, fontsize=9.0)
-    file = io.StringIO()
-    figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
-    return inline(file.getvalue(), "explorer-still", TITLE, VARIABLES)
-
-
-def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
-    """Draw a line (channels, n) of the law for each channel, the exact one dashed on it, and its initial on both.
-
-    The initial stands where the line is farthest from the others.
-    """
-    for name, colour, by_law, true in zip(CHANNELS, COLOURS, law, truth, strict=True):
-        ax.plot(x, by_law, color=colour, linewidth=2.2, label=name)
-        ax.plot(x, true, color=BLACK, linestyle="--", linewidth=0.9)
-    ends = x.size // 12  # beside the frame
-    for c, name in enumerate(CHANNELS):
-        apart = np.min(np.abs(np.delete(law, c, axis=0) - law[c]), axis=0)
-        at = ends + np.argmax(apart[ends:-ends])
-        behind = {"boxstyle": "circle,pad=0.1", "facecolor": WHITE, "edgecolor": "none"}
-        ax.text(x[at], law[c, at], name[0].upper(), ha="center", va="center", weight="bold", size=8.0, bbox=behind)
-
-
-def _edge(ax: Axes, law: ProfileLaw, alpha: Floats, mfp: Floats) -> None:
-    """Draw radiance beside the edge, over the strip of colours that it makes."""
-    x = np.linspace(-REACH, REACH, 121)
-    reflectance = np.asarray(exact.reflectance(alpha, SETTING))
-    by_law = reflectance * step_response(x, alpha, mfp, law=law)
-    _pairs(ax, x, by_law, reflectance * step_response(x, alpha, mfp, SETTING))
-    strip = srgb_codes(by_law.T)[None].astype(np.uint8)
-    ax.imshow(strip, extent=(-REACH, REACH, 0.88, 1.0), aspect="auto", zorder=3)
-    ax.set(xlabel="from the edge of the light [mm]", ylabel="radiance [white = 1]", xlim=(-REACH, REACH), ylim=(0, 1))
+def tables() -> dict[str, list[str]]:
+    """Return the exact tables of each light, of n = 1 and of `KNOTS`, in base64: `EXACT` as the script reads it."""
+    content, found = (resources.files(__package__) / EXACT).read_bytes(), {}
+    for light in LIGHTS:
+        sizes = [GRID.size, *(COARSE.size for _ in KNOTS)]
+        parts = [content[sum(sizes[:k]) : sum(sizes[: k + 1])] for k in range(len(sizes))]
+        found[light] = [base64.b64encode(part).decode("ascii") for part in parts]
+        content = content[sum(sizes) :]
+    return found

@@ -3,7 +3,7 @@ const CHANNELS = ["red", "green", "blue"];
 const VIEWS = {
   rr: { title: "r R_d(r) [1/mm]", of: (value, r) => value * r },
   rd: { title: "R_d(r) [1/mm²]", of: (value) => value },
-  error: { title: "R_d: law / exact − 1" },
+  error: { title: "Relative error of R_d" },
 };
 
 function significant(value, digits = 2) {
@@ -27,8 +27,8 @@ class Results {
   // What is said of a law under an index that it was not made for.
   foreign(law, n) {
     this.part("foreign").hidden = law.follows(n);
-    this.part("foreign").textContent = `${law.label} is of n = 1, shown at the α of the exact half space of n = ${n}, whose `
-      + "surface keeps light in: compare hazard, which follows n.";
+    this.part("foreign").textContent = `${law.label} is of n = 1 and ignores the refracting surface of n = ${n}. `
+      + "Compare it with hazard, which follows n.";
   }
 
   profiles(channels, view) {

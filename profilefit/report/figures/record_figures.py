@@ -219,8 +219,8 @@ def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
 SHOWN = (MEASURES["rel"], MEASURES["ks"])
 KINDS = {
     "searchlight": "pencil beam, n = 1",
-    "diffuse": "diffuse light, n = 1",
-    "refracting": "refracting surfaces, n = 1.4",
+    "diffuse": "diffuse illumination, n = 1",
+    "refracting": "refracting interface, n = 1.4",
 }
 # Lines of one panel in turn, by colour and marker: never by colour alone. Printed constants are dashed.
 COLOURS, MARKERS = (pen.BLUE, pen.VERMILION, pen.GREEN, pen.ORANGE, pen.PURPLE, pen.SKY), "osv^Dx+<"

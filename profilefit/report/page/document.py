@@ -14,37 +14,26 @@ from profilefit.recipes import record
 from profilefit.report.drawing import classed
 from profilefit.report.explorer import explorer_section
 from profilefit.report.page import sections
-from profilefit.report.page.markup import element, markup, section
+from profilefit.report.page.markup import element, paragraph, section
 from profilefit.report.records import Source
-from profilefit.report.tables.record_tables import summary
 from profilefit.shader.emit import text_beside
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
-LEAD = (
-    "How much light leaves a translucent surface at distance r from where it entered, R_d(r), as closed forms: fitted "
-    "to simulated or exact profiles, every constant with its errors, every law with its distance from the exact "
-    "profile."
-)
-CONVENTIONS = (
-    "alpha: reduced albedo; A: total diffuse reflectance; l or mfp: transport mean free path "
-    "1 / (mu_s' + mu_a), the unit of r; searchlight: a pencil beam (normal, collimated); diffuse: cosine-weighted "
-    "light from all sides. Errors are one standard error."
-)
+LEAD = "Light enters skin, milk or marble at one point and leaves around it: these models compute how much, and where."
 ROOM = 2**25  # bytes of a disk; the page of all shipped records has 2.5 MB
 PARTS = {
-    "fits": "What was fitted, from what",
-    "explorer": "Explore",
-    "constants": "Published against regenerated",
-    "quality": "How good, by albedo",
-    "paper": "The paper's figures again",
+    "explorer": "Try a material",
+    "fits": "What was fitted",
     "records": "Each record",
-    "stacks": "Layers",
-    "stability": "Where methods fail",
-    "tradeoff": "Speed against accuracy",
+    "quality": "Errors and constants",
+    "paper": "Figures of the paper",
+    "stacks": "Layered media",
+    "tradeoff": "Speed and accuracy",
+    "stability": "Limits of the models",
     "check": "In a shader",
-    "claims": "Promised, and measured",
-    "provenance": "Where it comes from",
+    "claims": "Promises and measurements",
+    "provenance": "Origin of the records",
 }
 # Section, and the command that measures it -> its parts.
 MEASURED = {"stability": sections.failures, "tradeoff": sections.speed, "check": sections.shader}
@@ -64,8 +53,7 @@ $style
 <body>
 <header>
 <h1>$title</h1>
-<p class="lead">$lead</p>
-<p class="dim">$summary</p>
+<p class="lead">$lead <span class="dim">$summary</span></p>
 <button id="theme" type="button" hidden>light or dark</button>
 </header>
 <nav aria-label="Contents"><ul>$links</ul></nav>
@@ -99,10 +87,9 @@ def write_page(
     measured = {name: measures.section(name, parts) for name, parts in MEASURED.items()}
     measured["claims"] = "\n".join(sections.promises(measures))
     makers: dict[str, Callable[[], str]] = {
-        "fits": lambda: markup(summary({name: source.content(name) for name in source.paths})),
+        "fits": lambda: sections.fitted(source),
         "explorer": lambda: explorer_section(source.folder),
-        "constants": lambda: sections.whole_figure(source, "constants"),
-        "quality": lambda: sections.whole_figure(source, "quality"),
+        "quality": lambda: sections.whole_figures(source),
         "paper": lambda: sections.paper_figures(source),
         "stacks": lambda: "\n".join(sections.layers(source, measures)),
         # These take longest.
@@ -112,9 +99,10 @@ def write_page(
     }
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     made["records"] = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
-    parts = {key: (title, made[key]) for key, title in PARTS.items() if made[key]}
+    intro = {key: paragraph(text) for key, text in sections.INTRO.items()}
+    parts = {key: (title, intro.get(key, "") + made[key]) for key, title in PARTS.items() if made[key]}
     count = f"{len(source.paths)} record{'s' if len(source.paths) != 1 else ''}"
-    write_whole(path, document(TITLE, LEAD, f"{count}, profilefit {__version__}. {CONVENTIONS}", parts))
+    write_whole(path, document(TITLE, LEAD, f"{count}, profilefit {__version__}", parts))
 
 
 def document(title: str, lead: str, summary: str, parts: Mapping[str, tuple[str, str]]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from rich.console import Console, Group, RenderableType
@@ -32,14 +32,26 @@ def command(line: str) -> str:
     return element("pre", element("code", escape(line)), class_="command", tabindex="0")
 
 
-def details(summary: str, inside: str, id_: str = "", is_open: bool = False) -> str:
-    """Return a summary with content that a click opens."""
-    return element("details", f"<summary>{summary}</summary>\n{inside}", id_=id_ or None, open="" if is_open else None)
+def details(summary: str, inside: str, id_: str = "", is_open: bool = False, group: str = "", class_: str = "") -> str:
+    """Return a summary with content that a click opens; of a group, one is open at a time."""
+    given = {"id_": id_, "name": group, "class_": class_}
+    attributes = {key: text or None for key, text in given.items()}
+    pane = element("div", inside, class_="pane", tabindex="0") if inside else ""
+    return element("details", f"<summary>{summary}</summary>\n{pane}", open="" if is_open else None, **attributes)
 
 
 def section(id_: str, title: str, parts: Iterable[str]) -> str:
     """Return a section with its heading."""
     return element("section", f"<h2>{escape(title)}</h2>\n" + "\n".join(parts), id_=id_)
+
+
+def gallery(drawings: Mapping[str, str], group: str) -> str:
+    """Return thumbnails by their titles: a click, or the space bar, enlarges one of them and shrinks the others."""
+    shown = []
+    for title, drawn in drawings.items():
+        small = element("span", drawn, class_="wide paper") + element("span", escape(title), class_="dim")
+        shown.append(details(small, "", group=group, class_="thumb"))
+    return element("div", "\n".join(shown), class_="gallery") if shown else ""
 
 
 def figure(drawn: str, title: str, on_paper: bool = False) -> str:
@@ -56,7 +68,7 @@ def markup(part: RenderableType) -> str:
     if isinstance(part, str):
         return paragraph(part)
     if isinstance(part, Text):
-        return element("p", _letters(part, _style(part)), class_=_classes(_style(part)))
+        return element("p", _letters(part, _style(part)), class_=_classes(_style(part))) if part.plain else ""
     if isinstance(part, Padding):
         return markup(part.renderable)
     if isinstance(part, Group):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
@@ -14,17 +15,17 @@ from mcml_sim.files.whole_file import MOST_JSON, parse_json, read_whole
 from profilefit.errors import InputError
 from profilefit.fitting.quality import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.recipes.evidence import digest, stale
-from profilefit.recipes.record import record_setting
+from profilefit.recipes.record import SPANS, record_setting
 from profilefit.recipes.run import preset_photons
 from profilefit.report.drawing import address, checked, inline
 from profilefit.report.figures import record_figures as plots
 from profilefit.report.figures.canvas import only
 from profilefit.report.kinds import stack_table, sum_tables
-from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
-from profilefit.report.records import Content, Source
+from profilefit.report.page.markup import command, details, element, figure, gallery, markup, paragraph
+from profilefit.report.records import Content, Source, converged, index_words, measures
 from profilefit.report.tables.cells import ABSENT, column_table, row_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
-from profilefit.report.tables.record_tables import photons_text, record_tables
+from profilefit.report.tables.record_tables import photons_text, record_tables, summary
 from profilefit.report.tables.tradeoff_tables import point_columns
 from profilefit.studies.stability.cells import Verdict
 
@@ -42,13 +43,14 @@ def provenance(source: Source, page: str) -> Iterator[str]:
         "data": [str(one.get("data_digest", ABSENT))[:SHOWN] for one in contents.values()],
         "record's own": [hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] for path in source.paths.values()],
     }
-    caption = f"SHA-256, the first {SHOWN} letters, of the numbers that were fitted and of the record's file"
-    yield markup(column_table("Records", columns, caption, left=("record", "preset", "data", "record's own")))
+    caption = f"First {SHOWN} letters of the SHA-256: of the fitted data, and of the record's file"
+    table = column_table("", columns, caption, left=("record", "preset", "data", "record's own"))
+    yield details("Photons, seed and checksums of each record", markup(table))
     versions = {tuple(sorted((one.get("versions") or {}).items())) for one in contents.values()} - {()}
     for known in sorted(versions):
         yield paragraph("Made with " + ", ".join(f"{name} {number}" for name, number in known) + ".", "dim")
     yield paragraph(f"SHA-256 over all records of the folder: {digest(source.folder)}", "dim")
-    yield paragraph("To make all of it again (measurements with the records have their own commands, beside them):")
+    yield paragraph("These commands make the records and this page again:")
     shown = shlex.join(["profilefit", "report", *(source.names or ()), "--fits", "fits", "--html", page])
     yield command("\n".join([*_remake_lines(contents, bool(source.names)), shown]))
 
@@ -70,18 +72,42 @@ def _remake_lines(contents: Mapping[str, Content], named: bool = True) -> list[s
 
 # What a figure shows, by how its name begins.
 CAPTIONS = {
-    "liang-7-profile": "Equation (7): r R_d of photons, of the exact half space, of the law printed and regenerated.",
-    "liang-7-error": "R_d of the law over the exact one, less 1; the band holds photon noise and model discrepancy.",
-    "liang-8-albedo": "The map from A to alpha, and its errors to the right.",
-    "liang-11-a": "Coefficient a of (7) over alpha: fits at each albedo, the law (11) printed and regenerated.",
-    "liang-13-b": "Coefficient b of (7) over alpha: fits at each albedo, the law (13) printed and regenerated.",
-    "liang-15-c": "Coefficient c of (7) over alpha: fits at each albedo, the law (15) printed and regenerated.",
-    "liang-19-inverse": "The inverse cdf (19)-(20): printed, regenerated and exact.",
-    "inversion-error": "Largest error of inverse cdfs in the share of the reflected energy, by albedo.",
-    "constants": "Printed constants against regenerated ones. z: their difference over its error.",
-    "quality": "Error over the reduced albedo, at held-out albedos.",
-    "residuals": "Residuals of the fit.",
+    "liang-7-profile": "Equation (7): r R_d by photons, by the exact solution, by printed and by fitted constants.",
+    "liang-7-error": "Relative error of R_d by equation (7). The band holds photon noise and model error.",
+    "liang-8-albedo": "The albedo inversion, equation (8), and its errors to the right.",
+    "liang-11-a": "Coefficient a of equation (7) over the albedo: printed, and fitted again.",
+    "liang-13-b": "Coefficient b of equation (7) over the albedo: printed, and fitted again.",
+    "liang-15-c": "Coefficient c of equation (7) over the albedo: printed, and fitted again.",
+    "liang-19-inverse": "The inverse cdf, equations (19) and (20): printed, fitted again, and exact.",
+    "inversion-error": "Largest error of inverse cdfs, as a share of the reflected light, over the albedo.",
+    "constants": "Each constant as printed and as fitted again. z is the difference, divided by its standard error.",
+    "quality": "Errors of profile models over the reduced albedo, at held-out albedos.",
+    "residuals": "Residuals of the fit: the model divided by the data, minus 1, with the standard errors of the data.",
 }
+WHOLE = {"quality": "Errors of all records by albedo", "constants": "Printed constants and fitted ones"}
+PAPER = "The records allow these figures of the paper. The command draws them, as PNG and SVG, into the folder figures."
+FITTED = (
+    "A record is a file with the constants of one fit. The constants were fitted to simulated light (photons) or to "
+    "the exact solution. Each constant has its standard errors. For example, hazard-diffuse is the record of the model "
+    "hazard under diffuse illumination.",
+    "Symbols: alpha is the reduced albedo, and A the total diffuse reflectance. The length l (mfp) is the transport "
+    "mean free path 1 / (mu_s' + mu_a). R_d(r) is the reflected light per area at the distance r. The cdf is the share "
+    "of the reflected light within r. n is the refractive index, and g the mean cosine of scattering.",
+)
+INTRO = {  # of sections, in words
+    "records": "Each line opens one record: its constants with standard errors, the fit, and its errors by albedo.",
+    "quality": "Each curve is one model. Its errors are relative to the exact solution, at held-out albedos.",
+    "stacks": "These records describe media of two or three layers, for example skin. A click enlarges a picture.",
+    "tradeoff": "Each chart compares techniques by error and time. Techniques on the lower left are accurate and fast.",
+    "stability": "Each model was evaluated at many albedos and radii, in several arithmetics, for example float32. Red "
+    "cells mark values that fail.",
+    "check": "Exported shader sources ran on the device below. The tables compare their values with the reference.",
+    "claims": "The documentation states figures of accuracy and speed. Each row compares one figure with its last "
+    "measurement. Each line below is the command that measures again.",
+    "provenance": "Checksums and seeds identify the data of each record.",
+}
+KINDS = {"delta_A": "albedo inversion", "rel": "profile model", "inversion_error": "inverse cdf"}  # by their measures
+LIGHT = {"searchlight": "pencil beam", "diffuse": "diffuse illumination"}
 
 
 def _drawn(plan: plots.Plan, source: Source) -> str:
@@ -100,29 +126,56 @@ def _drawing(plan: plots.Plan, source: Source, title: str) -> str:
         return figure(inline(file.read_text(encoding="utf-8"), plan.name, title), title)
 
 
-def whole_figure(source: Source, name: str) -> str:
-    """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
-    (plan,) = (one for one in plots.plans(source) if one.name == name)
-    return _drawn(plan, source)
+def whole_figures(source: Source) -> str:
+    """Return the figures of more than one record: quality by albedo, and printed constants against regenerated ones."""
+    plans = {plan.name: plan for plan in plots.plans(source)}
+    drawn = {name: _drawn(plans[name], source) for name in ("quality", "constants")}
+    return "".join(details(WHOLE[name], part, "", name == "quality", "whole") for name, part in drawn.items())
 
 
 def paper_figures(source: Source) -> str:
-    """Return the figures of the paper again, as far as there are records for them."""
-    return "\n".join(_drawn(plan, source) for plan in plots.PAPER if set(plan.needs) <= set(source.paths))
+    """Return the figures of the paper again, as far as records are named that they show; else how to draw them."""
+    plans = [plan for plan in plots.PAPER if set(plan.needs) <= set(source.paths)]
+    if source.names or not plans:
+        return "\n".join(_drawn(plan, source) for plan in plans)
+    listed = "".join(element("li", escape(CAPTIONS[plan.name])) for plan in plans)
+    needed = shlex.join(dict.fromkeys(name for plan in plans for name in plan.needs))
+    return paragraph(PAPER) + element("ul", listed) + command(f"profilefit report {needed} --figures figures")
 
 
-def record_part(source: Source, name: str, figures: bool = True) -> str:
-    """Return everything of one record, folded; without `figures` only what its .json has."""
+def record_part(source: Source, name: str) -> str:
+    """Return everything of one record, folded; figures only where records are named, as 25 records take a minute."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
-    plans_of = [plan for plan in plots.record_plans(source, name) if not plan.missing] if figures else []
+    plans_of = [plan for plan in plots.record_plans(source, name) if not plan.missing]
     corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
-    drawings = "\n".join(_drawn(plan, source) for plan in plans_of if plan.name != corner)
-    draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
-    commands = [draw] if any(plan.name == corner for plan in plans_of) else []
-    command_again = command("\n".join([*_remake_lines({name: content}), *commands]))
-    title = element("b", escape(name)) + " " + element("span", escape(content["title"]), class_="dim")
-    return details(title, element("div", tables + drawings + command_again, class_="record"), f"record-{name}")
+    drawings = "\n".join(_drawn(plan, source) for plan in plans_of if source.names and plan.name != corner)
+    draw = f"profilefit report {shlex.quote(name)} --figures figures  # residuals, quality, posterior"
+    command_again = command("\n".join([*_remake_lines({name: content}), *([draw] if plans_of else [])]))
+    colour = "green" if "fit" not in content or converged(content) else "red"
+    result = content["fit"]["result"] if "fit" in content else f"{len(content['readings'])} readings"
+    status = element("span", escape(result.partition(":")[0]), class_=colour)
+    title = f"{element('b', escape(name))} {element('span', escape(in_words(content)), class_='dim')} {status}"
+    return details(title, tables + drawings + command_again, f"record-{name}", group="records")
+
+
+def in_words(content: Content) -> str:
+    """Return what a record is of: the kind, the illumination, n and g."""
+    if content["pipeline"] == "evidence":
+        return "comparison of readings of a paper"
+    kind = next((words for measure, words in KINDS.items() if measures(content, measure)), KINDS["inversion_error"])
+    spans = {name: (index_words(content, name), content.get(key)) for name, key in SPANS.items()}
+    of = (f"{name} {'in' if span else '='} {words}" for name, (words, span) in spans.items() if span or words != "0")
+    return f"{kind}, {LIGHT[content['setting']['illumination']]}, {', '.join(of)}"
+
+
+def fitted(source: Source) -> str:
+    """Return what the records are, in words, and all of them in tables, folded."""
+    contents = {name: source.content(name) for name in source.paths}
+    kinds = Counter(in_words(one).partition(",")[0] for one in contents.values())
+    listed = ", ".join(f"{kind} ({count})" for kind, count in kinds.items())
+    table = details("Largest errors of every record", markup(summary(contents, glyphs=False)))
+    return "".join(map(paragraph, (*FITTED, f"Records by kind: {listed}."))) + table
 
 
 ALL = "all"
@@ -141,11 +194,12 @@ class EvidenceFolder:
 
     def section(self, name: str, parts: Callable[[EvidenceFolder, Content], Iterator[str]]) -> str:
         """Return the parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
-        missing = paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")
+        line = command(f"profilefit {name} --out evidence")
+        missing = paragraph("Not measured here. This command measures it:", "dim") + line
         try:
             content = self.content(name)
             shown: Iterable[str] = [missing] if content is None else parts(self, content)
-            return "\n".join([*shown, *_pictures(self, RENDERS if name == "check" else {})])
+            return "\n".join([*shown, _pictures(self, RENDERS, name) if name == "check" else ""])
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
             expected = f"{self.folder / name}.json: expected what `profilefit {name} --out` writes"
             raise InputError(f"{expected}, got {type(error).__name__}: {error}") from error
@@ -167,58 +221,59 @@ class EvidenceFolder:
     def drawing(self, name: str, title: str, on_paper: bool = False) -> str:
         """Return the figure `name`.svg beside it, or nothing."""
         path = self.folder / f"{name}.svg"
-        if not path.exists():
-            return ""
+        return figure(self.drawn(path, title), title, on_paper) if path.exists() else ""
+
+    def drawn(self, path: Path, title: str) -> str:
+        """Return an SVG of the folder as part of the page; ValueError where it is none of matplotlib's."""
         content = read_whole(path, MOST_DRAWING)
         if len(content) > MOST_DRAWING:
             raise ValueError(f"a drawing of more than {MOST_DRAWING} bytes, {path.name}")
-        return figure(inline(checked(content.decode("utf-8")), name, title), title, on_paper)
+        return inline(checked(content.decode("utf-8")), path.stem, title)
 
     def origin(self, content: Content) -> str:
         """Return when, where and by which command it was measured, and whether the records have changed since."""
         made = content["made"]
         machine = made.get("machine") or {}
-        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
+        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by:"
         parts = [paragraph(when, "dim"), command(str(made.get("command")))]
         if content.get("of", ALL) != ALL:
             of = content["of"]
             listed = ", ".join(of) if isinstance(of, list) else str(of)
             parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
         if stale(made, self.records):
-            parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
+            parts.append(paragraph("Records or version have changed since then: run it again.", "red"))
         return "\n".join(parts)
 
 
 # `python -m benchmarks.render` makes them.
 RENDERS = {
-    "render-laws.png": "A head by the exact profile, four laws and the separable filter, and how far each is off.",
-    "render-error.png": "Error of renders over samples a pixel and over time, against the exact picture.",
-    "render-choices.png": "The same head by each way to sample.",
-    "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
+    "render-laws.png": "A head by the exact profile, by four models and by the separable filter, and their errors.",
+    "render-error.png": "Error of pictures over samples per pixel and over time, relative to the exact picture.",
+    "render-choices.png": "One head by each sampling technique.",
+    "render-17-samples.png": "One head by 17 samples per pixel, as in Figure 14 of Liang et al.",
 }
 # `python -m benchmarks.layers --pictures`, and those of heart, sea and fur, make them.
 OF_LAYERS = {
-    "render-layers.png": "A head of layered skin: its truth, the law of the stack, the first layer's dipole (Zhao et "
-    "al.), the nearest half space.",
-    "render-ear.png": "An ear lit from behind, by the same three ways.",
-    "render-heart.png": "A heart: its truth, Gaussians split between screen and atlas, texture space alone, the screen "
-    "alone, no light scattering sideways.",
-    "render-heart-cost.png": "The heart's error over the time of its passes, by each way at four sizes.",
-    "render-heart-map.png": "The heart's error by texel and view; the least of the three in bold.",
-    "render-sea.png": "Under the sea, from the top left: all light, light broadened on its way, the forward peak kept, "
-    "single scattering.",
-    "render-sea-cost.png": "The sea's error over the time of its view, by each kind.",
-    "render-fur.png": "A ball of fur, from the top left: rays against each strand; sixteen shells, linear, quadratic "
-    "and of the fitted exponent; sixteen swept slabs that test one strand, and two.",
-    "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
-    "own-data.png": "What rings can know of tissue, by place and error; n and g given or open.",
+    "render-layers.png": "Layered skin: reference, model of the layers, dipole of the first layer, one semi-infinite "
+    "medium.",
+    "render-ear.png": "An ear, lit from behind, by the same techniques.",
+    "render-heart.png": "A heart: reference, Gaussians split between screen and atlas, atlas alone, screen alone, no "
+    "scattering.",
+    "render-heart-cost.png": "Error of the heart over time, by each technique at four sizes.",
+    "render-heart-map.png": "Error of the heart over texel size and view. The lowest of three is bold.",
+    "render-sea.png": "Under water: all light, broadened light, forward peak, single scattering.",
+    "render-sea-cost.png": "Error under water over the time of a view, by each technique.",
+    "render-fur.png": "Fur: rays against each strand, then shells (linear, quadratic, fitted), then swept slabs.",
+    "render-fur-cost.png": "Error of fur over time, at six angles.",
+    "own-data.png": "Errors of tissue's properties by place and error of the data; n and g known or not.",
 }
-GROUPS = {"laws": ("Laws in float32", OF_PROFILE), "maps": ("Maps in float32", OF_MAP[:2])}
+GROUPS = {"laws": ("Profile models in float32", OF_PROFILE), "maps": ("Albedo inversions in float32", OF_MAP[:2])}
 MEANING = (
-    "model: the record's error against the exact half space or photons, worst albedo; float32: what rounding adds; "
-    "bad: NaN, Inf, negative or not monotone, in and out of where the law holds"
+    "model: largest error over the albedo, relative to the exact solution or to photons; float32: error that rounding "
+    "adds; bad: number of values that are NaN, infinite, negative or not monotone, inside and outside the range of the "
+    "model"
 )
-COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
+COSTS = "Nanoseconds of the fastest run; in brackets the median ratio to the time of normalized diffusion"
 
 
 def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
@@ -230,63 +285,64 @@ def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
     if sums := plots.sums_of(source.folder):
         yield _drawing(plots.Plan(plots.OF_SUMS, (), (), plots.sum_figure), source, plots.sum_caption(sums))
         for name, one in sums.items():
-            yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
-    yield from _pictures(evidence, OF_LAYERS)
+            yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))), group="sums")
+    yield _pictures(evidence, OF_LAYERS, "layers")
 
 
 def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     """Yield the parts of its section."""
     yield evidence.origin(content)
-    counts = " and ".join(f"{len(content[key])} {key}" for key in GROUPS)
+    counts = " and ".join(f"{len(content[key])} {title.split(' in ')[0].lower()}" for key, (title, _) in GROUPS.items())
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
-    for key, (title, measures) in GROUPS.items():
-        errors = (f"{MEASURES[name].symbol}\n{of}" for name in measures for of in ("model", "float32"))
+    for key, (title, names) in GROUPS.items():
+        errors = (f"{MEASURES[name].symbol}\n{of}" for name in names for of in ("model", "float32"))
         header, rows = ("law", "result", "light", "n", *errors, "bad\ninside", "bad\noutside"), []
         for one in content[key]:
             setting = (one["setting"]["illumination"], f"{one['setting']['n']:g}")
-            known = (of.get(name) for name in measures for of in (one["model"]["values"], one["rounding"]))
+            known = (of.get(name) for name in names for of in (one["model"]["values"], one["rounding"]))
             bad = (sum(v for v in one[place].values() if isinstance(v, int)) for place in ("inside", "outside"))
             result = "FAIL" if one["broken"] else "pass"
             rows.append((_label(one), result, *setting, *map(significant, known), *map(str, bad)))
         if rows:
-            yield markup(row_table(title, header, rows, MEANING, left=("light", "result"), fold=("law",)))
+            table = row_table("", header, rows, MEANING, left=("light", "result"), fold=("law",))
+            yield details(title, markup(table), group="shader")
     if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in content[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
     if costs := content["costs"]:
         columns = {"source": list(costs)}
         for work in next(iter(costs.values()))["ns"]:
             columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
-        yield markup(column_table(COSTS, columns, left=("source",)))
+        table = column_table("", columns, COSTS, left=("source",))
+        yield details("Time of one evaluation", markup(table), group="shader")
 
 
 def _label(content: Content) -> str:
     return f"{content['name']}, {content['constants']}" if content["constants"] else str(content["name"])
 
 
-def _pictures(evidence: EvidenceFolder, titles: Mapping[str, str]) -> Iterator[str]:
-    for name, title in titles.items():
-        if (path := evidence.folder / name).exists():
-            source = address(path.read_bytes(), loss=True)
-            yield figure(f'<img alt="{escape(title)}" src="{source}">', title)
+def _pictures(evidence: EvidenceFolder, titles: Mapping[str, str], group: str) -> str:
+    paths = {title: path for name, title in titles.items() if (path := evidence.folder / name).exists()}
+    shown = {title: f'<img alt="" src="{address(path.read_bytes(), loss=True)}">' for title, path in paths.items()}
+    return gallery(shown, f"pictures-{group}")
 
 
 CHARTS = {
-    "truth": "Truths: error over time for a profile at five albedos.",
-    "laws": "Laws: error of R_d over the time of one evaluation.",
-    "samplers": "Samplers: error at an edge of light over time.",
-    "fits": "Fits: error of constants over time.",
+    "truth": "References: error of a profile at five albedos, over time.",
+    "laws": "Profile models: error of R_d over the time of one evaluation.",
+    "samplers": "Samplers: error at an edge of light, over time.",
+    "fits": "Fits: error of constants, over time.",
 }
 
 
 def speed(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     """Yield the parts of its section."""
-    for name, title in CHARTS.items():
-        if name in content:
-            # Parts may have been measured on different days.
-            yield evidence.origin({"made": content["made"], **content[name]})
-            yield evidence.drawing(f"tradeoff-{name}", title)
-            yield details(f"{escape(title)} The numbers", _numbers(content[name]))
+    paths = {title: evidence.folder / f"tradeoff-{name}.svg" for name, title in CHARTS.items() if name in content}
+    yield gallery({title: evidence.drawn(path, title) for title, path in paths.items() if path.exists()}, "charts")
+    for name in CHARTS:
+        if name in content:  # parts may have been measured on different days
+            numbers = evidence.origin({"made": content["made"], **content[name]}) + _numbers(content[name])
+            yield details(f"Numbers: {CHARTS[name].partition(':')[0].lower()}", numbers, group="tradeoff")
 
 
 def _numbers(part: Content) -> str:
@@ -300,12 +356,11 @@ def _numbers(part: Content) -> str:
 
 
 HOLDS = {
-    True: "No law, map or solver of this project has a red cell inside its stated range.",
-    False: "A law, map or solver of this project has a red cell inside its stated range.",
+    True: "No model, map or solver of this project fails (red cell) inside its stated range.",
+    False: "A model, map or solver of this project fails (red cell) inside its stated range.",
 }
 UNKNOWN = "no reference there: NaN, sign and order only"
 ATLAS = "stability-"
-FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
 def failures(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
@@ -313,7 +368,7 @@ def failures(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     yield evidence.origin(content)
     yield paragraph(HOLDS[bool(content["passed"])], "bold")
     aside = sum(int(one["count"]) for one in content["regions"] if one["class"] == Verdict.NOT_JUDGED.words)
-    yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
+    yield paragraph(f"{aside} cells, of all models, are not judged: there is no reference value.", "dim")
     groups: dict[str, list[Content]] = {}
     for region in content["regions"]:
         # Earlier versions wrote a cause and its remedy.
@@ -321,16 +376,16 @@ def failures(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
         groups.setdefault(sentence or UNKNOWN, []).append(region)
     rows = dict(sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]})))
     columns = {
-        "laws": [str(len({one["law"] for one in group})) for group in rows.values()],
+        "models": [str(len({one["law"] for one in group})) for group in rows.values()],
         "cells": [str(sum(int(one["count"]) for one in group)) for group in rows.values()],
-        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows.values()],
+        "result": [", ".join(sorted({one["class"] for one in group})) for group in rows.values()],
         "what helps": list(rows),
     }
-    yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
-    for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
-        title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
-        figure = evidence.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
-        yield details(title, figure, is_open=path.stem == FIRST)
+    yield markup(column_table("Where cells are red, and what helps", columns, left=("result",), fold=("what helps",)))
+    paths = {path: path.stem.removeprefix(ATLAS).replace("-", " ") for path in evidence.folder.glob(f"{ATLAS}*.svg")}
+    titles = {f"Arithmetic: {words}": path for path, words in sorted(paths.items())}
+    yield paragraph("One map for each arithmetic. One cell is one albedo and one radius (or share of the light).")
+    yield gallery({title: evidence.drawn(path, title) for title, path in titles.items()}, "stability-maps")
 
 
 def promises(evidence: EvidenceFolder) -> Iterator[str]:
@@ -338,4 +393,6 @@ def promises(evidence: EvidenceFolder) -> Iterator[str]:
     if (evidence.folder / FILE).exists():
         made, claims = read_claims(evidence.folder)
         yield evidence.origin({"made": made})
-        yield from map(markup, claim_tables(claims))
+        commands = dict.fromkeys(one.command for one in claims)
+        for line, table in zip(commands, claim_tables(claims), strict=True):
+            yield details(element("code", escape(line)), markup(table), group="claims")

@@ -23,6 +23,10 @@ PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
 MAP_COLUMNS = ("A\nmodel", "A\nfloat32", "α\nmodel", "α\nfloat32")
 COUNTS = ("bad\nin", "bad\nout")
+# Of markdown: what float32 adds.
+LAW_HEADERS = ("R_d [1e-6]", "cumulative energy [1e-6]", "radius [1e-6]", "density [1e-6]")
+MAP_HEADERS = ("A [1e-6]", "α [1e-6]")
+COSTS = ("law", *(f"{work} [ns]" for work in tuple(WORKS)[:3]))
 CAPTION = (
     "model: the record's error against the exact half space or photons, worst albedo (of printed constants that of "
     "the regenerated); float32: what rounding adds, at worst; sample: share of the energy between both radii; pdf: the "
@@ -43,7 +47,7 @@ def check_tables(outcome: Checked, in_detail: bool = False) -> list[RenderableTy
     for kind, names, checks in _groups(outcome):
         has_g = any(one.of.setting.g for one in checks)
         header = (kind, "n", *(("g",) if has_g else ()), *names, *COUNTS, "result")
-        rows = [(one.of.label, *_setting(one.of)[1 : 2 + has_g], *_cells(one)) for one in checks]
+        rows = [(one.of.label, *_setting(one.of)[: 1 + has_g], *_cells(one)) for one in checks]
         title, caption = f"{kind.capitalize()}s in float32, {outcome.device}", CAPTION if kind == "law" else ""
         parts.append(row_table(title, header, rows, caption, left=("result",), fold=(kind,)))
     parts += _place_tables(outcome.laws) if in_detail else []
@@ -106,17 +110,23 @@ def markdown_check(folder: Path) -> str:
 
 
 def markdown_checks(outcome: Checked) -> str:
-    """Return the README's tables: laws, maps, costs, and the broken bounds."""
+    """Return the tables of a page: what float32 adds at worst, a line a law and a line a map, costs, the device."""
     parts = []
-    for kind, names, checks in _groups(outcome):
-        header = (kind, "light", "n", "g", *(name.replace("\n", " ") for name in (*names, *COUNTS)), "result")
-        parts.append(markdown_table(header, [(one.of.label, *_setting(one.of), *_cells(one)) for one in checks]))
-    if broken := [f"- `{_called(one)}`: {bound}" for one in outcome.checks for bound in one.broken]:
-        parts.append("\n".join(broken))
+    for kind, _, checks in _groups(outcome):
+        header = (kind, *(LAW_HEADERS if kind == "law" else MAP_HEADERS), "bad values", "result")
+        labels = dict.fromkeys(one.of.label for one in checks)
+        parts.append(markdown_table(header, [_row(name, [c for c in checks if c.of.label == name]) for name in labels]))
     if outcome.costs:
-        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), _cost_rows(outcome.costs)))
-    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if outcome.costs else [])]
-    return "\n\n".join([*parts, f"On {outcome.device}. {'. '.join(captions)}."])
+        parts.append(markdown_table(COSTS, [row[: len(COSTS)] for row in _cost_rows(outcome.costs)]))
+    return "\n\n".join([*parts, f"Measured on {outcome.device}."])
+
+
+def _row(label: str, checks: Sequence[ShaderCheck]) -> tuple[str, ...]:
+    """Return the largest errors of float32 over n and g [1e-6], and bad values in/out of where the law holds."""
+    added = zip(*(_numbers(one)[1:4:2] + _numbers(one)[4:] for one in checks), strict=True)
+    worst = (max((1e6 * value for value in column if value is not None), default=None) for column in added)
+    bad = (str(sum(getattr(one, where).total for one in checks)) for where in ("inside", "outside"))
+    return (label, *map(significant, worst), "/".join(bad), FAIL if any(one.broken for one in checks) else PASS)
 
 
 def content(outcome: Checked) -> dict[str, Any]:
@@ -153,17 +163,21 @@ def _at_index(named: LoadedLaw) -> str:
 
 
 def _cells(check: ShaderCheck) -> tuple[str, ...]:
-    """Return model and float32 errors: of profile and cdf, or A and α; of radii and pdf; bad values and the verdict."""
+    """Return the errors, bad values and the verdict."""
+    bad = (str(check.inside.total), str(check.outside.total))
+    return (*map(significant, _numbers(check)), *bad, FAIL if check.broken else PASS)
+
+
+def _numbers(check: ShaderCheck) -> list[float | None]:
+    """Return model and float32 errors: of profile and cdf, or A and α; of radii and pdf."""
     rounding, more = check.rounding, list[float | None]()
     if isinstance(check, LawCheck):
         rounding = {name: value for name, value in rounding.items() if JUDGED[name] in check.spreads}
         own = check.spreads.get(OWN)
         more = [rounding.get("inversion_error"), own.most if own else None]
     names = ("delta_A", "delta_alpha") if isinstance(check, MapCheck) else ("rel", "ks")
-    numbers = [value for name in names for value in (check.model.get(name), rounding.get(name))] + more
-    bad = (str(check.inside.total), str(check.outside.total))
-    return (*map(significant, numbers), *bad, FAIL if check.broken else PASS)
+    return [value for name in names for value in (check.model.get(name), rounding.get(name))] + more
 
 
-def _setting(named: LoadedLaw) -> tuple[str, str, str]:
-    return named.setting.illumination, f"{named.setting.n:g}", f"{named.setting.g:g}"
+def _setting(named: LoadedLaw) -> tuple[str, str]:
+    return f"{named.setting.n:g}", f"{named.setting.g:g}"

@@ -1,12 +1,13 @@
-"""Claims of README and guides beside what was measured: the rows that `make claims` writes in a checkout."""
+"""Claims of README and guides with measured values: the rows that `make claims` writes in a checkout."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from html import escape
 from itertools import groupby, product
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from rich.console import RenderableType
@@ -20,21 +21,23 @@ from profilefit.report.tables.markdown import markdown_table
 
 FILE = "claims.json"
 AT_MOST, AT_LEAST = "≤", "≥"
-EXACT = "exact"  # the noise of what the same records give again to every digit
+EXACT = "exact"  # the noise of a value that a repeat gives to every digit
+CODE, LINE = 84, 116  # characters of a line of a page, in a command and in a paragraph
 
 
 @dataclass(frozen=True)
 class Claim:
     """A promised figure.
 
-    name   what `make claims ARGS="--only NAME"` calls it;  says  what the figure is of
-    value  measured, and low, high: the ends of its spread [unit];  noise  what that spread is, or what else is known
-    bound  what is promised [unit]: the most (sense ≤) or the least (sense ≥);  unit  % or nothing, for a plain number
-    truth  what it was held against;  command  prints it again;  date  of that [UTC, ISO 8601]
-    load   processes that wanted a core in the minute before, mean [-]
+    name   its anchor, and NAME of `make claims ARGS="--only NAME"`;  subject  "title: caption" of its table
+    says   measured quantity;  value  measured, low, high  ends of its spread [unit];  noise  meaning of the spread
+    bound  promised limit [unit]: upper (sense ≤) or lower (sense ≥);  unit  % or nothing, for a plain number
+    truth  reference;  command  prints the value;  date  of the measurement [UTC, ISO 8601]
+    load   mean number of processes that waited for a core in the minute before [-]
     """
 
     name: str
+    subject: str
     says: str
     value: float
     low: float
@@ -57,10 +60,15 @@ class Claim:
     def cells(self) -> tuple[str, str, str, str]:
         """Texts of the claim, the promise, the measured value and its noise."""
         unit = f" {self.unit}" if self.unit else ""
-        value, low, high = (significant(number, 3) for number in (self.value, self.low, self.high))
-        measured = f"{value}{unit}{'' if self.holds else ' BROKEN'}"
-        spread = "" if self.low == self.high else f"{low} … {high}{unit}: "
-        return self.says, f"{self.sense} {self.bound:g}{unit}", measured, f"{spread}{self.noise}"
+        measured = f"{significant(self.value, 3)}{unit}{'' if self.holds else ' BROKEN'}"
+        noise = f"{self.spread}: {self.noise}" if self.spread else self.noise
+        return self.says, f"{self.sense} {self.bound:g}{unit}", measured, noise
+
+    @property
+    def spread(self) -> str:
+        """Ends of the spread, or nothing where the value has none."""
+        ends = f"{significant(self.low, 3)} … {significant(self.high, 3)} {self.unit}".strip()
+        return "" if self.low == self.high else ends
 
 
 def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
@@ -80,22 +88,37 @@ def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
 
 
 def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
-    """Return a table for each command, under its name."""
+    """Return a table for each command, with the command as its title."""
     parts: list[RenderableType] = []
     for command, group in groupby(claims, key=lambda one: one.command):
         rows = list(group)
-        caption = f"held against: {rows[0].truth}; {rows[0].date}, load before {rows[0].load}"
+        caption = f"Reference: {rows[0].truth}. Measured {rows[0].date[:10]} at a load of {rows[0].load} processes."
         header = ("claim", "promised", "measured", "noise")
         parts.append(row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise")))
     return parts
 
 
 def markdown_claims(folder: Path) -> str:
-    """Return all rows as one table for the documentation."""
-    made, claims = read_claims(folder)
-    header = ("claim", "promised", "measured", "noise", "held against", "command", "load")
-    rows = [(*one.cells, one.truth, f"`{one.command}`", one.load) for one in claims]
-    machine = made.get("machine") or {}
-    note = f"Measured until {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores). "
-    note += "load: processes that wanted a core in the minute before the command."
-    return f"{markdown_table(header, rows)}\n\n{escape(note)}"
+    """Return a table for each subject, an anchor for each row, and below it the commands, folded."""
+    parts = []
+    for subject, group in groupby(read_claims(folder)[1], key=lambda one: one.subject):
+        title, _, caption = subject.partition(": ")
+        rows = list(group)
+        table = markdown_table(("claim", "promised", "measured"), [one.cells[:3] for one in rows]).splitlines()
+        anchors = (f'| <a id="{escape(one.name)}"></a>' for one in rows)
+        table[2:] = [line.replace("| ", anchor, 1) for line, anchor in zip(table[2:], anchors, strict=True)]
+        parts += [f"## {escape(title)}", f"{escape(caption)}.", "\n".join(table)]
+        parts += ["<details>\n<summary>Details</summary>", *_origins(rows), "</details>"]
+    return "\n\n".join(parts)
+
+
+def _origins(claims: Sequence[Claim]) -> Iterator[str]:
+    """Yield each command, and below it the reference, the date, the load and the spreads of its values."""
+    for command, group in groupby(claims, key=lambda one: one.command):
+        rows = list(group)
+        yield "```\n" + " \\\n    ".join(wrap(command, CODE, break_on_hyphens=False)) + "\n```"
+        text = f"Reference: {rows[0].truth}. On {rows[0].date[:10]}, load {rows[0].load}."
+        for noise in dict.fromkeys(one.noise for one in rows if one.noise != EXACT):
+            spreads = [f"`{one.name}` {one.spread}".strip() for one in rows if one.noise == noise]
+            text += f" {noise[:1].upper()}{noise[1:]}: {', '.join(spreads)}."
+        yield "\n".join(wrap(escape(text, quote=False), LINE, break_on_hyphens=False))

@@ -92,9 +92,9 @@ COLUMNS = {
     "variance": "variance",
 }
 CAPTION = (
-    "inversion: max |cdf(r(ξ)) − ξ|, ξ ≤ 0.999; atom: share of samples at one radius; even, edge: relative error of "
-    "even light and of light beyond a straight edge, with the sampler's own pdf or the law's; variance: of the weight "
-    "of one sample, with its own"
+    "inversion: max |cdf(r(ξ)) − ξ|, ξ ≤ 0.999; atom: share of samples at one radius; even, edge: relative error under "
+    "even illumination and beside its edge, with the pdf of the sampler (own) or of the model (law); variance: of the "
+    "weight of one sample, with the pdf of the sampler"
 )
 
 
@@ -133,8 +133,8 @@ SCALES: Mapping[str, tuple[float, str]] = {
     "r2": (1.0, ""),
 }
 MAP_HEADERS = ("map", "light", "n", "δA", "δα", "√(1-α)", "rises", "α(1)", "fold", "α(0)")
-MAP_CAPTION = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
-NOTHING = "None of these records holds a law that can be measured against the exact half space."
+MAP_CAPTION = "δA, δα: largest errors; √(1-α): largest relative error; fold: A at which alpha(A) turns; for its light"
+NOTHING = "None of these records holds a model with an exact solution as reference."
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[Rendera
             home = (law.label, law.setting.illumination, f"{law.setting.n:g}")
             numbers = (albedo_number(measure, getattr(quality, measure)) for measure in OF_MAP)
             rows.append((*home, *numbers, albedo_number("at_one", law.law.alpha(0.0))))
-        yield row_table("Maps between A and α", MAP_HEADERS, rows, MAP_CAPTION, left=("light",), fold=("map",))
+        yield row_table("Albedo inversions", MAP_HEADERS, rows, MAP_CAPTION, left=("light",), fold=("map",))
     for setting, of_setting in groupby(qualities.samplers, key=lambda one: one.of.setting):
         samplers = list(of_setting)
         shown = []
@@ -187,7 +187,7 @@ def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[Rendera
             errors = (one.exact_error, *(getattr(one.quality, name) for name in COLUMNS.values()))
             shown.append((f"{one.of.label}: {one.name}", *map(_worst, errors)))
         header = ("law: sampler", "exact", *COLUMNS)
-        caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
+        caption = f"At the worst albedo. {CAPTION}; exact: inversion error by the exact cdf"
         yield row_table(f"Samplers, {setting}", header, shown, caption, fold=header[:1])
         if in_detail:
             yield from sampler_tables({f"{one.of.label}: {one.name}": one.quality for one in samplers})
@@ -226,18 +226,19 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 
 def markdown_laws(measured: Sequence[tuple[LoadedLaw, Quality]]) -> str:
-    """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    of_measures = (f"{measure} {which}" for measure in ("rel", "ks") for which in ("mean", "worst"))
-    header = ("law", "constants", "light", "n", "number", *of_measures)
+    """Return a line a law: where it belongs, its constants, and its errors over alpha [%]."""
+    header = ("model", "constants", "illumination", "n", "mean error of R_d [%]", "largest [%]")
     rows = [
         (
             *(one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"),
-            str(len(one.law.constant_names())),
-            *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
+            *(
+                significant(PERCENT * float(of))
+                for of in (np.mean(quality.rel), np.max(quality.rel), np.max(quality.ks))
+            ),
         )
         for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
     ]
-    return markdown_table(header, rows)
+    return markdown_table((*header, "largest error of cumulative energy [%]"), rows)
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
@@ -252,7 +253,7 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     columns["mean"] = [_number(measure, float(np.mean(row))) for row in values]
     columns["worst"] = [_number(measure, MEASURES[measure].worst(row)) for row in values]
     title = f"{measure}: {MEASURES[measure].formula}{SCALES[measure][1]}, by α; {setting}"
-    caption = f"mean and worst over {alpha.size} albedos; over α: from the least to the worst here, logarithmic"
+    caption = f"mean and worst over {alpha.size} albedos; over α: logarithmic scale, from the least to the worst here"
     if setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))

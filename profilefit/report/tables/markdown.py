@@ -16,15 +16,27 @@ from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.quality_tables import albedo_number
 
 OF_THE_PAPER = ("liang", "burley", "rational")  # its own laws, and those it is compared with
-PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
+# Words and factor of a measure in headers.
+WORDS = {
+    "rel": ("error of R_d [%]", 100.0),
+    "ks": ("error of cumulative energy [%]", 100.0),
+    "l1": ("misplaced energy [%]", 100.0),
+    "mse": ("MSE [1e-6/mfp²]", 1e6),
+    "r2": ("R²", 1.0),
+    "inversion_error": ("error of the sampled energy [%]", 100.0),
+}
 DISTANCES = ("constant_distance", "curve_distance")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
+AS_PUBLISHED = "-as-published"  # ends the name of a record of the paper's protocol
+OF_MAPS = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)")
+OF_MAPS += ("monotone", "α at A = 1", "A at the fold")
+
 # Headers of columns that stand to the left.
-NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
-NAMES |= {"verdict", "law", "profile model", "light", "sampler", "measure", "claim", "noise"}
-NAMES |= {"held against", "command", "stack", "channel"}
+NAMES = frozenset({"record", "equation", "constant", "constants", "constants found"})
+NAMES |= {"verdict", "law", "profile model", "model", "map", "source", "illumination", "light", "sampler", "measure"}
+NAMES |= {"claim", "noise", "held against", "command", "stack", "channel", "table", "fit", "moments"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # Profile models of the README: the one in use, the best sum of Gaussians, and those of the lowest error.
 SHORT = {("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
@@ -32,87 +44,73 @@ SHORT |= {("hazard-refracting", "regenerated")}
 
 
 def markdown_constants(contents: Mapping[str, Content]) -> str:
-    """Return every constant of every record: printed, regenerated, and its errors; a failed fit has no row."""
-    known = records.known_errors(one for content in _fits(contents).values() for one in content["constants"].values())
-    header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
-    rows: list[Sequence[str]] = []
+    """Return every constant as published and as refitted by both protocols; a failed fit has no value."""
+    rows: dict[tuple[str, str], list[str]] = {}
     failures = []
     for name, content in _fits(contents).items():
+        stem = name.removesuffix(AS_PUBLISHED).removesuffix("-whole")
         if not converged(content):
             failures.append(f"{_text(name)} has no constants to show: {_text(content['fit']['result'])}.")
             continue
         for constant, values in content["constants"].items():
-            errors = [significant(values.get(key)) for key in known]
-            if not values.get("free", True):
-                errors = ["held", *[ABSENT] * (len(known) - 1)]
-            published = values.get("published")
-            rows.append((
-                name, EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT, constant,
-                ABSENT if published is None else f"{published:g}",
-                to_error(values["regenerated"], largest_error(values)), *errors,
-            ))  # fmt: skip
-    note = "Digits end where the largest error does; constants are correlated, so compute with the record's own."
-    return "\n\n".join([markdown_table(header, rows), *failures, note])
+            value, error = values["regenerated"], records.total_error(values) or largest_error(values)
+            published = ABSENT if values.get("published") is None else f"{values['published']:g}"
+            equation = EQUATION.get(constant, stem) if content["law"] == "liang" else stem
+            row = rows.setdefault((stem, constant), [equation, constant, published, ABSENT, ABSENT])
+            text = (
+                f"{to_error(value, error)} ± {significant(error)}" if values.get("free", True) else f"{value:g} (fixed)"
+            )
+            row[-2 if name.endswith(AS_PUBLISHED) else -1] = text
+    table = markdown_table(("equation", "constant", "published", "paper's protocol", "whole profile"), [*rows.values()])
+    return "\n\n".join([table, *failures])
 
 
 def _hazard(contents: Mapping[str, Content]) -> str:
-    """Return the constants of the hazard law in every setting, a record a column, and its worst errors there.
-
-    Records of n = 1 come first, then those that span the indices of a surface that refracts.
-    """
-    of_hazard = {name: c for name, c in _fits(contents).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
-    fitted = {name: c for name, c in of_hazard.items() if converged(c)}
-    forms: dict[tuple[str, ...], dict[str, Content]] = {}
-    for name, content in sorted(fitted.items(), key=lambda item: bool(item[1].get("indices"))):
-        forms.setdefault(tuple(content["constants"]), {})[name] = content
-    tables = []
-    for names, alike in forms.items():  # a column for each record of the same constants
-        rows = [("n", *map(records.index_words, alike.values()))]
-        for name in names:
-            of = [content["constants"][name] for content in alike.values()]
-            rows.append((name, *(to_error(one["regenerated"], largest_error(one)) for one in of)))
-        for measure in ("rel", "ks"):
-            worst_of = (records.worst(content, "regenerated", measure) for content in alike.values())
-            rows.append((f"{measure}, worst", *map(significant, worst_of)))
-        tables.append(markdown_table(("constant", *alike), rows))
-    return "\n\n".join(tables)
+    """Return the constants of the hazard law at n = 1, a record a column, and its largest errors there."""
+    named = {name: c for name, c in _fits(contents).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
+    fitted = {name: c for name, c in named.items() if converged(c) and c["setting"].get("n") == 1}
+    rows = []
+    for name in next(iter(fitted.values()), {"constants": ()})["constants"]:
+        of = [content["constants"][name] for content in fitted.values()]
+        rows.append((name, *(to_error(each["regenerated"], largest_error(each)) for each in of)))
+    for measure, (words, factor) in list(WORDS.items())[:2]:
+        worst = (factor * records.worst(content, "regenerated", measure) for content in fitted.values())
+        rows.append((f"largest {words}", *map(significant, worst)))
+    return markdown_table(("constant", *fitted), rows) if fitted else ""
 
 
 def _readings(contents: Mapping[str, Content]) -> str:
-    """Return the reading nearest to print of each equation: its choices, its result, and the verdict."""
-    header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
-    readings = [r for content in contents.values() for r in content.get("readings") or ()]
+    """Return the reading nearest to print of each equation: its constants, their distance, and the verdict."""
     best: dict[str, Content] = {}
+    readings = [r for content in contents.values() for r in content.get("readings") or ()]
     for reading in sorted(readings, key=lambda r: inf if r["curve_distance"] is None else r["curve_distance"]):
         best.setdefault(reading["equation"], reading)
     rows = [
         (
             equation,
-            best[equation]["choices"],
             ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
-            ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
-            *(ABSENT if (far := best[equation][key]) is None else f"{far:.1%}" for key in DISTANCES),
+            *(ABSENT if (far := best[equation][key]) is None else f"{far:.1%}".replace("%", " %") for key in DISTANCES),
             best[equation]["verdict"],
         )
         for equation in dict.fromkeys(reading["equation"] for reading in readings)
     ]
+    header = ("equation", "constants found", "worst constant", "curve, rms", "verdict")
     return markdown_table(header, rows) if rows else ""
 
 
 def sections(contents: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
     paper = {name: c for name, c in contents.items() if _is_searchlight(c) and c["law"] in OF_THE_PAPER}
-    of_maps = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
     sets = _measured(contents, "delta_A")
     maps = [(owner, which, *(albedo_number(name, values[name]) for name in OF_MAP)) for owner, which, values in sets]
     tables = {
         "short": _short(contents),
-        "quality": _quality(_measured(paper, "rel"), PROFILE_MEASURES),
+        "quality": _quality(_measured(paper, "rel"), ("mean rel", "largest l1", "largest mse", "smallest r2")),
         "constants": markdown_constants(paper),
         "hazard": _hazard(contents),
         "readings": _readings(contents),
-        "inversion": _quality(_measured(contents, "inversion_error"), ("inversion_error",)),
-        "maps": markdown_table(of_maps, maps) if maps else "",
+        "inversion": _quality(_measured(contents, of := "inversion_error"), (f"mean {of}", f"largest {of}")),
+        "maps": markdown_table(OF_MAPS, maps) if maps else "",
     }
     return {name: text for name, text in tables.items() if text}
 
@@ -127,19 +125,18 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
     return text
 
 
-def _quality(sets: Sequence[tuple[str, str, Content]], measures: Sequence[str], of: str = "record") -> str:
-    """Return a row for each set of constants: mean and worst over alpha of these measures; nothing without a set."""
-    header = (of, "constants", *(f"{key.replace('_', ' ')} {end}" for key in measures for end in ("mean", "worst")))
+def _quality(sets: Sequence[tuple[str, str, Content]], columns: Sequence[str], of: str = "record") -> str:
+    """Return a row for each set of constants, its mean or worst measures over alpha; nothing without a set."""
+    ends = [column.split() for column in columns]
     rows = []
     for owner, which, values in sets:
         row = [owner, which]
-        for key in measures:
-            ends: tuple[float | None, float | None] = (None, None)  # photons do not say all
-            if (known := values.get(key)) is not None:
-                ends = float(np.mean(known)), MEASURES[key].worst(known)
-            row += [f"{end:.4f}" if key == "r2" and end is not None else significant(end) for end in ends]
+        for end, key in ends:
+            known, factor = values.get(key), WORDS[key][1]  # photons do not say all
+            value = None if known is None else float(np.mean(known)) if end == "mean" else MEASURES[key].worst(known)
+            row.append(f"{value:.4f}" if key == "r2" and value else significant(value and factor * value))
         rows.append(row)
-    return markdown_table(header, rows) if rows else ""
+    return markdown_table((of, "constants", *(f"{end} {WORDS[key][0]}" for end, key in ends)), rows) if rows else ""
 
 
 def _short(contents: Mapping[str, Content]) -> str:
@@ -147,13 +144,8 @@ def _short(contents: Mapping[str, Content]) -> str:
     searchlight = {name: c for name, c in contents.items() if _is_searchlight(c, spanning=True)}
     chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     chosen.sort(key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
-    rows = []
-    for owner, which, values in chosen:
-        ends = (end for key in ("rel", "ks") for end in (np.mean(values[key]), max(values[key])))
-        rows.append([owner + records.at_index(contents.get(owner, {})), which, *(f"{100 * end:.2g} %" for end in ends)])
-    return markdown_table(
-        ("profile model", "constants", "R_d, mean", "R_d, worst", "energy, mean", "energy, worst"), rows
-    )
+    named = [(owner + records.at_index(contents.get(owner, {})), which, values) for owner, which, values in chosen]
+    return _quality(named, ("mean rel", "largest rel"), "profile model")
 
 
 def _measured(contents: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
@@ -185,12 +177,10 @@ def _text(cell: str) -> str:
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a GitHub table, names to the left and numbers to the right, every line filled to the same width.
+    """Return a GitHub table, names to the left and numbers to the right, without padding.
 
     What is in its cells begins no element and no further column.
     """
-    header, rows = [_text(cell) for cell in header], [[_text(cell) for cell in row] for row in rows]
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
-    lines = [header, rule, *rows]
-    return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)
+    rule = [":--" if name in NAMES else "--:" for name in header]
+    lines = [[_text(cell) for cell in header], rule, *([_text(cell) for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

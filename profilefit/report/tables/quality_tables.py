@@ -58,7 +58,7 @@ def spark_table(content: Content) -> list[RenderableType]:
         "least": on_the_point([significant(min(values)) for _, _, values in rows]),
         "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
     }
-    caption = "One logarithmic scale for each measure, from its least to its worst"
+    caption = "Logarithmic scale for each measure, from its least to its worst"
     title = f"Errors over α{at_index(content)}{_failed(content)}"
     return [column_table(title, columns, caption, left=("", list(columns)[1]))]
 
@@ -70,7 +70,7 @@ def quality_tables(content: Content) -> list[RenderableType]:
         columns = {"": [MEASURES[measure].formula for measure in OF_MAP]}
         for name in measured_sets(content):
             columns[name] = [albedo_number(measure, content["quality"][name][measure]) for measure in OF_MAP]
-        return [*first, column_table(f"Quality of the map{at_index(content)}{_failed(content)}", columns)]
+        return [*first, column_table(f"Errors of the albedo inversion{at_index(content)}{_failed(content)}", columns)]
     sets = [content["quality"][name] for name in measured_sets(content)]
     groups = [[key for key in group if all(values_of(one, key) is not None for one in sets)] for group in TABLES]
     return [*first, *(_table(content, group) for group in groups if group)]
@@ -82,7 +82,7 @@ def _index_table(content: Content) -> RenderableType:
     columns = {name: [f"{value:g}" for value in worst[name]] for name in SPANS if name in worst}
     known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in worst]
     columns |= {one.header: on_the_point(list(map(significant, worst[one.name]))) for one in known}
-    caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
+    caption = "At the worst albedo. " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
     title = "By refractive index" + (" and g" if "g" in worst else "")
     return column_table(title + _failed(content), columns, caption, left=("n",))
 
@@ -99,7 +99,7 @@ def _table(content: Content, group: list[str]) -> RenderableType:
             header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
     caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
-    title = f"Quality at held-out albedos{at_index(content)}{_failed(content)}"
+    title = f"Errors at held-out albedos{at_index(content)}{_failed(content)}"
     return column_table(title, columns, caption, left=("α",))
 
 

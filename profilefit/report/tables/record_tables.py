@@ -30,15 +30,15 @@ if TYPE_CHECKING:
 
 Line = tuple[str, RenderableType]
 MEANING_OF_ERROR = {
-    "photons": "noise of the simulation",
-    "dr": "radial bins of finite width",
-    "model": "the law's misfit, as a random function of the same size and correlation lengths",
-    "misfit": "the misfit taken for independent noise, which it is not",
-    "jackknife": "leaving out a sixth of the albedos",
+    "photons": "photon noise",
+    "dr": "width of radial bins",
+    "model": "misfit of the model, as a random function of equal size and correlation lengths",
+    "misfit": "misfit treated as independent noise",
+    "jackknife": "spread of fits that leave out a sixth of the albedos",
 }
 DERIVED = {
-    "radius": ("r [mfp]", "Radius within which 99.5 % of the light leaves"),
-    "reflectance": ("A", "Total reflectance"),
+    "radius": ("r [mfp]", "Radius that contains 99.5 % of the energy"),
+    "reflectance": ("A", "Total diffuse reflectance"),
 }
 TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
 LIMITS = ("energy_limit", "source_limit")  # of a profile, that weigh in its fit
@@ -82,11 +82,11 @@ def constants_table(content: Content) -> RenderableType:
     meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
         columns["\nz"] = [ABSENT if z is None else f"{z:+.0f}" if abs(z) >= TENFOLD else f"{z:+.1f}" for z in scores]
-        meanings.append(f"z: published less regenerated, over the errors of {records.TOTAL}, combined")
+        meanings.append(f"z: published minus regenerated, over the combined error ({records.TOTAL})")
     title = "Constants, lengths in units of the transport mean free path"
     caption = "; ".join(meanings)
     if not converged(content):
-        caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
+        caption = f"The fit failed, and its last values are no model: {content['fit']['result']}"
     return column_table(title, {"": list(constants), **columns}, caption)
 
 
@@ -94,7 +94,7 @@ def _intervals_table(content: Content) -> RenderableType:
     """Return the 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
     chains = content["posterior"]
     if not chains:
-        return Text("No credible intervals: a chain starts from a fit that converged.")
+        return Text("No credible intervals: the fit did not converge.")
     rows = []
     for name, constant in content["constants"].items():
         for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
@@ -112,7 +112,7 @@ def _derived_table(derived: Content, surface: str = "") -> RenderableType:
         rows.append((f"{alpha:g}", to_error(value, largest), *map(significant, errors)))
     quantity, title = DERIVED[derived["quantity"]]
     header = ("α", quantity, "± photons", "± model")
-    caption = "model: how far the law is from the truth; one standard error each"
+    caption = "One standard error each: of photon noise and of the model"
     return row_table(title + surface, header, rows, caption, ("α",), aligned=header[1:])
 
 
@@ -179,8 +179,8 @@ def stage_tables(stages: Content) -> list[RenderableType]:
     states.append(("fits of (7)", text))
     if stages.get("length_exponents"):
         powers = ", ".join(f"{letter} l^{power:.3f}" for letter, power in stages["length_exponents"].items())
-        states.append(("with l", f"{powers}; similarity says −1, 0, 1"))
-    title, header = "Stages: coefficient laws through the fits at each albedo", ("", "through the points", "± photons")
+        states.append(("scaling", f"{powers}; expected −1, 0, 1"))
+    title, header = "Coefficients of the fits at each albedo, fitted over albedo", ("", "fitted", "± photons")
     return [row_table(title, header, rows, aligned=header[1:]), _facts("", states)]
 
 
@@ -193,18 +193,18 @@ def title_of(content: Content) -> RenderableType:
         is_in = f"every {name} in" if content.get(ranges) else f"{name} ="
         light += f", {is_in} {records.index_words(content, name)}"
     if content.get("indices"):
-        light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
+        light += f"; tables and figures show {at_index(content).removeprefix(', ')} unless they name another"
     lines: list[Line] = [
-        ("law", f"{content['law']}, {content['equations']}"),
+        ("model", f"{content['law']}, {content['equations']}"),
         ("setting", light),
-        ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
+        ("reference", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
     if a := protocol.get("albedos"):
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
     if indices := protocol.get("indices"):
         lines.append(("indices", ", ".join(f"{n:g}" for n in indices)))
     if cosines := protocol.get("cosines"):
-        lines.append(("g", ", ".join(f"{g:g}" for g in cosines) + "; albedos and radii are reduced"))
+        lines.append(("g", ", ".join(f"{g:g}" for g in cosines) + "; reduced albedos and radii"))
     if rings := protocol.get("rings"):
         even = f"even, {rings['dr']:g} wide, to {rings['last']:g}" if rings.get("dr") else ""
         text = even or f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
@@ -249,9 +249,9 @@ def evidence_tables(content: Content) -> list[RenderableType]:
         parts.append(_table1(content["table1"]))
     if halves := content.get("halves"):
         lines = [(f"{row.get('material', ABSENT)}, {row.get('model', '')}", _share(row.get("off"))) for row in halves]
-        title = "Table 1 as printed: mean of its halves over its whole, less 1"
-        parts.append(row_table(title, ("material", "off"), lines, left=("material",)))
-    return parts or [Text("This record holds no readings.")]
+        title = "Table 1 as published: mean of both halves over the whole range, minus 1"
+        parts.append(row_table(title, ("material", "difference"), lines, left=("material",)))
+    return parts or [Text("This record has no readings.")]
 
 
 def _readings_of(equation: str, readings: list[Content]) -> RenderableType:
@@ -264,9 +264,9 @@ def _readings_of(equation: str, readings: list[Content]) -> RenderableType:
         text = "\n".join(part for part in (one["choices"], ", ".join(pairs), one.get("evidence")) if part)
         rows.append((one["verdict"], _share(one["curve_distance"]), _share(one["constant_distance"]), text))
     more = len(readings) - len(rows)
-    caption = f"and {more} more in the record, further from print" if more else ""
-    title = f"{equation}: rms distance of the curve and largest distance of a constant from print"
-    header = ("verdict", "curve", "constants", "reading, its constants, its evidence")
+    caption = f"The record has {more} more readings, which differ more from print." if more else ""
+    title = f"{equation}: rms difference of the curve and largest difference of a constant, relative to print"
+    header = ("verdict", "curve", "constants", "reading, constants, evidence")
     return row_table(title, header, rows, caption, left=("verdict",), fold=header[-1:])
 
 
@@ -285,11 +285,11 @@ def _table1(rows: list[Content]) -> RenderableType:
         ratios = [*(significant(ratio, 3) for ratio in _ratio(row)), *[ABSENT] * 3]
         lines.append((material, row.get("model", ABSENT), *ratios[:3]))
     caption = (
-        f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
-        "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
+        f"MSE over the published MSE, {len(shown)} of {len(rows)} rows. The paper does not state channel and range: "
+        "here they are those at which normalized diffusion is closest to its published error."
     )
     header = ("material", "model", "near half", "far half", "all")
-    return row_table("Table 1 redone", header, lines, caption, left=("material",), fold=("model",))
+    return row_table("Table 1 recomputed", header, lines, caption, left=("material",), fold=("model",))
 
 
 def _ratio(row: Content) -> list[float]:
@@ -313,36 +313,38 @@ def _by(rows: Iterable[Content], key: str) -> dict[Any, list[Content]]:
 SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
 FAILED = "FAILED"
 Records = Mapping[str, Content]
-REPRODUCED = "Records made, and the largest moves of their constants from the shipped records"
+REPRODUCED = "Regenerated records: largest changes of their constants from the shipped records"
 REPRODUCED_CAPTION = (
-    "moved: in units of the constant's stated error; at most 0.05 counts as reproduced. relative: as a "
-    "share of the constant. interval: largest move of an interval's end, in units of what the Monte Carlo error of the "
-    f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
+    "moved: change over the stated error, reproduced up to 0.05. relative: change over the constant. interval: change "
+    "of an end of an interval, over the change that the Monte Carlo error of the chains allows. "
+    f"{ABSENT}: no shipped record has equal photons, seed and layers."
 )
 CAPTION = (
-    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
-    "regenerated. "
-    "`profilefit report NAME` has constants, errors and quality by α."
+    "Largest error over α, and over n where a record spans indices: published → corrected, if any → regenerated. "
+    "`profilefit report NAME` prints constants, their errors, and errors by α."
 )
 
 
 # Measure that a kind of records has, by which one knows them -> title, and measures by their headers.
 SUMMARIES = {
-    "rel": ("Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)", {"rel": "rel"}),
-    "inversion_error": ("Inverse cdfs: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
-    "delta_A": ("Maps between A and α", {"max error of A": "delta_A", "of √(1 − α)": "largest_s"}),
+    "rel": ("Profile models: mean |model / exact − 1| of R_d over radii, and max |cdf − exact cdf|", {"R_d": "rel"}),
+    "inversion_error": ("Samplers: max |cdf(r(ξ)) − ξ|", {"error": "inversion_error"}),
+    "delta_A": (
+        "Albedo inversions: error of A, relative error of √(1 − α)",
+        {"A": "delta_A", "√(1 − α)": "largest_s"},
+    ),
 }
 
 
-def summary(contents: Records) -> RenderableType:
-    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+def summary(contents: Records, glyphs: bool = True) -> RenderableType:
+    """Return profile laws, inverse cdfs, maps, and comparisons of readings, each kind in a table, `glyphs` too."""
     groups: dict[str, dict[str, Content]] = {measure: {} for measure in SUMMARIES}
     readings = {name: content for name, content in contents.items() if content["pipeline"] == "evidence"}
     for name, content in contents.items():
         if name not in readings:
             is_of = (measure for measure in ("delta_A", "rel") if records.measures(content, measure))
             groups[next(is_of, "inversion_error")][name] = content
-    shown = [_summary_table(measure, group) for measure, group in groups.items() if group]
+    shown = [_summary_table(measure, group, glyphs) for measure, group in groups.items() if group]
     if readings:
         lines = []
         for content in readings.values():
@@ -350,14 +352,14 @@ def summary(contents: Records) -> RenderableType:
             good = {equation for equation, verdict in verdicts if verdict == "reproduced"}
             lines.append(f"{len(verdicts)} readings, {len(good)} of {len(dict(verdicts))} reproduced")
         columns = {"record": list(readings), "found": lines}
-        shown.append(column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found")))
+        shown.append(column_table("Readings of choices that a paper leaves open", columns, left=("record", "found")))
     failed = {name: content["fit"]["result"] for name, content in contents.items() if "fit" in content}
     failures = [Text(f"{name}: {text}", style="red") for name, text in failed.items() if text != "converged"]
     parts = [part for table in shown for part in (table, Text())]
     return Group(*parts, *failures, Text(CAPTION, style="dim"))
 
 
-def _summary_table(measure: str, contents: Records) -> RenderableType:
+def _summary_table(measure: str, contents: Records, glyphs: bool) -> RenderableType:
     """Return a line a record: the worst of its measures, set by set, and how one that varies goes over α."""
     title, headers = SUMMARIES[measure]
     columns = {
@@ -367,8 +369,8 @@ def _summary_table(measure: str, contents: Records) -> RenderableType:
         **{header: [_course(content, key) for content in contents.values()] for header, key in headers.items()},
     }
     if measure == "rel":
-        columns["ks"] = [_course(content, "ks").rpartition(" → ")[2] for content in contents.values()]
-    if measure != "delta_A":
+        columns["cdf"] = [_course(content, "ks").rpartition(" → ")[2] for content in contents.values()]
+    if glyphs and measure != "delta_A":
         rows = [values_of(content["quality"]["regenerated"], measure) or [] for content in contents.values()]
         columns["over α"] = [cells.spark(row, cells.span(rows), SPARK) for row in rows]
     return column_table(title, columns, left=("record", "over α"))

@@ -34,7 +34,7 @@ SHORT = {
 }
 SIGNS = dict(zip(SHORT, "?≈↕−×!", strict=True))  # one character a class, as in the figure
 LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
-BARE = "no reference there: only NaN, sign and order are looked at"
+BARE = "no reference: only NaN, sign and order are checked"
 LONGEST_NAME = 18  # characters: a line of 100 holds it beside the advice
 # What a line a law says of its fits: header, case, how its value begins, and whether shares or spreads.
 SUMMARY = (
@@ -59,14 +59,14 @@ def advice_table(parts: Sequence[Findings]) -> RenderableType:
         name = next(iter(subjects)) if len(subjects) == 1 else f"{len(subjects)} of them"
         names.append(name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…")
     columns = {
-        "of": names,
+        "method": names,
         "cells": [str(sum(one.count for one in group)) for _, group in rows],
         "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
-        "what helps": [advice or BARE for (_, advice), _ in rows],
+        "advice": [advice or BARE for (_, advice), _ in rows],
     }
     total = sum(one.codes.size for part in parts for one in part.cells)
-    caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
-    return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
+    caption = f"{LEGEND}\n{total} cells; inaccurate: an error of more than a tenth of the model error"
+    return column_table("Cells that fail, and advice", columns, caption, ("method", "as"), ("advice",))
 
 
 def region_table(part: Findings, most: int = 20) -> RenderableType:
@@ -99,9 +99,9 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
                 columns[header].append(f"{100.0 * one.converged:.0f} %" if is_share else significant(one.spread))
     nonsense = [one.converged == 0 for one in fits if one.case == NONSENSE]
     caption = (
-        "Share that converges from starts so far off, and on dark or white albedos alone; then the largest relative\n"
-        "change of a constant: with wider bins, under noise, trimmed at 0.0005 instead of 0.05.\n"
-        f"Nonsense (NaN, all zeros, one albedo): {sum(nonsense)} of {len(nonsense)} refused by name."
+        "Share of fits that converge: starts within a factor of 2 or 8, only dark or only white albedos. Then the\n"
+        "largest relative change of a constant: wider bins, photon noise, trimming at 0.0005 instead of 0.05.\n"
+        f"Nonsense (NaN, all zeros, one albedo): {sum(nonsense)} of {len(nonsense)} refused with a message."
     )
     return column_table("Fits", columns, caption, ("fit",))
 
@@ -120,7 +120,7 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
         "else": [", ".join(f"{count} {kind}" for kind, count in one.results if kind != "converged") for one in shown],
     }
     nonsense = "; ".join(sorted({kind for one in fits if one.case == NONSENSE for kind, _ in one.results}))
-    caption = f"spread: the largest relative change of a constant. Nonsense (NaN, all zeros, one albedo): {nonsense}"
+    caption = f"spread: largest relative change of a constant. Nonsense (NaN, all zeros, one albedo): {nonsense}"
     return column_table("Fits", columns, caption, ("fit",), ("case", "else"))
 
 

@@ -55,7 +55,7 @@ def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
         columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
         caption = f"cost: {panel.cost}; error: {panel.error}".replace("$", "")
         if "distance" in columns:
-            caption += "; distance: of the constants from their noise-free limit, in their standard errors"
+            caption += "; distance: from constants to their noise-free limit, in standard errors"
         notes = "\n".join((caption, *(part.notes if panel is part.panels[-1] else ())))
         tables.append(column_table(f"{part.name}, {panel.title}".replace("$", ""), columns, notes, left=("", "stands")))
     return tables

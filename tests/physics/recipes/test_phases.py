@@ -129,8 +129,8 @@ def test_the_lines_of_the_guide(tmp_path):
     values = 0.4367 * PETZOLD.integral * PETZOLD.values
     rows = (f"{a:.6g}, {value:.9g}\n" for a, value in zip(degrees[kept], values[kept], strict=True))
     path.write_text("angle, value [1/(m sr)]\n" + "".join(rows))
-    lines = "\n".join(record.table_lines(record.described(read_phase(path))))
-    assert lines in (ROOT / "docs" / "guide" / "phases.md").read_text()
+    words = " ".join(record.table_lines(record.described(read_phase(path)))).split()
+    assert " ".join(words) in " ".join((ROOT / "docs/explanation/phases.md").read_text().split())
 
 
 def test_a_first_gap_under_a_row_at_zero_and_a_last_row_that_is_noise(tmp_path):

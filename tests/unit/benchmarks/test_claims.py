@@ -1,4 +1,4 @@
-"""What is promised: quick rows measured, the last measurement, a promise that is not kept; its table, and damage."""
+"""Promised figures: quick rows measured, the last measurement, a promise that is not kept; its table, and damage."""
 
 import json
 import re
@@ -73,9 +73,9 @@ def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, t
 # The table
 
 ROW = {
-    **{"name": "time", "says": "time of <ours>", "value": 1.31, "low": 1.25, "high": 1.4, "noise": "least | most"},
-    **{"sense": "≤", "bound": 1.5, "unit": "", "truth": "theirs", "command": "profilefit check", "date": "today"},
-    "load": "0.2",
+    **{"name": "time", "subject": "Speed: Times <1", "says": "time of <ours>", "value": 1.31, "low": 1.25, "high": 1.4},
+    **{"noise": "least | most", "sense": "≤", "bound": 1.5, "unit": "", "truth": "theirs"},
+    **{"command": "profilefit check", "date": "today", "load": "0.2"},
 }
 SHARE = {"sense": "≥", "bound": 20, "unit": "%", "value": 12.0, "low": 12.0, "high": 12.0, "noise": "exact"}
 
@@ -91,11 +91,13 @@ def test_a_row_is_judged_by_its_numbers_and_shown_with_its_noise(tmp_path):
     assert time.cells == ("time of <ours>", "≤ 1.5", "1.31", "1.25 … 1.40: least | most")
     assert share.cells[1:] == ("≥ 20 %", "12.0 % BROKEN", "exact")
     page = "".join(promises(EvidenceFolder(tmp_path, tmp_path)))
-    told = ("time of &lt;ours&gt;", "1.25 … 1.40", "12.0 % BROKEN", "≥ 20 %", "held against: theirs", "make claims")
+    told = ("time of &lt;ours&gt;", "1.25 … 1.40", "12.0 % BROKEN", "≥ 20 %", "Reference: theirs", "make claims")
     assert [text for text in told if text not in page] == []
     lines = markdown_claims(tmp_path).splitlines()
-    assert {len(re.split(r"(?<!\\)\|", line)) for line in lines[:4]} == {9}
-    assert r"time of \<ours>" in lines[2]
+    assert lines[:3] == ["## Speed", "", "Times &lt;1."]
+    assert {len(re.split(r"(?<!\\)\|", line)) for line in lines[4:8]} == {5}
+    assert r'<a id="time"></a>time of \<ours>' in lines[6]
+    assert lines[-3:-1] == ["Reference: theirs. On today, load 0.2. Least | most: `time` 1.25 … 1.40.", ""]
 
 
 @pytest.mark.parametrize(

@@ -107,10 +107,11 @@ def test_markdown_has_a_line_a_law(folder):
     laws = profile_laws(folder, ["burley-whole"])
     [(law, quality)] = tables.for_each(lambda one: profile_quality(one.law, ALPHA), laws)
     [[cells]] = parsed(tables.markdown_laws([(law, quality)]))
-    home = tuple(cells[key] for key in ("law", "constants", "light", "n", "number"))
-    assert home == ("burley", "burley-whole", "searchlight", "1", "4")
-    assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)
-    assert float(cells["ks worst"]) == pytest.approx(quality.ks.max(), rel=0.06)
+    home = tuple(cells[key] for key in ("model", "constants", "illumination", "n"))
+    assert home == ("burley", "burley-whole", "searchlight", "1")
+    assert float(cells["mean error of R_d [%]"]) == pytest.approx(100 * quality.rel.mean(), rel=0.06)
+    ks = float(cells["largest error of cumulative energy [%]"])
+    assert ks == pytest.approx(100 * quality.ks.max(), rel=0.06)
 
 
 def test_maps_under_their_own_light(folder):
