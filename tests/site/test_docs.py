@@ -226,9 +226,12 @@ def test_the_cluster_of_two_processes_traces():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["README.md", "docs/tutorials/shader.md"])
-def test_the_python_that_is_printed_runs(page):
-    """With a hundredth of the photons."""
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorials/mcml.md"])
+def test_the_python_that_is_printed_runs(page, tmp_path, monkeypatch):
+    """With a hundredth of the photons, beside the files of the run that the tutorial begins with."""
+    monkeypatch.chdir(tmp_path)
+    slab = ["run", str(ROOT / "examples/slab.mci"), "--photons", "1e4", "--out", "runs", "--quiet"]
+    COMMANDS["mcml-sim"](slab, standalone_mode=False)
     blocks = re.findall(r"```python\n(.+?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
     exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
 
