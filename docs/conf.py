@@ -12,16 +12,8 @@ author = "the profilefit authors"
 release = version = version_of("profilefit")
 copyright = f"{author}, MIT licence"
 
-extensions = [
-    "myst_parser",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
-    "mathml",
-    "docstrings",
-    "law_pages",
-    "file_keys",
-    "commands",
-]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
+extensions += ["mathml", "docstrings", "law_pages", "file_keys", "commands", "row_anchors"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "examples", "ext"]
 root_doc = "index"

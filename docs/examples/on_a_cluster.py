@@ -1,10 +1,11 @@
-"""Run on the workers of a Dask scheduler: python on_a_cluster.py tcp://host:8786 [photons]."""
+"""Run on Dask workers: python on_a_cluster.py tcp://host:8786 [photons]."""
 
 import sys
 
 from mcml_sim import Grid, Setting, simulate_orders
 
-address, photons = sys.argv[1], int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000_000
+address = sys.argv[1]
+photons = int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000_000
 light = simulate_orders(
     Grid(dr=0.05, nr=400),  # annuli [1 / (mu_s + mu_a)]
     photons,

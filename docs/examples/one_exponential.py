@@ -1,4 +1,4 @@
-"""A law of one exponential: 2 pi x R_d = A q e^{-q x}, x = r/l, q = q0 + q1 s + q2 s^2, s = sqrt(1 - alpha)."""
+"""One exponential: 2 pi x R_d = A q e^{-q x}, x = r/l, q = q0 + q1 s + q2 s^2."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -14,7 +14,8 @@ float radiance(vec2 uv) {
         float turn = 2.39996323 * float(i);                            // golden angle
         vec2 there = uv + mfp * x * vec2(cos(turn), sin(turn)) / texel;
         // weight: 2 pi x R_d / A over the density of the sampler, nearly 1
-        sum += texture(irradiance, there).r * hazard_density(x, s) / hazard_radius_density(x, s);
+        float weight = hazard_density(x, s) / hazard_radius_density(x, s);
+        sum += weight * texture(irradiance, there).r;
     }
     return hazard_reflectance(s) * sum / (3.14159265 * float(SAMPLES));
 }

@@ -9,7 +9,7 @@ const int SAMPLES = 32;
 vec3 radiance(vec2 uv) {
     vec3 found = vec3(0.0);
     for (int c = 0; c < 3; c++) {
-        skin_Shape s = skin_shape(float(c), texture(thickness, uv).r); // once per point and channel
+        skin_Shape s = skin_shape(float(c), texture(thickness, uv).r); // once per point
         float light = 0.0;
         float weights = 0.0;
         for (int i = 0; i < SAMPLES; i++) {
@@ -21,7 +21,7 @@ vec3 radiance(vec2 uv) {
             light += weight * texture(irradiance, there)[c];
             weights += weight;
         }
-        found[c] = skin_reflectance(s) * light / (3.14159265 * weights); // uniform light gives exactly A / pi
+        found[c] = skin_reflectance(s) * light / (3.14159265 * weights); // A / pi
     }
     return found;
 }

@@ -1,4 +1,4 @@
-"""Trace a share of a run: python share.py 3 16 is the fourth of 16 shares. Without arguments, read all."""
+"""Trace the fourth of 16 shares: python share.py 3 16. Without arguments, read all."""
 
 import sys
 

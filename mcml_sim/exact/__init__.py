@@ -3,13 +3,14 @@
     import jax
     from mcml_sim import Layer, Medium, Setting, exact
 
-    exact.profile([0.1, 1.0], 0.9)                                  # a half space, numpy, float64
-    exact.profile([0.1, 1.0], 0.9, setting=Setting(n=1.4))          # whose surface refracts, n >= 1
-    exact.profile([0.1, 1.0], 0.99, setting=Setting(n=1.4, g=0.9))  # which scatters forwards: n 1.33 to 1.45, g to .95
+    exact.profile([0.1, 1.0], 0.9)  # semi-infinite medium, numpy, float64
+    exact.profile([0.1, 1.0], 0.9, setting=Setting(n=1.4))  # refracting interface, n >= 1
+    exact.profile([0.1, 1.0], 0.9, setting=Setting(n=1.4, g=0.9))  # n 1.33 to 1.45, g to .95
     with jax.enable_x64(True):
-        jax.jit(jax.grad(exact.profile, argnums=1))(1.0, 0.9)       # jax
+        jax.jit(jax.grad(exact.profile, argnums=1))(1.0, 0.9)  # jax
 
-    light = exact.solve(Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0))))   # a stack of layers
+    layers = Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0)
+    light = exact.solve(Medium(layers))
     light.reflectance, light.profile([0.01, 0.1])
 
 `transform` has the transform of the profile where n = 1, `cone` and `refracting` where n > 1, `by_albedo` its inverse,
