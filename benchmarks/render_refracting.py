@@ -108,7 +108,7 @@ def draw(judge: Judged, found: Sequence[Shot], path: Path) -> None:
             100 * _difference(judge, one)[::-1],
             **{"cmap": STEPS, "vmin": -_end(), "vmax": _end(), "interpolation": "nearest"},
         )
-        error.set_title(f"brightness off by {_percent(one.error)}", fontsize=9, pad=3)
+        error.set_title(f"error of brightness {_percent(one.error)}", fontsize=9, pad=3)
         for ax, what in ((head, "a head, drawn by it"), (error, "its error")):
             ax.set(xticks=[], yticks=[], ylabel="" if column else what)
             ax.spines[:].set_visible(False)
@@ -153,7 +153,7 @@ def _profiles(ax: Axes, one: Shot, first: bool) -> None:
         )
     ax.set(yscale="log", xlim=(0.0, FARTHEST), ylim=(LEAST, MOST), xlabel="r [mean free paths]")
     ax.set_title(one.title, color=one.colour, fontsize=11, fontweight="bold", pad=16)
-    ax.text(0.5, 1.03, f"R$_d$ off by {_percent(one.profile_error)}", transform=ax.transAxes, ha="center", fontsize=9)
+    ax.text(0.5, 1.03, f"error of R$_d$ {_percent(one.profile_error)}", transform=ax.transAxes, ha="center", fontsize=9)
     if first:
         ax.set_ylabel("r R$_d$ [1/mean free path]")
         ax.legend(loc="upper right", fontsize=8)

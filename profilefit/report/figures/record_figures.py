@@ -429,8 +429,8 @@ def sum_caption(sums: Mapping[str, gaussians.SumRecord]) -> str:
     text = (
         "Sums of Gaussians of one set of variances in all colours: mean relative error of R_d, in rings even in ln r "
         "from 0.01 mean free paths to 99.5 % of the light. "
-        f"Six are off by {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
-        f"{worst[2]}, {worst[1]}), by at most {_percent(alone)} where each colour has its own variances."
+        f"Six have an error of {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
+        f"{worst[2]}, {worst[1]}), and at most {_percent(alone)} if each colour has its own variances."
     )
     for one in sums.values():
         light = one.content["setting"]["illumination"]

@@ -241,13 +241,12 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     together = math.hypot(layer.error, choice.nearest.error.total)
     text = (
         f"Layers, {colour}: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
-        f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under {light}) is off by "
-        f"{_percent(layer.error)}{noise} %; with the choice {_percent(together)} %."
+        f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under {light}) has "
+        f"an error of {_percent(layer.error)}{noise} %; with the choice {_percent(together)} %."
     )
     single = max(one.single for one in layers)
     needs = "needs a pass of its own" if single > choice.scene.tolerance else "needs no pass of its own"
-    text += f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on "
-    text += "average."
+    text += f" Single scattering {needs}: if it leaves in all directions alike, the mean error is {_percent(single)} %."
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as the file says, and these layers are not."

@@ -165,8 +165,8 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
     g = 0.0 if fit.data.layer is None else fit.data.layer.g  # of a simulation
     if g and not fit.spec.law.setting.g:
         yield (
-            f"the medium scatters with g = {g:g}, what is fitted isotropically: within ten transport mean free paths "
-            "this is off by tens of percent, which shows as a misfit only if rows lie within one"
+            f"the medium has g = {g:g}, and the fitted model g = 0: within ten transport mean free paths the error is "
+            "tens of percent, which shows as a misfit only if rows lie within one"
         )
     if fit.rel is None:
         yield "the model error is unknown for this surface: there is neither an exact profile nor a record of it"
@@ -263,7 +263,7 @@ def _beam(result: MediumPosterior) -> Iterator[str]:
     if width.noticed:
         yield (
             f"THE BEAM IS NO PENCIL (p-value {p_value(width.chance)}): a Gaussian one of 1/e^2 radius {width.w:.2g} "
-            f"{unit} explains the data better; without its `beam` the values above are off by more than their errors"
+            f"{unit} explains the data better; without its `beam` the errors of the values above are too small"
         )
     elif width.telling is None:
         yield "a pencil beam is assumed; no Gaussian beam up to half of the last radius would move a value by its error"

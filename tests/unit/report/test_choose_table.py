@@ -74,7 +74,7 @@ def test_the_worst_of_three_colours_is_told(choice):
     layers = [replace(LAYER, error=error, standard_error=spread) for error, spread in errors.values()]
     text = words(choice, *layers)
     assert "Layers, of three colours, green the worst: one layer is not enough: " in text
-    assert "is off by 2.1 ± 0.010 %" in text
+    assert "has an error of 2.1 ± 0.010 %" in text
     made = [(one["channel"], one["error"], one["verdict"]) for one in data(choice, *layers)["one_layer"]]
     assert made == [("red", 0.014, "enough"), ("green", 0.021, "not enough"), ("blue", 0.022, "undecided")]
     assert "Layers, of three colours, red the worst: one layer is enough." in words(choice, *layers[:1] * 3)
