@@ -40,9 +40,6 @@ class Run(NamedTuple):
     """Command whose numbers hold figures; what they are held against; what their spread is; what --quick adds to it.
 
     subject   title and caption of the table that its claims belong to
-    subject   title and caption of the table that its claims belong to
-    subject   title and caption of the table that its claims belong to
-    subject   title and caption of the table that its claims belong to
     promises  name, bound, place of the figure in the numbers or a function of them, what it is of, and its noise where
               that is not the run's: a figure is a value, or value, low and high
     fitted    whether it reads fits/: what does not stays as it was measured when a record is made again
@@ -207,17 +204,17 @@ def pictured(read):
 # Subjects of claims, and the caption of their table.
 MODELS = "Profile models: Largest errors of R_d (mean over radii) and A, and times over normalized diffusion"
 DATA = "Fits and uncertainties: Deviation from simulated constants, and intervals that cover too seldom or too often"
-TRACING = "Photon tracing: Ratios to a scalar tracer, and memory"
+TRACING = "Photon tracing: Ratios to a scalar tracer, of two workers to one, and memory"
 EXACT_SOLUTIONS = "Exact solutions: Largest relative differences, p-values and times"
 RENDERING = "Rendering: Errors of images, and of irradiance beside an edge"
-LAYERS = "Layers: Errors of the stack model relative to exact R_d (mean over radii) and A"
+LAYERS = "Layers: Errors of the stack model relative to exact or traced R_d (mean over radii) and A, and shader times"
 SEA = "Sea: Errors of phase functions, closed forms and caustic maps"
 FUR = "Fur: Errors of shells and swept slabs, and numbers of layers"
 # fmt: off
 TURNS = "least and most of the turns"
 RECORDS = Run(
     MODELS, "profilefit report hazard albedo-rational albedo-liang", "",
-    "exact solution, n = 1, 24 albedos from 0.05 to 0.995, none of them fitted", EXACT, (
+    "exact solution, n = 1, pencil beam, 24 albedos from 0.05 to 0.995, none of them fitted", EXACT, (
         ("hazard-error", "≤ 0.25 %", worst("records.hazard.quality.regenerated.rel", 0.01),
          "error of R_d, hazard, n = 1"),
         ("map-error", "≤ 5e-06", "records.albedo-rational.quality.regenerated.delta_A",
@@ -226,7 +223,7 @@ RECORDS = Run(
                                         "records.albedo-rational.quality.regenerated.delta_A"),
          "error of A, equation (8) over rational inversion"),
     ))
-SCALAR = "ratios to compiled scalar tracers in the manner of MCML on one core with AVX-512"
+SCALAR = "compiled scalar tracers in the manner of MCML on one core with AVX-512, or one pinned worker"
 RUNS = (
     RECORDS,
     Run(MODELS, "profilefit report hazard-refracting hazard-diffuse-refracting albedo-rational-refracting "
@@ -246,21 +243,22 @@ RUNS = (
          "error of A, rational inversion, g > 0"),
     )),
     Run(MODELS, "python -m benchmarks.laws", "",
-        "exact solution, and times over normalized diffusion with its exact inverse on one core", TURNS, (
+        "exact solution, n = 1, pencil beam, and times over normalized diffusion with its exact inverse on one core",
+        TURNS, (
         ("hazard-nearer", "≥ 50", times("normalized diffusion.rel.worst", "hazard.rel.worst"),
          "error of R_d, normalized diffusion over hazard"),
         ("quantile-nearer", "≥ 20", times("normalized diffusion.rel.worst", "quantile.rel.worst"),
          "error of R_d, normalized diffusion over quantile"),
         ("hazard-time", "≤ 1.5", "hazard.time_ratio.both",
-         "CPU time of a radius and R_d, hazard"),
+         "CPU time of a radius and R_d, hazard, n = 1"),
         ("quantile-time", "≤ 0.6", "quantile.time_ratio.both",
          "CPU time of a radius and R_d, quantile"),
         ("hazard-profile-time", "≤ 3", "hazard.time_ratio.profile",
-         "CPU time of R_d alone, hazard"),
+         "CPU time of R_d alone, hazard, n = 1"),
     )),
     Run(MODELS, "profilefit check", "", "float64, the exact solution, and times over normalized diffusion", EXACT, (
         ("shader-time", "≤ 3", "costs.hazard.ratio.both",
-         "shader time of a radius and R_d, hazard",
+         "shader time of a radius and R_d, hazard, n = 1",
          "median of 7 turns"),
         ("shader-rounding", "≤ 10 %", rounding, "float32 error, relative to the model error"),
         ("shader-faults", "≤ 0", lambda n: sum(len(one["broken"]) for kind in ("laws", "maps") for one in n[kind]),
@@ -279,19 +277,19 @@ RUNS = (
         ("orders-speed", "≥ 20", ratio("simulate_orders, live events/s, over the yardstick"),
          "live events per second, simulate_orders with bins"),
         ("half-space-speed", "≥ 30", ratio("half space, photons/s"),
-         "photons per second, semi-infinite medium, R only"),
+         "photons per second, alpha = 0.9, R only"),
         ("half-space-tally-speed", "≥ 15", ratio("half space, r-z, photons/s"),
-         "photons per second, semi-infinite medium, r-z tally"),
+         "photons per second, alpha = 0.9, r-z tally at every event"),
         ("layers-speed", "≥ 6", ratio("three layers, r and angle, photons/s, over the layered twin"),
-         "photons per second, three layers, by radius and angle"),
+         "photons per second, MCML's three layers, by radius and angle"),
         ("layers-tally-speed", "≥ 5", ratio("three layers, r-z tally too, over the layered twin"),
-         "photons per second, three layers, r-z tally"),
+         "photons per second, MCML's three layers, r-z tally"),
         ("half-space-efficiency", "≥ 20", "efficiency.half space, Rd",
          "1 / (variance × time), semi-infinite medium, R", "variances of 400 blocks, 7 %"),
         ("layers-efficiency", "≥ 6", lambda n: min(v for key, v in n["efficiency"].items() if key.startswith("three")),
          "1 / (variance × time), three layers, least of R, T, A", "variances of 400 blocks, 7 %"),
         ("accuracy-time", "≥ 800", "time to accuracy, 32 albedos.median",
-         "speed to 1 % in each of 100 radial bins at 32 albedos", "extrapolated"),
+         "one simulate_orders run over 32 scalar runs, speed to 1 % in 100 bins", "extrapolated"),
         ("threads", "≥ 1.6", ratio("two threads over one pinned worker, orders"), "speed, two threads over one"),
         ("processes", "≥ 1.9", ratio("two processes over one pinned worker, orders"),
          "speed, two processes over one"),
@@ -309,17 +307,17 @@ RUNS = (
         ("exact-totals", "≤ 1e-07", "totals",
          "A, difference from a stack's integral equation", EXACT),
         ("exact-nodes", "≤ 1e-10", "doubled nodes",
-         "A and transform, change with 2 × the nodes", EXACT),
+         "A and transform up to 7 / mfp, change with 2 × the nodes", EXACT),
         ("exact-profile", "≤ 1e-05", "profile",
          "R_d, change with 1.5 × the nodes", EXACT),
         ("exact-matched", "≤ 1e-06", "matched",
          "R_d, difference between n = 1 + 1e-12 and n = 1", EXACT),
         ("exact-derivatives", "≤ 1e-06", "derivatives",
-         "derivatives, difference from finite differences", EXACT),
+         "derivatives by alpha, r, mfp, n, error by differences", EXACT),
         ("exact-cut", "≤ 1e-06", "cut",
          "R_d, difference of one medium cut into three layers", EXACT),
         ("exact-photons", "≥ 0.001", "half space, photons",
-         "p-value of photons, semi-infinite medium, n = 1.4", EXACT),
+         "p-value of photons, semi-infinite medium, n = 1.4, three albedos", EXACT),
         ("stack-photons", "≥ 0.001", "stack, photons",
          "p-value of photons, three layers, n = 1.4", EXACT),
         ("exact-time", "≤ 5", "new index, seconds", "time of 256 radii, 32 albedos, new index, compiled [s]"),
@@ -346,7 +344,8 @@ RUNS = (
          "worst of all, each rendered to 3 %"),
     )),
     Run(LAYERS, "python -m benchmarks.stacks", "",
-        "exact stacks, first layers of 0.03 to 8 mm, both illuminations, thicknesses not fitted", EXACT, (
+        "exact stacks, first layers of 0.03 to 8 mm at thicknesses not fitted and each stack's own, both illuminations",
+        EXACT, (
         ("stack-error", "≤ 3 %", lambda n: 100 * n["rel"],
          "error of R_d, mean of 12 stacks and colours"),
         ("stack-worst", "≤ 10 %", lambda n: 100 * n["worst"], "error of R_d, worst stack, illumination, thickness"),
@@ -358,14 +357,15 @@ RUNS = (
     Run(LAYERS, "python -m benchmarks.stacks --random 20", "", "exact solution of 20 random stacks of 2 to 4 layers",
         EXACT, (
         ("random-stacks", "≤ 10 %", lambda n: 100 * n["own"]["worst"],
-         "error of R_d, worst random stack"),
+         "error of R_d, worst random stack, own thickness"),
     )),
     Run(LAYERS, "python -m benchmarks.stacks --forward 0.9 --light searchlight --stack heart", "",
-        "3e7 photons per colour, radial bins from 0.1 mean free paths",
+        "3e7 photons per colour of the stack heart, pencil beam, bins from 0.1 mean free paths, noise subtracted",
         "photons, subtracted in quadrature", (
         ("forward-stack", "≤ 5 %", lambda n: 100 * n["rel"],
-         "error of R_d, g = 0.9, mean of three colours"),
-        ("forward-worst", "≤ 12 %", lambda n: 100 * n["worst"], "error of R_d, g = 0.9, worst colour"),
+         "error of R_d, heart with g = 0.9, pencil beam, mean of three colours"),
+        ("forward-worst", "≤ 12 %", lambda n: 100 * n["worst"],
+         "error of R_d, heart with g = 0.9, pencil beam, worst colour"),
     )),
     Run(LAYERS, "python -m benchmarks.stack_source", "",
         "the source in float64 within 99.5 % of the energy, and the source of hazard", EXACT, (
@@ -385,8 +385,8 @@ RUNS = (
     Run(SEA, "profilefit report petzold", "",
         "mean particle phase function of Petzold, 55 angles, with its mean cosine and backscattered share", EXACT, (
         ("phase-three", "≤ 0.17", of_phase("3-terms"),
-         "rms of ln(form / data), three terms"),
-        ("phase-four", "≤ 0.07", of_phase("4-terms"), "rms of ln(form / data), four terms"),
+         "rms of ln(form / data), three terms, moments held"),
+        ("phase-four", "≤ 0.07", of_phase("4-terms"), "rms of ln(form / data), four terms, moments held"),
     )),
     Run(SEA, "python -m benchmarks.sea --only beam segment shafts exact hits splats", "",
         "photons (omega to 0.8, c t to 4), float64, quadrature, exact irradiance of ridges and dense steps", EXACT, (

@@ -82,7 +82,7 @@ VARIABLES = {
 
 @styled
 def still() -> str:
-    """Return the picture as SVG, by the shipped record: what it shows is the same in every report."""
+    """Return the picture as SVG, by the shipped record: it is equal in every report."""
     law = load(LAW, setting=SETTING)
     figure = canvas(3.2)
     profile, cdf, edge = figure.subplots(1, 3)

@@ -10,14 +10,15 @@ from sphinx.application import Sphinx
 from mcml_sim.cli.app import app as mcml_sim
 from profilefit.cli import app as profilefit
 
-PAGE, HEAD = "reference/cli", "| option | meaning | default |\n| :--- | :--- | :--- |\n"
+PAGE, HEAD = "reference/cli", "| option | meaning | default |\n|:--|:--|:--|\n"
 
 
 def row(one: Any) -> str:
     """Return the row of an option or argument."""
     name = ", ".join(one.opts) if one.opts[0].startswith("-") else one.metavar or one.name.upper()
     value = one.default.value if isinstance(one.default, Enum) else one.default
-    words = one.show_default if isinstance(one.show_default, str) else "" if value in (None, False) else f"`{value}`"
+    shown = "" if value is None or value is False else f"`{value}`"
+    words = one.show_default if isinstance(one.show_default, str) else shown
     return f"| `{name}` | {in_code(one.help)} | {in_code('required' if one.required else words)} |\n"
 
 

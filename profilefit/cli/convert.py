@@ -35,7 +35,7 @@ def convert(
     illumination: Annotated[
         str | None, typer.Option(help=f"Illumination of --reflectance and --falloff: {LIGHTS_HELP}.")
     ] = None,
-    n: Annotated[float, typer.Option("--n", help="Refractive index of the medium, for --reflectance.")] = 1.0,
+    n: Annotated[float, typer.Option("--n", help="Refractive index of the medium, for A given or printed.")] = 1,
     g: Annotated[float, typer.Option("--g", help="Anisotropy; alpha and mu_s' stay reduced.")] = 0.0,
     mu_a: Annotated[str | None, typer.Option(help="Absorption coefficient, for example 0.1/mm; needs --mu-s.")] = None,
     mu_s: Annotated[str | None, typer.Option(help="Reduced scattering coefficient mu_s', for example 2/mm.")] = None,

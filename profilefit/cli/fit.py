@@ -34,7 +34,7 @@ PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 def fit(
     context: typer.Context,
     data: Annotated[
-        Path, typer.Argument(help="Table (.csv, .tsv, .txt), MCML output (.mco) or mcml-sim output (.npz).")
+        Path, typer.Argument(help="Table (.csv, .tsv, .txt), .mco or .npz file; with --kind phase, petzold is shipped.")
     ],
     kind: Annotated[str, typer.Option(help="Kind of data: profile, or phase for a phase function.")] = PROFILE,
     law: Annotated[

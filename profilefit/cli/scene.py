@@ -32,8 +32,8 @@ def scene(
     """Draw a scene beside its reference (a minute).
 
     For a file NAME.toml, the picture by its technique is NAME.png, and NAME-error.png shows the error of each pixel.
-    NAME.json contains error and cost, which are also printed. Times belong to this machine's OpenGL, which is a GPU or
-    a software rasteriser.
+    The reference has a picture, too. NAME.json contains error and cost, which are also printed. Times belong to this
+    machine's OpenGL, which is a GPU or a software rasteriser.
 
     \b
     Example, on a file of profilefit examples:

@@ -245,7 +245,7 @@ def premise_lines(content: Content) -> list[str]:
     own, second = (f"{data[name]:.3f}" for name in ("mean_cosine", "second"))
     return [
         *phase.table_lines(data),
-        f"Haltrin's form is off by a factor of e^{haltrin['rms']:.2f} (rms), {best[1]} by e^{best[0]:.2f}. "
+        f"Haltrin's form differs by a factor of e^{haltrin['rms']:.2f} (rms), {best[1]} by e^{best[0]:.2f}. "
         f"Its premises: the mean of P_2 is the mean cosine (here {second} and {own}), "
         f"and that follows from the backscattered share by a regression (here {data['regression']:.3f} for {own}).",
     ]

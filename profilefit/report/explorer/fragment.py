@@ -47,7 +47,7 @@ MEASURES = (
 
 
 def explorer_section(folder: Folder) -> str:
-    """Return what goes into the page's section: laws with the records in `folder`, in a `<div class="explorer">`.
+    """Return the HTML of the page's section: laws with the records in `folder`, in a `<div class="explorer">`.
 
     It needs no network and no other file, works from file://, and follows the page's variables for colours, --fg, --bg,
     --muted, --line, --blue, --green and --vermilion, where there are such. RecordError on a damaged record. Seconds.
@@ -76,7 +76,7 @@ def _slider(name: str, channel: str, low: float, high: float, step: float, label
 def _data(folder: Folder) -> str:
     """Return all that the script reads, as JSON that cannot end the element it stands in.
 
-    The texts of laws share two thirds of their lines: each is told by the numbers of its lines.
+    The texts of laws share two thirds of their lines: each is stored as the numbers of its lines.
     """
     laws, sphere = offered(folder), _asset("sphere.glsl")
     texts = [text for law in laws for text in (law.text, law.refracting.text if law.refracting else "")]

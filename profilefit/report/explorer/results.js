@@ -28,7 +28,7 @@ class Results {
   foreign(law, n) {
     this.part("foreign").hidden = law.follows(n);
     this.part("foreign").textContent = `${law.label} is of n = 1 and ignores the refracting surface of n = ${n}. `
-      + "Compare it with hazard, which follows n.";
+      + "It is drawn at the alpha of the exact solution. Compare it with hazard, which follows n.";
   }
 
   profiles(channels, view) {

@@ -99,7 +99,7 @@ def write_page(
     }
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     made["records"] = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
-    intro = {key: paragraph(text) for key, text in sections.INTRO.items()}
+    intro = {key: paragraph(text) for key, text in sections.INTRO.items() if key not in MEASURED}
     parts = {key: (title, intro.get(key, "") + made[key]) for key, title in PARTS.items() if made[key]}
     count = f"{len(source.paths)} record{'s' if len(source.paths) != 1 else ''}"
     write_whole(path, document(TITLE, LEAD, f"{count}, profilefit {__version__}", parts))

@@ -21,10 +21,10 @@ from profilefit.report.tables.fit_tables import photo_lines, photo_tables
 from profilefit.shader.law_file import export_medium
 
 TITLE = "A medium, by photographs of a laser spot"
-LEAD = "What scatters and absorbs behind a spot of light, colour by colour, from a bracket of its photographs."
+LEAD = "Scattering and absorption of a medium, colour by colour, from a bracket of photographs of a laser spot."
 DRAWN = {
-    SPOT: "The merged picture, in decades below the brightest; some of the rings, and what no exposure recorded.",
-    RINGS: "Light of the rings and the fit; below, what is left over, in standard errors.",
+    SPOT: "The merged picture, in decades below the brightest; some rings, and pixels that no exposure recorded.",
+    RINGS: "Light of the rings and the fit; below, the residuals in standard errors.",
 }
 SHADER = (
     "A file of functions and constants: R_d, its cdf and a sampler of any albedo and mean free path, as a blur of "

@@ -92,12 +92,13 @@ FITTED = (
     "hazard under diffuse illumination.",
     "Symbols: alpha is the reduced albedo, and A the total diffuse reflectance. The length l (mfp) is the transport "
     "mean free path 1 / (mu_s' + mu_a). R_d(r) is the reflected light per area at the distance r. The cdf is the share "
-    "of the reflected light within r. n is the refractive index, and g the mean cosine of scattering.",
+    "of the reflected light within r. n is the refractive index, and g the mean cosine of scattering. Diffuse "
+    "illumination is cosine-weighted light from all sides.",
 )
 INTRO = {  # of sections, in words
     "records": "Each line opens one record: its constants with standard errors, the fit, and its errors by albedo.",
     "quality": "Each curve is one model. Its errors are relative to the exact solution, at held-out albedos.",
-    "stacks": "These records describe media of two or three layers, for example skin. A click enlarges a picture.",
+    "stacks": "These records describe layered media, for example skin. A click enlarges a picture.",
     "tradeoff": "Each chart compares techniques by error and time. Techniques on the lower left are accurate and fast.",
     "stability": "Each model was evaluated at many albedos and radii, in several arithmetics, for example float32. Red "
     "cells mark values that fail.",
@@ -150,7 +151,7 @@ def record_part(source: Source, name: str) -> str:
     plans_of = [plan for plan in plots.record_plans(source, name) if not plan.missing]
     corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
     drawings = "\n".join(_drawn(plan, source) for plan in plans_of if source.names and plan.name != corner)
-    draw = f"profilefit report {shlex.quote(name)} --figures figures  # residuals, quality, posterior"
+    draw = f"profilefit report {shlex.quote(name)} --figures figures"
     command_again = command("\n".join([*_remake_lines({name: content}), *([draw] if plans_of else [])]))
     colour = "green" if "fit" not in content or converged(content) else "red"
     result = content["fit"]["result"] if "fit" in content else f"{len(content['readings'])} readings"
@@ -160,7 +161,7 @@ def record_part(source: Source, name: str) -> str:
 
 
 def in_words(content: Content) -> str:
-    """Return what a record is of: the kind, the illumination, n and g."""
+    """Return the kind, illumination, n and g of a record, in words."""
     if content["pipeline"] == "evidence":
         return "comparison of readings of a paper"
     kind = next((words for measure, words in KINDS.items() if measures(content, measure)), KINDS["inversion_error"])
@@ -170,7 +171,7 @@ def in_words(content: Content) -> str:
 
 
 def fitted(source: Source) -> str:
-    """Return what the records are, in words, and all of them in tables, folded."""
+    """Return a description of the records, and their tables, folded."""
     contents = {name: source.content(name) for name in source.paths}
     kinds = Counter(in_words(one).partition(",")[0] for one in contents.values())
     listed = ", ".join(f"{kind} ({count})" for kind, count in kinds.items())
@@ -198,7 +199,7 @@ class EvidenceFolder:
         missing = paragraph("Not measured here. This command measures it:", "dim") + line
         try:
             content = self.content(name)
-            shown: Iterable[str] = [missing] if content is None else parts(self, content)
+            shown: Iterable[str] = [missing] if content is None else (paragraph(INTRO[name]), *parts(self, content))
             return "\n".join([*shown, _pictures(self, RENDERS, name) if name == "check" else ""])
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
             expected = f"{self.folder / name}.json: expected what `profilefit {name} --out` writes"
@@ -268,6 +269,7 @@ OF_LAYERS = {
     "own-data.png": "Errors of tissue's properties by place and error of the data; n and g known or not.",
 }
 GROUPS = {"laws": ("Profile models in float32", OF_PROFILE), "maps": ("Albedo inversions in float32", OF_MAP[:2])}
+SHOWN_AS = {"rel": "R_d", "ks": "cdf", "inversion_error": "radius"}
 MEANING = (
     "model: largest error over the albedo, relative to the exact solution or to photons; float32: error that rounding "
     "adds; bad: number of values that are NaN, infinite, negative or not monotone, inside and outside the range of the "
@@ -296,7 +298,7 @@ def shader(evidence: EvidenceFolder, content: Content) -> Iterator[str]:
     verdict = "all pass" if content["passed"] else "bounds are broken"
     yield paragraph(f"{counts} on {content['device']}: {verdict}.", "bold")
     for key, (title, names) in GROUPS.items():
-        errors = (f"{MEASURES[name].symbol}\n{of}" for name in names for of in ("model", "float32"))
+        errors = (f"{SHOWN_AS.get(name, MEASURES[name].symbol)}\n{of}" for name in names for of in ("model", "float32"))
         header, rows = ("law", "result", "light", "n", *errors, "bad\ninside", "bad\noutside"), []
         for one in content[key]:
             setting = (one["setting"]["illumination"], f"{one['setting']['n']:g}")

@@ -36,7 +36,7 @@ CAPTION = (
 COST_CAPTION = (
     "ns and, in brackets, times normalized diffusion. profile: R_d; sample: a radius; both: a radius and R_d there; "
     "estimate: a sample of (22), that is a radius, its density and R_d at another distance; material: both, with "
-    "another α at each. Of the source as exported; constants do not change it"
+    "another α at each. For the exported source; constants do not change it"
 )
 HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16 alone, worst of 24 albedos, l = 1"
 

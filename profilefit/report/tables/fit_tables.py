@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # which a fit of one medium does not load
 HELD, EDGE = "held", "edge"
 SHARES = ("A", "alpha")  # which end at 1
 # tests/physics/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
-HELD_IN = "checked on simulated replicates, such intervals cover the truth in 93 to 98 %"
+HELD_IN = "checked on simulated replicates, such intervals cover the simulated value in 93 to 98 %"
 RIVALLED = ("mu_s'", "mu_a", "scale")
 ODD = (0.5, 2.0)  # scales between these are a calibration's
 UNLIKELY = 3.0  # standard errors
@@ -409,7 +409,7 @@ def layers_content(fit: LayersFit) -> dict[str, Any]:
 
 MEDIUM = ("mu_s'", "mu_a", "alpha", "l", "A")
 REMEDY = "photograph cards, or expose longer"
-CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
+CARDS = "a white one gives beam and glare, a grey one the scale; --simulate says what they are worth"
 
 
 def photo_tables(photo: Photo) -> list[RenderableType]:

@@ -30,13 +30,13 @@ DISTANCES = ("constant_distance", "curve_distance")
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
 AS_PUBLISHED = "-as-published"  # ends the name of a record of the paper's protocol
-OF_MAPS = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)")
-OF_MAPS += ("monotone", "α at A = 1", "A at the fold")
+OF_MAPS = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)", "monotone", "α at A = 1")
+OF_MAPS = (*OF_MAPS, "A at the fold")
 
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "constants found"})
-NAMES |= {"verdict", "law", "profile model", "model", "map", "source", "illumination", "light", "sampler", "measure"}
-NAMES |= {"claim", "noise", "held against", "command", "stack", "channel", "table", "fit", "moments"}
+NAMES |= {"verdict", "law", "profile model", "model", "map", "illumination", "light", "measure"}
+NAMES |= {"claim", "stack", "channel", "table", "fit", "moments"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # Profile models of the README: the one in use, the best sum of Gaussians, and those of the lowest error.
 SHORT = {("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
