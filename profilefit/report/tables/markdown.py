@@ -30,8 +30,8 @@ DISTANCES = ("constant_distance", "curve_distance")
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
 AS_PUBLISHED = "-as-published"  # ends the name of a record of the paper's protocol
-OF_MAPS = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)", "monotone", "α at A = 1")
-OF_MAPS = (*OF_MAPS, "A at the fold")
+OF_MAPS: tuple[str, ...] = ("record", "constants", "error of A", "error of α", "relative error of √(1 − α)")
+OF_MAPS += ("monotone", "α at A = 1", "A at the fold")
 
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "constants found"})
