@@ -94,7 +94,7 @@ def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
         raise InputError(f"--fits must be a folder of records, got {str(requested)!r}, which is none")
     folder = known_folder(requested)
     if folder.resolve() != fits_folder().resolve() and not (quiet and requested):
-        where = "" if requested else " in the folder that you are in; --fits chooses others"
+        where = "" if requested else " in the current folder; --fits chooses others"
         warnings.warn(f"records of {str(folder)!r}{where}", OtherRecords, stacklevel=2)
     return folder
 
@@ -107,7 +107,7 @@ def evidence_folder(records: Path, requested: Path | None = None) -> Path:
     if requested is not None and not requested.is_dir():
         raise InputError(f"--evidence must be a folder, got {str(requested)!r}, which is none")
     if requested is None and EVIDENCE.is_dir():
-        where = f"measurements of {str(EVIDENCE)!r} in the folder that you are in; --evidence chooses others"
+        where = f"measurements of {str(EVIDENCE)!r} in the current folder; --evidence chooses others"
         warnings.warn(where, OtherRecords, stacklevel=2)
     return requested or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)
 

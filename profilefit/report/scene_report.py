@@ -73,7 +73,7 @@ def _chart(points: Sequence[ChartPoint], device: str) -> bytes:
 
 
 def scene_lines(drawn: RenderResult, device: str) -> Iterator[str]:
-    """Yield what is printed: a line for each number of samples, then a whole frame, and the truth's own error."""
+    """Yield what is printed: a line for each number of samples, then a whole frame, and the error of the reference."""
     for point in drawn.chart:
         what = f"{point.label}, {point.samples} samples"
         yield f"{what}: error {point.rmse:.3g}, {_times(point.milliseconds)} for its passes"
@@ -81,7 +81,7 @@ def scene_lines(drawn: RenderResult, device: str) -> Iterator[str]:
     for name, times in drawn.passes.items():
         yield f"  {name}: {_times(times)}"
     yield (
-        f"the truth's own error: {drawn.truth_error.half:.1e} at half of the pixels, {drawn.truth_error.most:.1e} at "
+        f"error of the reference: {drawn.truth_error.half:.1e} at half of the pixels, {drawn.truth_error.most:.1e} at "
         f"nine in ten, {drawn.truth_error.rms:.1e} root mean square"
     )
     yield f"errors are root mean squares of {drawn.of}, over its mean; times are of {device}"

@@ -166,12 +166,12 @@ def test_records_that_are_not_the_shipped_ones_are_named(command):
     Path("fits").mkdir()
     for name in ("hazard", "albedo-rational"):
         shutil.copy(FITS / f"{name}.json", "fits")
-    said = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
+    said = "profilefit: records of 'fits' in the current folder; --fits chooses others\n"
     assert command("export", "hazard") == (0, shipped, said)
     (Path("fits") / "albedo-rational.json").unlink()
     status, out, err = command("export", "hazard")
     assert (status, "// map: this record came with profilefit" in out) == (0, True)
-    assert err.splitlines()[1:] == ["profilefit: no record 'albedo-rational' in 'fits': the shipped map serves"]
+    assert err.splitlines()[1:] == ["profilefit: no record 'albedo-rational' in 'fits': the shipped albedo inversion is used"]
 
 
 def test_a_folder_that_lacks_the_record_gives_no_other(refused):

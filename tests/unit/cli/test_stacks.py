@@ -135,7 +135,7 @@ def test_a_stack_beside_other_records(command, done, heart):
     assert "Muscle under its skin" in out
     done("report", "skin")
     Path("fits/hazard.json").write_bytes((fits_folder() / "hazard.json").read_bytes())
-    other = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
+    other = "profilefit: records of 'fits' in the current folder; --fits chooses others\n"
     assert command("report", "heart")[::2] == (0, other)
     assert command("report", "skin")[::2] == (0, f"{other}profilefit: stack 'skin' is of {str(fits_folder())!r}\n")
 

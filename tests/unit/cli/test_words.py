@@ -223,7 +223,7 @@ def test_what_was_asked_for_comes_first_then_what_is_here_then_what_is_shipped(t
     Path("fits").mkdir()
     assert records_folder() == fits_folder(), "an empty folder has nothing to show"
     Path("fits/one.json").write_text("{}")
-    with pytest.warns(OtherRecords, match="records of 'fits' in the folder that you are in; --fits chooses others"):
+    with pytest.warns(OtherRecords, match="records of 'fits' in the current folder; --fits chooses others"):
         assert records_folder(quiet=True) == Path("fits")
     Path("mine").mkdir()
     with pytest.warns(OtherRecords, match="records of 'mine'$"):

@@ -155,7 +155,7 @@ def test_settings_have_records_by_their_names_or_are_told_which_there_are():
 
 def test_records_of_another_folder_come_first_and_by_their_setting(tmp_path):
     make_record(tmp_path, "burley-whole", "burley", FOUR)
-    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped map serves"):
+    with pytest.warns(ShippedMap, match=r"no record 'albedo-rational' in '.*': the shipped albedo inversion is used"):
         here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
     assert here.constants() == FOUR != shipped.constants()
     assert here.albedo == shipped.albedo  # not in that folder: the installation's own
