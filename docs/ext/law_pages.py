@@ -104,14 +104,13 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
 def index_text(pages: Sequence[Page], folder: Folder) -> str:
     """Return the table of all laws with the worst errors that their records state, and the list of the pages."""
     contents = _contents(folder)
-    header = ("law", "constants", "light", "n", "number", *(f"{MEASURES[key].symbol} worst" for key in WORST))
+    header = ("law", "constants", "light", "n", "number of constants", "R_d", "cdf", "radius", "A")
     rows = [_row(page, one, contents) for page in pages for one in page.members]
     caption = (
-        "Every law and map between alpha and A, with every set of constants that comes with this version. The errors "
-        "are those at the worst held-out albedo, as the records state them: `rel` the mean relative error "
-        "of R_d, `ks` the largest error of the cumulated energy, `xi` that of the inversion, `A` that of the "
-        "reflectance. The pages are made of the records when the documentation is built; "
-        "[Which model](../explanation/models.md) measures also those that have no record."
+        "Every profile model and albedo inversion, with every set of constants of this version. Errors are the largest "
+        "over held-out albedos, as the records state them. R_d is the mean relative error over radii, cdf the largest "
+        "error of the cumulative energy, radius the error of the inverse cdf, and A the error of the reflectance. "
+        "[Which model](../explanation/models.md) also measures sets without a record."
     )
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.name for page in pages) + "\n```"
     return "\n\n".join(["# All laws", caption, markdown_table(header, rows), tree]) + "\n"
