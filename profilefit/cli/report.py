@@ -123,7 +123,7 @@ def report(
         show(list(law_tables.every_law(measured(), bool(names))), screen())
     elif claims:
         made, rows = read_claims(options.evidence_folder(folder, evidence))
-        show(claim_tables(rows), screen())
+        show(list(claim_tables(rows, titled=True).values()), screen())
         if stale(made, folder):
             said.print("since then records or version have changed: `make claims` measures again", markup=False)
     else:

@@ -395,6 +395,5 @@ def promises(evidence: EvidenceFolder) -> Iterator[str]:
     if (evidence.folder / FILE).exists():
         made, claims = read_claims(evidence.folder)
         yield evidence.origin({"made": made})
-        commands = dict.fromkeys(one.command for one in claims)
-        for line, table in zip(commands, claim_tables(claims), strict=True):
+        for line, table in claim_tables(claims, titled=False).items():
             yield details(element("code", escape(line)), markup(table), group="claims")

@@ -87,14 +87,16 @@ def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
         raise InputError(f"{path}: expected what `make claims` writes, got {given}") from error
 
 
-def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
-    """Return a table for each command, with the command as its title."""
-    parts: list[RenderableType] = []
-    for command, group in groupby(claims, key=lambda one: one.command):
-        rows = list(group)
+def claim_tables(claims: Sequence[Claim], titled: bool) -> dict[str, RenderableType]:
+    """Return a table for each command, by command, which is its title, too, if `titled`."""
+    parts: dict[str, RenderableType] = {}
+    for command in dict.fromkeys(one.command for one in claims):
+        rows = [one for one in claims if one.command == command]
         caption = f"Reference: {rows[0].truth}. Measured {rows[0].date[:10]} at a load of {rows[0].load} processes."
         header = ("claim", "promised", "measured", "noise")
-        parts.append(row_table(command, header, [one.cells for one in rows], caption, fold=("claim", "noise")))
+        parts[command] = row_table(
+            command if titled else "", header, [one.cells for one in rows], caption, fold=("claim", "noise")
+        )
     return parts
 
 
@@ -117,8 +119,9 @@ def _origins(claims: Sequence[Claim]) -> Iterator[str]:
     for command, group in groupby(claims, key=lambda one: one.command):
         rows = list(group)
         yield "```\n" + " \\\n    ".join(wrap(command, CODE, break_on_hyphens=False)) + "\n```"
-        text = f"Reference: {rows[0].truth}. On {rows[0].date[:10]}, load {rows[0].load}."
+        lines = [f"Reference: {rows[0].truth}. Measured on {rows[0].date[:10]} at load {rows[0].load}."]
         for noise in dict.fromkeys(one.noise for one in rows if one.noise != EXACT):
             spreads = [f"`{one.name}` {one.spread}".strip() for one in rows if one.noise == noise]
-            text += f" {noise[:1].upper()}{noise[1:]}: {', '.join(spreads)}."
-        yield "\n".join(wrap(escape(text, quote=False), LINE, break_on_hyphens=False))
+            lines.append(f"{noise[:1].upper()}{noise[1:]}: {', '.join(spreads)}.")
+        shown = (wrap(escape(f"- {line}", quote=False), LINE, break_on_hyphens=False) for line in lines)
+        yield "\n".join("\n  ".join(parts) for parts in shown)

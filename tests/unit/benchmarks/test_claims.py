@@ -97,7 +97,8 @@ def test_a_row_is_judged_by_its_numbers_and_shown_with_its_noise(tmp_path):
     assert lines[:3] == ["## Speed", "", "Times &lt;1."]
     assert {len(re.split(r"(?<!\\)\|", line)) for line in lines[4:8]} == {5}
     assert r'<a id="time"></a>time of \<ours>' in lines[6]
-    assert lines[-3:-1] == ["Reference: theirs. On today, load 0.2. Least | most: `time` 1.25 … 1.40.", ""]
+    reference = "- Reference: theirs. Measured on today at load 0.2."
+    assert lines[-4:-1] == [reference, "- Least | most: `time` 1.25 … 1.40.", ""]
 
 
 @pytest.mark.parametrize(
