@@ -218,7 +218,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     """
 
     def laws() -> str:
-        profiles = profile_laws(folder, matched=False)
+        profiles = [one for one in profile_laws(folder, matched=False) if not one.records]
         return markdown_laws(for_each(lambda one: profile_quality(one.law, ALBEDOS), profiles))
 
     check, claims = (lambda: markdown_check(folder)), (lambda: markdown_claims(folder / EVIDENCE))

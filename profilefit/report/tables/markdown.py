@@ -19,10 +19,6 @@ OF_THE_PAPER = ("liang", "burley", "rational")  # its own laws, and those it is 
 # Words and factor of a measure in headers.
 WORDS = {
     "rel": ("error of R_d [%]", 100.0),
-    "ks": ("error of cumulative energy [%]", 100.0),
-    "l1": ("misplaced energy [%]", 100.0),
-    "mse": ("MSE [1e-6/mfp²]", 1e6),
-    "r2": ("R²", 1.0),
     "inversion_error": ("error of the sampled energy [%]", 100.0),
 }
 DISTANCES = ("constant_distance", "curve_distance")
@@ -91,7 +87,6 @@ def sections(contents: Mapping[str, Content]) -> dict[str, str]:
     maps = [(owner, which, *(albedo_number(name, values[name]) for name in OF_MAP)) for owner, which, values in sets]
     tables = {
         "short": _short(contents),
-        "quality": _quality(_measured(paper, "rel"), ("mean rel", "largest l1", "largest mse", "smallest r2")),
         "constants": markdown_constants(paper),
         "readings": _readings(contents),
         "inversion": _quality(_measured(contents, of := "inversion_error"), (f"mean {of}", f"largest {of}")),
@@ -119,7 +114,7 @@ def _quality(sets: Sequence[tuple[str, str, Content]], columns: Sequence[str], o
         for end, key in ends:
             known, factor = values.get(key), WORDS[key][1]  # photons do not say all
             value = None if known is None else float(np.mean(known)) if end == "mean" else MEASURES[key].worst(known)
-            row.append(f"{value:.4f}" if key == "r2" and value else significant(value and factor * value))
+            row.append(significant(value and factor * value))
         rows.append(row)
     return markdown_table((of, "constants", *(f"{end} {WORDS[key][0]}" for end, key in ends)), rows) if rows else ""
 
