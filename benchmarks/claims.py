@@ -451,10 +451,10 @@ def numbers(command: str) -> Any:
         return json.loads(text)
 
 
-def claimed(run: Run, command: str, told: Any, date: str = "", load: str = "unknown") -> Iterator[Claim]:
+def claimed(run: Run, command: str, values: Any, date: str = "", load: str = "unknown") -> Iterator[Claim]:
     """Return the rows of a run whose command printed these numbers."""
     for name, bound, read, says, *noise in run.promises:
-        found = at(told, read) if isinstance(read, str) else read(told)
+        found = at(values, read) if isinstance(read, str) else read(values)
         value, low, high = found if isinstance(found, Sequence) else (found,) * 3
         sense, most, *unit = bound.split()
         spread = noise[0] if noise else EXACT if low == high else run.noise
@@ -487,7 +487,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         found |= {one.name: one for one in new}
         rows = [asdict(found[name]) for name in names if name in found]
         write_whole(file, as_json({"made": origin, "rows": rows}))  # after each command: the next may take ten minutes
-        show(claim_tables(new), Console(width=WIDTH, highlight=False))
+        show(list(claim_tables(new, titled=True).values()), Console(width=WIDTH, highlight=False))
     if broken := [f"{one.says}: {one.cells[2]}, promised {one.cells[1]}" for one in found.values() if not one.holds]:
         sys.exit("\n".join(broken))
 
