@@ -1,10 +1,10 @@
 """Renders judged: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
 
     python -m benchmarks.render errors|table2|fig14|variance|pictures|choices|refracting
-                                [--quick] [--size WxH] [--figure FILE] [--json FILE] [--reference FILE]
+                                [--quick] [--size WxH] [--figure FILE] [--json FILE]
 
-Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. The exact picture takes
-minutes: `--reference FILE` keeps it there for the next time. All but `refracting` is of n = 1, as published.
+Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. All but `refracting` is of
+n = 1, as published.
 README.md beside this file says what the numbers mean.
 """
 
@@ -91,7 +91,7 @@ def choices(context: moderngl.Context, options: argparse.Namespace) -> dict:
 def refracting(context: moderngl.Context, options: argparse.Namespace) -> dict:
     """Draw three laws of a surface that refracts: profiles, a head by each, and its error."""
     size = options.size or render_refracting.SIZE
-    with render_refracting.judged_head(context, size, options.reference) as judge:
+    with render_refracting.judged_head(context, size) as judge:
         found = render_refracting.shots(judge, 1 if options.quick else render_refracting.SEEDS)
         render_refracting.report(found)
         if options.figure:
@@ -105,7 +105,7 @@ WHAT: dict[str, Callable[[moderngl.Context, argparse.Namespace], dict]] = {
 
 
 def _judged(context: moderngl.Context, options: argparse.Namespace):
-    return judged(context, options.size or VIEW, options.reference, options.quick)
+    return judged(context, options.size or VIEW, options.quick)
 
 
 def _drawn(
@@ -147,7 +147,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture [pixels]")
     parser.add_argument("--figure", type=_png, metavar="FILE", help="draw a chart or picture there, .png")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers there too")
-    parser.add_argument("--reference", type=Path, metavar="FILE", help="keep the exact picture there, .npz")
     options = parser.parse_args(arguments)
     try:
         context = open_context()

@@ -56,11 +56,11 @@ class Shot:
     error: float
 
 
-def judged_head(context: moderngl.Context, size: tuple[int, int], kept: Path | None) -> AbstractContextManager[Judged]:
+def judged_head(context: moderngl.Context, size: tuple[int, int]) -> AbstractContextManager[Judged]:
     """Return the head under a surface of n = 1.4 in the colour of the material, with its exact answer."""
     x, y, z = (np.array(TARGET) + DISTANCE * unit(HEAD.direction)).tolist()
     scene = head_scene(MATERIAL, Camera((x, y, z), TARGET, HEIGHT), setting=SKIN)
-    return judged(context, size, kept, True, scene, SCALE, SKIN)
+    return judged(context, size, True, scene, SCALE, SKIN)
 
 
 def shots(judge: Judged, seeds: int) -> list[Shot]:

@@ -25,15 +25,16 @@ def scene(
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for pictures (PNG) and numbers (JSON).")] = OUT,
+    no_reference: Annotated[bool, typer.Option("--no-reference", help="Draw the picture alone, of any size.")] = False,
     example: Annotated[bool, typer.Option("--example", help="Print an example file of a scene.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Draw a scene beside its reference (a minute).
 
-    For a file NAME.toml, the picture by its technique is NAME.png, and NAME-error.png shows the error of each pixel.
-    The reference has a picture, too. NAME.json contains error and cost, which are also printed. Times belong to this
-    machine's OpenGL, which is a GPU or a software rasteriser.
+    For a file NAME.toml, the picture by its technique is NAME.png. NAME-comparison.png shows it beside the reference,
+    the error of each pixel, and two other techniques. The reference has a picture, too. NAME.json contains error and
+    cost, which are also printed. Times belong to this machine's OpenGL, which is a GPU or a software rasteriser.
 
     \b
     Example, on a file of profilefit examples:
@@ -60,11 +61,13 @@ def scene(
 
     home = import_module(SCENES[name][0])
     request = home.read(file, content)
+    if not no_reference:
+        request.require_reference()
     stem = out / Path(file).stem
-    for end in (".json", ".png", "-truth.png", "-error.png"):
+    for end in (".json", ".png", "-truth.png", "-error.png", "-comparison.png"):
         require_writable(Path(f"{stem}{end}"))
-    with working("drawing the scene and its reference", quiet), opened() as context:
-        drawn, device = home.draw(context, request), renderer(context)
+    with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
+        drawn, device = (home.picture if no_reference else home.draw)(context, request), renderer(context)
     figures = report.scene_figures(drawn, device.partition(",")[0])
     files: dict[Path, bytes | str] = {Path(f"{stem}{end}.png"): png for end, png in figures.items()}
     body = {"made": {"by": typed(), "version": __version__}, "of": content, **report.content(drawn, device)}

@@ -9,20 +9,29 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps, image
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
-from profilefit.scenes.stage.judge import ChartPoint, RenderResult
+from profilefit.report.tables.cells import significant
+from profilefit.scenes.stage.judge import ChartPoint, RenderResult, SceneImage
 
 LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured
+# Comparison: its width, pictures side by side, and the height of a label [pixels]; pixels per inch; sizes of letters.
+WIDE, COLUMNS, LABEL, SCREEN, LARGE, SMALL = 1920, 3, 76, 100, 17.0, 15.0
 
 
-def scene_figures(drawn: RenderResult, device: str) -> dict[str, bytes]:
-    """Return PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart"."""
-    pictures = {"": drawn.picture, "-truth": drawn.truth}
-    files = {end: _png(image.imsave, picture) for end, picture in pictures.items()} | {"-error": _error_map(drawn)}
-    if len(drawn.chart) > 1:
-        files["-chart"] = _chart(drawn.chart, device)
+def scene_figures(drawn: SceneImage, device: str) -> dict[str, bytes]:
+    """Return PNG files by the ends of their names: "" the picture; with a reference "-truth", "-error" and more."""
+    files = {"": _png(image.imsave, drawn.picture)}
+    if isinstance(drawn, RenderResult):
+        files |= {"-truth": _png(image.imsave, drawn.truth), "-error": _error_map(drawn)}
+        files["-comparison"] = _comparison(drawn, device)
+        if len(drawn.chart) > 1:
+            files["-chart"] = _chart(drawn.chart, device)
     return files
 
 
@@ -49,6 +58,54 @@ def _error_map(drawn: RenderResult) -> bytes:
 
 
 @styled
+def _comparison(drawn: RenderResult, device: str) -> bytes:
+    """Draw the picture, the reference, the error and rivals on a page of `WIDE` pixels."""
+    rows, columns = drawn.picture.shape[:2]
+    across = WIDE // COLUMNS
+    height = 2 * (round(across * rows / columns) + LABEL)
+    figure = canvas(height / SCREEN, WIDE / SCREEN)
+    grid = figure.subplots(2, COLUMNS)
+    figure.set_layout_engine("none")
+    panels = [
+        (drawn.picture, _label(drawn.point)),
+        (drawn.truth, f"reference\n{drawn.truth.shape[1]} x {drawn.truth.shape[0]} pixels"),
+        *((one.picture, _label(one.point)) for one in drawn.rivals),
+    ]
+    places = [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for ax in grid.ravel():
+        ax.set_axis_off()
+    for (row, column), (picture, label) in zip(places, panels, strict=False):
+        _panel(grid[row, column], picture, label)
+    colours = colormaps["inferno"].with_extremes(bad=NOWHERE)
+    most = float(np.nanquantile(drawn.error, LAST)) or 1.0
+    shown = colours(drawn.error / most)
+    shown[np.isnan(drawn.error)] = colours.get_bad()
+    _panel(grid[0, 2], shown, "error of the first picture\nby pixel, on the scale below")
+    gap = LABEL / height
+    for row in range(2):
+        for column in range(COLUMNS):
+            grid[row, column].set_position((column / COLUMNS, 0.5 * (1 - row), 0.995 / COLUMNS, 0.5 - gap))
+    bar = figure.add_axes((2.0 / COLUMNS + 0.03, 0.36, 1.0 / COLUMNS - 0.06, 0.025))
+    figure.colorbar(ScalarMappable(Normalize(0.0, 100.0 * most), colours), bar, orientation="horizontal", extend="max")
+    bar.tick_params(labelsize=SMALL)
+    bar.set_xlabel(f"error of {drawn.of}, over its mean [%]", fontsize=SMALL)
+    said = "Errors in labels are root mean squares\nover all pixels that are judged.\n"
+    said += f"Times are of the passes,\nat the size of the reference,\non {device.partition(' (')[0]}."
+    figure.text(2.0 / COLUMNS + 0.03, 0.24, said, fontsize=SMALL, va="top")
+    return _png(figure.savefig, dpi=SCREEN)
+
+
+def _panel(ax: Axes, picture: NDArray[Any], label: str) -> None:
+    ax.imshow(picture, interpolation="antialiased", aspect="auto")
+    ax.set_title(label, fontsize=LARGE, pad=6.0, linespacing=1.25)
+
+
+def _label(point: ChartPoint) -> str:
+    error, time = significant(100.0 * point.rmse), float(f"{median(point.milliseconds):.2g}")
+    return f"{point.label}, {point.samples} samples\nerror {error} %, {time:g} ms"
+
+
+@styled
 def _chart(points: Sequence[ChartPoint], device: str) -> bytes:
     figure = canvas(3.4, 7.0)
     by_samples, by_time = figure.subplots(1, 2, sharey=True)
@@ -72,30 +129,38 @@ def _chart(points: Sequence[ChartPoint], device: str) -> bytes:
     return _png(figure.savefig, dpi=DPI)
 
 
-def scene_lines(drawn: RenderResult, device: str) -> Iterator[str]:
-    """Yield what is printed: a line for each number of samples, then a whole frame, and the error of the reference."""
-    for point in drawn.chart:
+def scene_lines(drawn: SceneImage, device: str) -> Iterator[str]:
+    """Yield what is printed: a line for each number of samples and each rival, a whole frame, and the reference."""
+    judged = drawn if isinstance(drawn, RenderResult) else None
+    for point in (*judged.chart, *(one.point for one in judged.rivals)) if judged else ():
         what = f"{point.label}, {point.samples} samples"
         yield f"{what}: error {point.rmse:.3g}, {_times(point.milliseconds)} for its passes"
-    yield f"a whole frame with {drawn.point.samples} samples: {_times(drawn.frame)}"
+    yield f"a whole frame by {drawn.label} with {drawn.samples} samples: {_times(drawn.frame)}"
     for name, times in drawn.passes.items():
         yield f"  {name}: {_times(times)}"
-    yield (
-        f"error of the reference: {drawn.truth_error.half:.1e} at half of the pixels, {drawn.truth_error.most:.1e} at "
-        f"nine in ten, {drawn.truth_error.rms:.1e} root mean square"
-    )
-    yield f"errors are root mean squares of {drawn.of}, over its mean; times are of {device}"
+    if judged is None:
+        yield f"times are of {device}"
+        return
+    half, most, rms = judged.truth_error
+    yield f"error of the reference: {half:.1e} at half of the pixels, {most:.1e} at nine in ten, rms {rms:.1e}"
+    rows, columns = judged.truth.shape[:2]
+    yield f"errors, at {columns} x {rows} pixels, are root mean squares of {judged.of}, over its mean"
+    yield f"times are of {device}"
 
 
-def content(drawn: RenderResult, device: str) -> dict[str, Any]:
-    """Return the numbers for --json and a file: errors over the mean of the truth [-], times in ms."""
+def content(drawn: SceneImage, device: str) -> dict[str, Any]:
+    """Return the numbers for --json and a file: errors over the mean of the reference [-], times in ms."""
+    whole = {"device": device, "technique": drawn.label, "samples": drawn.samples}
+    whole["frame_milliseconds"] = _spread(drawn.frame)
+    whole |= {"passes": {name: _spread(times) for name, times in drawn.passes.items()}} if drawn.passes else {}
+    if not isinstance(drawn, RenderResult):
+        return whole
     return {
-        "device": device,
+        **whole,
         **_point(drawn.point),
-        "frame_milliseconds": _spread(drawn.frame),
-        **({"passes": {name: _spread(times) for name, times in drawn.passes.items()}} if drawn.passes else {}),
         "truth_error": drawn.truth_error._asdict(),
         "chart": [_point(one) for one in drawn.chart],
+        "rivals": [_point(one.point) for one in drawn.rivals],
     }
 
 

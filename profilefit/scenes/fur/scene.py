@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -17,7 +18,8 @@ from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, 
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
-from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, RenderResult
+from profilefit.scenes.stage.drawing import Drawer
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, Rendering, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import Samples, TechniqueTable, Viewpoint, ViewRequest
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
@@ -167,27 +169,30 @@ class FurRender(NamedTuple):
 
     def points(self, by: LayerTechnique, layers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of layers; time is of both passes."""
-        draw, time = partial(self.picture, by), lambda count: self.renderer.time(*self._passes(by, count))
-        return self.judge.points(by.name, layers, draw, time, turns)
+        return self.judge.points(by.name, layers, partial(self.picture, by), partial(self.time, by), turns)
+
+    def time(self, by: LayerTechnique, layers: int) -> float:
+        """Return the milliseconds of both passes."""
+        return self.renderer.time(*self._passes(by, layers))
 
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:
         return self.surface.layered(self.view, by, layers), self.shade
 
 
 @contextmanager
-def reference_render(context: moderngl.Context, of: FurRequest) -> Iterator[FurRender]:
-    """Open the passes and the reference image of a request."""
+def reference_render(context: moderngl.Context, of: FurRequest, has_reference: bool = True) -> Iterator[FurRender]:
+    """Open the passes and the reference image of a request; without one, all is black that is judged."""
     fur, each = of.fur, of.technique.supersampling
     ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.force, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
     shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table).shade(view)
     with Renderer(context, size) as renderer:
-        hits = ball.cast(view, size)
+        hits = ball.cast(view, size) if has_reference else np.ones((size[1], size[0], 4), np.float32)
         renderer.write(HITS, hits)
         fine = renderer.image(shade)[..., :3].astype(float)
         mask = averaged((hits[..., 3:] > NOTHING).astype(float), each)[..., 0] > 0
         reference = averaged(fine, each)
-        exposure = float(1.0 / max(np.quantile(reference[mask].max(axis=-1), WHITE), 1e-30))
+        exposure = exposure_of(reference[mask].max(axis=-1), WHITE)
         error = _standard_error(fine, each, mask) if each > 1 else UNKNOWN
         judge = Judge(reference, mask, error, exposure)
         yield FurRender(of, renderer, FurSurface.of_ball(ball), shade, view, fine, judge)
@@ -203,9 +208,35 @@ def _standard_error(fine: Floats, each: int, mask: NDArray[np.bool_]) -> TruthEr
     return TruthError.of(0.5 * np.sqrt(np.mean(halves**2, axis=-1))[mask] / mean)
 
 
-def draw(context: moderngl.Context, of: FurRequest) -> RenderResult:
-    """Draw the picture beside its reference, with error and cost: half a minute."""
-    with reference_render(context, of) as drawn:
-        chart, samples = drawn.points(of.technique.way, of.numbers), of.sampling.samples
-        frame = next(point.milliseconds for point in chart if point.samples == samples)
-        return drawn.judge.result(drawn.picture(of.technique.way, samples), chart, samples, frame, of="the fur's light")
+@dataclass(frozen=True)
+class FurDrawing:
+    """Drawing of fur by `FurRender`."""
+
+    render: FurRender
+    judge: Judge | None
+
+    def shot(self, of: FurRequest, turns: int) -> Rendering:
+        """See `Drawing`."""
+        way, samples = of.technique.way, of.technique.samples
+        radiance = self.render.picture(way, samples)
+        return Rendering(way.name, radiance, tuple(self.render.time(way, samples) for _ in range(turns)))
+
+    def points(self, of: FurRequest, numbers: Sequence[int]) -> list[ChartPoint]:
+        """See `Drawing`."""
+        return self.render.points(of.technique.way, numbers)
+
+    def exposure(self, radiance: Floats) -> float:
+        """See `Drawing`."""
+        return exposure_of(radiance.max(axis=-1), WHITE)
+
+
+@contextmanager
+def opened(context: moderngl.Context, of: FurRequest, has_reference: bool) -> Iterator[FurDrawing]:
+    """Open the drawing of a request."""
+    with reference_render(context, of, has_reference) as drawn:
+        yield FurDrawing(drawn, drawn.judge if has_reference else None)
+
+
+SHELLS = {"kind": "shells", "exponent": 1.0}
+drawer = Drawer(opened, (SHELLS, {"kind": "shells", "exponent": "fitted"}, {"kind": "swept"}), "the fur's light")
+draw, picture = drawer.draw, drawer.picture

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.scene import HeartRender, HeartRequest
-from profilefit.scenes.heart.truth import Elements, summed
+from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, points
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.surface_sum import Elements
 
 SURE = Sampling(64)  # where the error of a technique is asked for, not its noise
 

@@ -28,10 +28,11 @@ from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
-from profilefit.scenes.stage.judge import Judge, RenderResult
-from profilefit.scenes.stage.request import MOST_PIXELS, TechniqueTable, Viewpoint, ViewRequest, draw_lit, rendered
+from profilefit.scenes.stage.drawing import Drawer, StageDrawing
+from profilefit.scenes.stage.judge import Judge
+from profilefit.scenes.stage.request import MOST_PIXELS, TechniqueTable, Viewpoint, ViewRequest, draw_lit
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import TruthError, evenly, world
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, evenly, world
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
 from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Rgb, Scene, rgb
 
@@ -126,10 +127,21 @@ class Scattering(NamedTuple):
 read = HeartRequest.of
 
 
-def draw(context: moderngl.Context, of: HeartRequest) -> RenderResult:
-    """Draw the picture beside its reference: a minute, half of it for exact light if no record has these layers."""
-    with reference_render(context, of, light_of(of, of.technique.gaussians)) as drawn:
-        return rendered(drawn.stage, drawn.judge, of, drawn.named(of.technique.kind))
+@contextmanager
+def opened(context: moderngl.Context, of: HeartRequest, has_reference: bool) -> Iterator[StageDrawing]:
+    """Open the drawing of a request; exact light takes half a minute if no record has these layers."""
+    light = light_of(of, of.technique.gaussians)
+    with reference_render(context, of, light, has_reference=has_reference) as drawn:
+
+        def technique_of(given: HeartRequest) -> tuple[NamedTechnique, Technique]:
+            named = drawn.named(given.technique.kind)
+            return named, named.by
+
+        yield StageDrawing(drawn.stage, technique_of, drawn.judge if has_reference else None)
+
+
+drawer = Drawer(opened, ({"kind": TEXTURE}, {"kind": SCREEN}, {"kind": SPLIT}))
+draw, picture = drawer.draw, drawer.picture
 
 
 @dataclass(frozen=True)
@@ -175,9 +187,13 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
 
 @contextmanager
 def reference_render(
-    context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = MOST_PIXELS
+    context: moderngl.Context,
+    of: HeartRequest,
+    light: Scattering,
+    most: int = MOST_PIXELS,
+    has_reference: bool = True,
 ) -> Iterator[HeartRender]:
-    """Open the passes and the reference image of a request, judged at so many pixels at most."""
+    """Open the passes and the reference image of a request, judged at so many pixels at most, or with no reference."""
     size, margin = atlas_size(of.mesh, of.technique.texel, MOST_TEXELS)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
         buffers = stage.buffers()
@@ -191,7 +207,9 @@ def reference_render(
             judged = np.zeros_like(judged)
             judged[chosen] = True
             inside = judged
-        reference, error = _reference(stage, part, places, inside, light)
+        reference, error = buffers.irradiance.astype(float), UNKNOWN
+        if has_reference:
+            reference, error = _reference(stage, part, places, inside, light)
         judge = Judge(reference, judged, error)
         yield HeartRender(stage, judge, atlas, part, light, of.pixel)
 

@@ -6,18 +6,16 @@ angle, with kappa = radius^2 / v (`sphere_blur`).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats, checked_finite, checked_numbers, require
 from profilefit.errors import InputError
+from profilefit.scenes.stage.surface_sum import Elements, gaussian_sums
 
 NEIGHBOURS = 24  # points that gather together
-COARSE = 0.6  # sigma, in the spacing of elements, below which a Gaussian is none: light comes out where it went in
-TOGETHER = 1.0 / 6.0  # sigma within which elements count as one: wider by 2e-3 of the variance at most
+MERGED = 1.0 / 6.0  # side of the cubes in which elements are merged [sigma]
 NOTHING = 16.0  # d^2 / 2 v from which on e^-that, 1e-7, counts as none
 
 
@@ -68,41 +66,15 @@ def surface_blur(
     return found
 
 
-class Elements(NamedTuple):
-    """A surface in parts: points (n, 3), areas (n,), irradiance (n, c), and their mean side [length, length^2, -]."""
-
-    points: Floats
-    areas: Floats
-    irradiance: Floats
-    spacing: float
-
-    def within(self, side: float) -> Elements:
-        """Return the surface with elements in each cube of a side as one about their middle: area and light stay."""
-        if side <= self.spacing:
-            return self
-        cells = np.floor((self.points - self.points.min(axis=0)) / side).astype(np.int64)
-        _, of = np.unique(cells @ (1, 2**21, 2**42), return_inverse=True)
-        area = np.bincount(of, self.areas).astype(float)
-        middle, light = (
-            np.stack([np.bincount(of, self.areas * column) for column in value.T], axis=1) / area[:, None]
-            for value in (self.points, self.irradiance)
-        )
-        return Elements(middle, area, light, side)
-
-
 def summed(elements: Elements, variances: ArrayLike, weights: ArrayLike, at: ArrayLike, own: ArrayLike) -> Floats:
     """Return `surface_blur` at points (m, 3) for Gaussians of any width: (m, c).
 
     own  (m, c) irradiance of those points, which is what Gaussians narrower than the elements leave there
     """
     found = np.zeros(np.shape(own))
-    for variance, weight in zip(np.asarray(variances, float), np.asarray(weights, float), strict=True):
-        sigma = float(np.sqrt(variance))
-        if sigma <= COARSE * elements.spacing:
-            found += weight * own
-        else:
-            points, areas, irradiance, _ = elements.within(TOGETHER * sigma)
-            found += surface_blur(points, areas, irradiance, [variance], [weight], at)
+    sums = gaussian_sums(elements, np.asarray(at, float), np.asarray(own, float), np.sqrt(variances), MERGED)
+    for weight, light in zip(np.asarray(weights, float), sums, strict=True):
+        found += weight * light[:, 1:]
     return found
 
 

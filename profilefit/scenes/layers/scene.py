@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache, cached_property
 from typing import Annotated, Literal, Self
 
 import moderngl
@@ -26,9 +28,10 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
-from profilefit.scenes.stage.judge import Judge, RenderResult, surface_judge
+from profilefit.scenes.stage.drawing import Drawer, StageDrawing
+from profilefit.scenes.stage.judge import Judge, surface_judge
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import NamedTechnique
+from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
 KINDS = ("stack", "dipole", "half space", "none")
@@ -43,6 +46,7 @@ class LayersTechnique(request.TechniqueTable):
     """Table [technique]: kind  of the technique;  single  whether light scattered once leaves in its own directions."""
 
     kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
+    samples: request.Samples = 64
     single: Annotated[bool | Literal["auto"], words("true, false or auto")] = "auto"
     tolerance: Tolerance = 0.02
 
@@ -92,22 +96,35 @@ class LayersRequest(request.ViewRequest, StackRequest):
 read = LayersRequest.of
 
 
-def draw(context: moderngl.Context, of: LayersRequest) -> RenderResult:
-    """Draw the picture beside its reference, with error and cost: minutes, for exact light at nine thicknesses."""
-    scene = scene_of(of)
+@contextmanager
+def opened(context: moderngl.Context, of: LayersRequest, has_reference: bool) -> Iterator[StageDrawing]:
+    """Open the drawing of a request; exact light at nine thicknesses, for the reference, takes minutes."""
+    scene, laws = scene_of(of), cache(lambda: laws_of(of))
+
+    def technique_of(given: LayersRequest) -> tuple[NamedTechnique, Technique]:
+        named = technique(given, laws() if given.kind in OF_LAW else None)
+        if not given.single:
+            return named, named.by
+        return named, passes.WithSingle(named.by, given.media, given.thickness.least, given.thickness.most)
+
     with Stage(context, of.size) as stage:
         request.draw_lit(stage, scene, of.file)  # before the minutes that exact light takes
-        table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
-        named = technique(of, laws_of(of) if of.kind in OF_LAW else None)
-        seen = passes.WithSingle(named.by, of.media, of.thickness.least, of.thickness.most) if of.single else named.by
-        return request.rendered(stage, surface_judge(stage, scene, of.mfp, table), of, named, seen)
+        judge = None
+        if has_reference:
+            table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
+            judge = surface_judge(stage, of.mfp, table)
+        yield StageDrawing(stage, technique_of, judge)
+
+
+drawer = Drawer(opened, ({"kind": "dipole"}, {"kind": "half space"}, {"kind": "stack"}))
+draw, picture = drawer.draw, drawer.picture
 
 
 def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
     scene = scene_of(of)
     request.draw_lit(stage, scene, of.file)
-    return surface_judge(stage, scene, of.mfp, table, has_error=False)
+    return surface_judge(stage, of.mfp, table, has_error=False)
 
 
 def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> NamedTechnique:

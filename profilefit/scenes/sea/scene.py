@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import moderngl
 import numpy as np
@@ -22,7 +23,8 @@ from profilefit.scenes.sea.paths import Sunlight, traced
 from profilefit.scenes.sea.water import World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, RenderResult
+from profilefit.scenes.stage.drawing import Drawer
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, Rendering, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.surface import averaged
 from profilefit.scenes.stage.world import Camera
@@ -130,8 +132,7 @@ class SeaTechnique(request.TechniqueTable):
 class SeaCamera(request.ResolutionTable):
     """Table [camera]: eye and target [m];  angle  the picture's height [rad]."""
 
-    limit: ClassVar[str] = "whose truth is traced"
-    resolution: request.Resolution = (128, 96)
+    reference_pixel: Annotated[int, Field(ge=1, le=16)] = 4
     eye: Point = (6.0, 2.5, -2.2)
     target: Point = (0.0, 2.5, -2.4)
     angle: Annotated[
@@ -240,8 +241,11 @@ class SeaRender(NamedTuple):
 
     def points(self, kind: str, numbers: Sequence[int], turns: int = TURNS) -> list[ChartPoint]:
         """Return error and cost of each number of samples; time is of the view's pass."""
-        draw, time = partial(self.picture, kind), lambda count: self.passes.renderer.time(self._view(kind, count))
-        return self.judge.points(kind, numbers, draw, time, turns)
+        return self.judge.points(kind, numbers, partial(self.picture, kind), partial(self.time, kind), turns)
+
+    def time(self, kind: str, samples: int) -> float:
+        """Return the milliseconds of the view's pass."""
+        return self.passes.renderer.time(self._view(kind, samples))
 
     def _view(self, kind: str, samples: int) -> Pass:
         of, fine = self.request, self.request.technique.supersampling
@@ -250,11 +254,12 @@ class SeaRender(NamedTuple):
 
 @contextmanager
 def reference_render(context: moderngl.Context, of: SeaRequest, paths: int = PATHS) -> Iterator[SeaRender]:
-    """Open the passes and the reference image of a request; paths  of the reference, all pixels together."""
+    """Open the passes and the reference image of a request; paths  of the reference in all, 0 for no reference."""
     world, named = of.world, of.technique
     with Renderer(context, of.size) as renderer:
         passes = SeaPasses(renderer, world, of.splat, named.vertices, named.texels, named.slices)
-        drawn = SeaRender(of, passes, Judge.of_halves(halves_of(of, world, paths), WHITE))
+        halves = halves_of(of, world, paths) if paths else np.ones((2, of.size[1], of.size[0], 3))
+        drawn = SeaRender(of, passes, Judge.of_halves(halves, WHITE))
         drawn.light()
         yield drawn
 
@@ -272,13 +277,37 @@ def halves_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -
     return halves.reshape(2, rows, columns, 3)
 
 
-def draw(context: moderngl.Context, of: SeaRequest) -> RenderResult:
-    """Draw the picture beside its reference, with error and cost: a minute."""
-    with reference_render(context, of) as drawn:
-        chart, samples = drawn.points(of.technique.kind, of.numbers), of.sampling.samples
-        view = next(point.milliseconds for point in chart if point.samples == samples)
-        maps = [drawn.light() for _ in range(TURNS)]
+@dataclass(frozen=True)
+class SeaDrawing:
+    """Drawing of a sea by `SeaRender`."""
+
+    render: SeaRender
+    judge: Judge | None
+
+    def shot(self, of: SeaRequest, turns: int) -> Rendering:
+        """See `Drawing`."""
+        kind, samples = of.technique.kind, of.technique.samples
+        maps = [self.render.light() for _ in range(turns)]
+        radiance = self.render.picture(kind, samples)
+        view = tuple(self.render.time(kind, samples) for _ in range(turns))
         passes = {**{name: tuple(one[name] for one in maps) for name in maps[0]}, "view": view}
-        frame = tuple(map(sum, zip(*passes.values(), strict=True)))
-        picture = drawn.picture(of.technique.kind, samples)
-        return drawn.judge.result(picture, chart, samples, frame, of="light", passes=passes)
+        return Rendering(kind, radiance, tuple(map(sum, zip(*passes.values(), strict=True))), passes)
+
+    def points(self, of: SeaRequest, numbers: Sequence[int]) -> list[ChartPoint]:
+        """See `Drawing`."""
+        return self.render.points(of.technique.kind, numbers)
+
+    def exposure(self, radiance: Floats) -> float:
+        """See `Drawing`."""
+        return exposure_of(radiance, WHITE)
+
+
+@contextmanager
+def opened(context: moderngl.Context, of: SeaRequest, has_reference: bool) -> Iterator[SeaDrawing]:
+    """Open the drawing of a request."""
+    with reference_render(context, of, PATHS if has_reference else 0) as drawn:
+        yield SeaDrawing(drawn, drawn.judge if has_reference else None)
+
+
+drawer = Drawer(opened, ({"kind": "scaled"}, {"kind": "single"}, {"kind": "broadened"}), "light")
+draw, picture = drawer.draw, drawer.picture

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Self
@@ -35,8 +37,9 @@ from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.judge import RenderResult, surface_judge
+from profilefit.scenes.stage.judge import surface_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import Camera, Part, Scene
@@ -82,6 +85,7 @@ def head_scene(
 
 
 SAMPLED, SEPARABLE, NONE = KINDS = ("samples", "separable", "none")
+OTHERS = {SEPARABLE: "separable filter", NONE: "no scattering"}  # for a reader
 OF_LAW = ("law", "constants", "illumination")
 SKIN = 1.4  # refractive index
 
@@ -111,6 +115,7 @@ class SkinTechnique(request.TechniqueTable):
     """Table [technique]: samples of a law, the separable filter, or none."""
 
     kind: Annotated[str, OneOf(*KINDS)] = SAMPLED
+    samples: request.Samples = 64
     law: Text = "hazard"
     constants: Text = "regenerated"
     illumination: Annotated[str, OneOf(*ILLUMINATIONS)] = "diffuse"
@@ -159,7 +164,7 @@ class SceneRequest(request.ViewRequest):
     def label(self) -> str:
         """Name of the technique for a reader."""
         named = self.technique
-        return f"{named.law}, {named.constants}" if named.kind == SAMPLED else named.kind
+        return f"{named.law}, {named.constants}" if named.kind == SAMPLED else OTHERS[named.kind]
 
     @cached_property
     def method(self) -> Technique:
@@ -191,12 +196,21 @@ class SceneRequest(request.ViewRequest):
 read = SceneRequest.of
 
 
-def draw(context: moderngl.Context, of: SceneRequest) -> RenderResult:
-    """Draw the picture beside its reference, with error and cost: a minute for 26 000 pixels, of the reference."""
+@contextmanager
+def opened(context: moderngl.Context, of: SceneRequest, has_reference: bool) -> Iterator[StageDrawing]:
+    """Open the drawing of a request."""
     scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
-    named = NamedTechnique(of.label, of.method, scene.material.mfp)
+
+    def technique_of(given: SceneRequest) -> tuple[NamedTechnique, Technique]:
+        return NamedTechnique(given.label, given.method, scene.material.mfp), given.method
+
     with Stage(context, of.size) as stage:
         request.draw_lit(stage, scene, of.file)
-        return request.rendered(stage, surface_judge(stage, scene, named.mfp, of.setting), of, named)
+        judge = surface_judge(stage, scene.material.mfp, of.setting) if has_reference else None
+        yield StageDrawing(stage, technique_of, judge)
+
+
+drawer = Drawer(opened, ({"kind": SEPARABLE}, {"kind": NONE}, {"kind": SAMPLED}))
+draw, picture = drawer.draw, drawer.picture

@@ -15,9 +15,9 @@ from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error, seen
 from profilefit.scenes.stage.technique import NamedTechnique
-from profilefit.scenes.stage.world import INSIDE, Scene
+from profilefit.scenes.stage.world import INSIDE
 
 Bytes = NDArray[np.uint8]
 TURNS = 5
@@ -40,26 +40,66 @@ class ChartPoint:
 
 
 @dataclass(frozen=True)
-class RenderResult:
-    """Scene, drawn beside its reference; row 0 at the top.
+class Rendering:
+    """Picture by one technique, row 0 at the bottom.
 
-    picture, truth  (h, w, 3) as a screen shows them
-    error  (h, w) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none is
-           measured. Its own root mean square is `point.rmse`, or more if the reference has noise
-    chart  the point of the technique, and others with other numbers of samples, the least first
+    Attributes:
+        label: of the technique.
+        radiance: (h, w, 3) to the eye.
+        frame: milliseconds of a frame, each time that it was drawn.
+        passes: milliseconds of its parts, by name.
+        judged: (h, w, 3) light whose error is measured, in the reference's unit; None where it is the radiance.
+    """
+
+    label: str
+    radiance: NDArray[Any]
+    frame: tuple[float, ...]
+    passes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    judged: NDArray[Any] | None = None
+
+
+@dataclass(frozen=True)
+class SceneImage:
+    """Scene, drawn by one technique; row 0 at the top.
+
+    picture  (h, w, 3) as a screen shows it
+    label, samples  of the technique
     frame, passes  milliseconds of a whole frame, each time that it was drawn (turns,); of its parts by their names
-    of     light that the errors are of
     """
 
     picture: Bytes
+    label: str
+    samples: int
+    frame: tuple[float, ...]
+    passes: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Picture (h, w, 3) by another technique, with its error and cost."""
+
+    point: ChartPoint
+    picture: Bytes
+
+
+@dataclass(frozen=True)
+class RenderResult(SceneImage):
+    """Picture beside its reference; row 0 at the top.
+
+    truth  (rows, columns, 3) the reference, as a screen shows it
+    error  (rows, columns) root mean square of the channels' errors, over the mean of the reference [-]; NaN where none
+           is measured. Its own root mean square is `point.rmse`, or more if the reference has noise
+    chart  the point of the technique, and others with other numbers of samples, the least first
+    of     light that the errors are of
+    """
+
     truth: Bytes
     error: Floats
     point: ChartPoint
     chart: tuple[ChartPoint, ...]
-    frame: tuple[float, ...]
     truth_error: TruthError
     of: str = "scattered light"
-    passes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    rivals: tuple[Rival, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,8 +124,8 @@ class Judge:
         """
         reference = np.asarray(halves.mean(axis=0))
         share = np.sqrt(np.mean((halves[1] - halves[0]) ** 2, axis=-1)) / 2.0 / np.mean(reference)
-        exposure = float(1.0 / max(np.quantile(reference, white), 1e-30))
-        return cls(reference, np.ones(reference.shape[:2], bool), TruthError.of(share), exposure, halves)
+        mask, exposure = np.ones(reference.shape[:2], bool), exposure_of(reference, white)
+        return cls(reference, mask, TruthError.of(share), exposure, halves)
 
     @property
     def mean(self) -> float:
@@ -128,32 +168,27 @@ class Judge:
         ]
 
     def result(
-        self,
-        picture: NDArray[np.floating],
-        chart: Sequence[ChartPoint],
-        samples: int,
-        frame: Sequence[float],
-        shown: NDArray[np.floating] | None = None,
-        of: str = "scattered light",
-        passes: Mapping[str, Any] | None = None,
+        self, shot: Rendering, chart: Sequence[ChartPoint], samples: int, of: str = "scattered light"
     ) -> RenderResult:
-        """Return a picture (h, w, 3), whose error is measured, beside its reference.
+        """Return a shot, whose error is measured, beside its reference.
 
-        chart  points of the technique, one of them of `samples`, those of the picture
-        frame, passes  milliseconds of a whole frame, and of parts of it;  of  light that the errors are of
-        shown  (h, w, 3) radiance to the eye, where `picture` is exitance: whatever else it has is its own in both
+        chart  points of the technique, one of them of `samples`;  of  light that the errors are of
         """
-        true = self.reference if shown is None else shown + (self.reference - picture) / np.pi
+        judged = shot.radiance if shot.judged is None else shot.judged
+        # Whatever else than the judged light is in the picture is its own in the reference, too.
+        true = self.reference if shot.judged is None else shot.radiance + (self.reference - judged) / np.pi
         return RenderResult(
-            picture=to_srgb((picture if shown is None else shown)[::-1], self.exposure),
+            picture=to_srgb(shot.radiance[::-1], self.exposure),
+            label=shot.label,
+            samples=samples,
+            frame=shot.frame,
+            passes=shot.passes,
             truth=to_srgb(true[::-1], self.exposure),
-            error=self.relative_error(picture)[::-1],
+            error=self.relative_error(judged)[::-1],
             point=next(point for point in chart if point.samples == samples),
             chart=tuple(chart),
-            frame=tuple(frame),
             truth_error=self.truth_error,
             of=of,
-            passes=passes or {},
         )
 
     def _squares(self, picture: NDArray[np.floating]) -> Floats:
@@ -176,20 +211,20 @@ def points(
     return judge.points(named.label, samples, draw, time, turns)
 
 
-def surface_judge(
-    stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, has_error: bool = True
-) -> Judge:
-    """Return the judge of a scene that a stage has drawn: the surface integral, all over its pixels.
+def surface_judge(stage: Stage, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, has_error: bool = True) -> Judge:
+    """Return the judge of the scene that a stage has drawn: the surface integral, all over its pixels.
 
-    scene  drawn once more, with pixels of half the side, if the error of the reference is to be estimated
     mfp    of the three channels (3,) [mm];  table  of curves, or the setting of the exact half space
     """
-    buffers, error = stage.buffers(), UNKNOWN
-    if has_error:
-        with Stage(stage.context, (2 * stage.size[0], 2 * stage.size[1])) as fine:
-            fine.draw(scene)
-            error = own_error(fine.buffers(), mfp, table)
-    return Judge(exitance_of(buffers, mfp, table), buffers.mask > INSIDE, error)
+    buffers = stage.buffers()
+    light = exitance_of(buffers, mfp, table)
+    error = own_error(*seen(buffers), light, mfp, table) if has_error else UNKNOWN
+    return Judge(light, buffers.mask > INSIDE, error)
+
+
+def exposure_of(light: NDArray[np.floating], white: float) -> float:
+    """Return the exposure by which so large a share of the numbers is at most white."""
+    return float(1.0 / max(np.quantile(light, white), 1e-30))
 
 
 def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
-from profilefit.scenes.stage.judge import TURNS, Judge, RenderResult, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import INSIDE, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
-# The reference sums over all pairs of pixels, six minutes on a core for so many.
-MOST_PIXELS = 2**16
+MOST_SIDE = 4096  # of a picture [pixels]
+MOST_PIXELS = 2**21  # of a reference: two minutes on two cores for a head that fills half of them
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
 LARGEST_VIEW = 1000.0  # [mm]
 MOST_LIGHT = 1000.0
@@ -36,8 +34,8 @@ Irradiance = Annotated[float, Field(ge=0.0, le=MOST_LIGHT)]
 Irradiances = Annotated[tuple[Irradiance, Irradiance, Irradiance], LISTED]
 Samples = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 OfChoose = Annotated[Any, words("what `profilefit choose` reads")]
-Pixels = Annotated[int, Field(ge=1, le=1024)]
-Resolution = Annotated[tuple[Pixels, Pixels], LISTED, words("two whole numbers of pixels in 1 ... 1024")]
+Pixels = Annotated[int, Field(ge=1, le=MOST_SIDE)]
+Resolution = Annotated[tuple[Pixels, Pixels], LISTED, words(f"two whole numbers of pixels in 1 ... {MOST_SIDE}")]
 
 
 class TechniqueTable(Declared):
@@ -53,16 +51,10 @@ class TechniqueTable(Declared):
 
 
 class ResolutionTable(Declared):
-    """Table [camera]: columns and rows of the picture [pixels]."""
+    """Table [camera]: columns and rows of the picture; side of a pixel of the reference and its errors [pixels]."""
 
-    limit: ClassVar[str] = "which the truth sums over"
-    resolution: Resolution = (160, 120)
-
-    @model_validator(mode="after")
-    def _few(self) -> Self:
-        if self.resolution[0] * self.resolution[1] > MOST_PIXELS:
-            raise Refused(f"{MOST_PIXELS} pixels at most, {self.limit}", list(self.resolution), "resolution")
-        return self
+    resolution: Resolution = (960, 540)
+    reference_pixel: Annotated[int, Field(ge=1, le=16)] = 2
 
 
 class CameraTable(ResolutionTable):
@@ -144,6 +136,23 @@ class ViewRequest(Declared):
         return self.camera_table.resolution
 
     @property
+    def of_reference(self) -> Self:
+        """Request at the size of the reference."""
+        if self.camera_table.reference_pixel == 1:
+            return self
+        columns, rows = (max(side // self.camera_table.reference_pixel, 1) for side in self.size)
+        return self.changed(camera_table={"resolution": (columns, rows), "reference_pixel": 1})
+
+    def require_reference(self) -> None:
+        """Raise InputError where the reference would have too many pixels."""
+        columns, rows = self.of_reference.size
+        if columns * rows > MOST_PIXELS:
+            raise InputError(
+                f"{self.file}: [camera] resolution over reference_pixel must be {MOST_PIXELS} pixels of a reference at "
+                f"most, got {columns} x {rows}; a larger picture is drawn with --no-reference"
+            )
+
+    @property
     def sampling(self) -> Sampling:
         """Samples of a pixel."""
         return Sampling(self.technique.samples)
@@ -161,15 +170,3 @@ def draw_lit(stage: Stage, scene: Scene, file: str) -> None:
     inside = buffers.mask > INSIDE
     if not np.any(buffers.irradiance[inside] > 0):
         raise InputError(f"{file}: the view must show something that light scatters in, and light must reach it")
-
-
-def rendered(
-    stage: Stage, judge: Judge, request: ViewRequest, named: NamedTechnique, seen: Technique | None = None
-) -> RenderResult:
-    """Return the picture of what a stage has drawn, its reference, error and cost; seen  what else it is shown by."""
-    sampling = request.sampling
-    chart = points(stage, judge, named, sampling, request.numbers)
-    exitance = stage.scatter(named.by, named.mfp, sampling, named.alpha)
-    radiance = stage.render(seen or named.by, named.mfp, sampling, named.alpha)
-    frame = stage.time(seen or named.by, named.mfp, sampling, TURNS, "frame", named.alpha)
-    return judge.result(exitance, chart, sampling.samples, frame, radiance)

@@ -85,11 +85,14 @@ def measure_fur(sizes: FurSizes = FUR, track: Track = silent) -> TradeoffPart:
     return TradeoffPart("fur", "Fur in layers", tuple(panels), notes)
 
 
+SMALL = {"sea": (128, 96), "fur": (160, 120)}  # pixels of a picture that is drawn again and again
+
+
 def example(name: str) -> Any:
-    """Return the request of a scene's shipped example."""
+    """Return the request of a scene's shipped example, as a small picture."""
     home, file = SCENES[name]
     path = shipped("examples") / file
-    return import_module(home).read(str(path), read_toml(path))
+    return import_module(home).read(str(path), read_toml(path)).changed(camera_table={"resolution": SMALL[name]})
 
 
 def _points(panel: str, found: Iterable[ChartPoint], fact: str) -> tuple[Point, ...]:

@@ -50,18 +50,13 @@ def test_errors_fall_with_samples_and_are_drawn(context, scene, few, tmp_path, c
 
 
 @pytest.mark.slow
-def test_the_command_keeps_the_exact_picture(tmp_path, capsys):
-    numbers, kept = tmp_path / "numbers.json", tmp_path / "exact.npz"
-    command = ["fig14", "--quick", "--size", "24x24", "--json", str(numbers), "--reference", str(kept)]
-    render.main(command)
-    assert capsys.readouterr().out.startswith("on ")
-    first, written = json.loads(numbers.read_text())["pictures"][0], kept.read_bytes()
-    with np.load(kept) as content:
-        assert content["truth"].shape == (24, 24, 3)
-    render.main(command)
-    assert kept.read_bytes() == written
-    again = json.loads(numbers.read_text())["pictures"][0]
-    assert [one["rmse"] for one in again] == [one["rmse"] for one in first]
+def test_the_command_repeats_its_numbers(tmp_path, capsys):
+    found = []
+    for _ in range(2):
+        render.main(["fig14", "--quick", "--size", "24x24", "--json", str(tmp_path / "numbers.json")])
+        assert capsys.readouterr().out.startswith("on ")
+        found.append([one["rmse"] for one in json.loads((tmp_path / "numbers.json").read_text())["pictures"][0]])
+    assert found[0] == found[1]
 
 
 def test_measures_are_0_for_the_truth_and_know_a_difference():

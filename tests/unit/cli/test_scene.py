@@ -35,7 +35,7 @@ scene = "skin"
 samples = 4
 chart = [64]
 [camera]
-resolution = [32, 24]
+resolution = [64, 48]
 """
 
 
@@ -71,7 +71,12 @@ def test_what_choose_reads_is_ignored():
 def test_the_truth_is_of_the_index_that_the_law_is_of(opengl, n):
     """A truth of another index is wrong by more than the noise of so many samples."""
     skin = import_module(SCENES["skin"][0])
-    content = {"scene": "skin", "n": n, "camera": {"resolution": [48, 36]}, "technique": {"samples": 256}}
+    content = {
+        "scene": "skin",
+        "n": n,
+        "camera": {"resolution": [48, 36], "reference_pixel": 1},
+        "technique": {"samples": 256},
+    }
     request = skin.read("", content)
     other = request.changed()
     vars(other)["method"] = skin.read("", {**content, "n": 2.4 - n}).method
@@ -86,17 +91,40 @@ def test_a_scene_is_drawn_beside_its_truth(done, small, opengl):
     """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
     told = json.loads(done("scene", str(small), "--out", "drawn", "--json", "--quiet"))
     assert json.loads(Path("drawn/small.json").read_text(encoding="utf-8")) == told
-    ends = ("-chart.png", "-error.png", "-truth.png", ".json", ".png")
+    ends = ("-chart.png", "-comparison.png", "-error.png", "-truth.png", ".json", ".png")
     assert sorted(path.name for path in Path("drawn").iterdir()) == [f"small{end}" for end in ends]
     picture, truth = (image.imread(io.BytesIO(Path(f"drawn/small{end}.png").read_bytes())) for end in ("", "-truth"))
-    assert picture.shape[:2] == truth.shape[:2] == (24, 32)
-    assert 0.001 < np.abs(picture - truth)[..., :3].mean() < 0.1  # noise of four samples
+    assert (picture.shape[:2], truth.shape[:2]) == ((48, 64), (24, 32))
+    halved = picture.reshape(24, 2, 32, 2, -1).mean(axis=(1, 3))
+    assert 0.001 < np.abs(halved - truth)[..., :3].mean() < 0.1  # noise of four samples
+    assert [one["technique"] for one in told["rivals"]] == ["separable filter", "no scattering"]
+    assert image.imread("drawn/small-comparison.png").shape[1] == 1920
     few, many = told["chart"]
     assert (few["samples"], many["samples"]) == (4, 64)
     assert few["rmse"] == told["rmse"]
     assert 0 < many["rmse"] < 0.5 * few["rmse"]
     assert 0 < few["milliseconds"]["least"] <= few["milliseconds"]["median"] <= few["milliseconds"]["most"]
     assert 0 < told["truth_error"]["half"] < told["truth_error"]["rms"] < 0.2
+
+
+def test_a_picture_without_a_reference(done, small, opengl):
+    """It may be larger than a reference, has no error, and nothing is written but it and its numbers."""
+    told = json.loads(done("scene", str(small), "--no-reference", "--out", "drawn", "--json", "--quiet"))
+    assert sorted(path.name for path in Path("drawn").iterdir()) == ["small.json", "small.png"]
+    assert image.imread("drawn/small.png").shape[:2] == (48, 64)
+    assert told["samples"] == 4
+    assert "rmse" not in told
+
+
+def test_a_reference_has_a_largest_size(command, small):
+    small.write_text(SMALL.replace("[64, 48]", "[4096, 4096]\nreference_pixel = 2"), encoding="utf-8")
+    said = (
+        f"profilefit: {small}: [camera] resolution over reference_pixel must be 2097152 pixels of a reference at most"
+    )
+    code, out, error = command("scene", str(small), "--out", "drawn")
+    assert (code, out) == (2, "")
+    assert error == f"{said}, got 2048 x 2048; a larger picture is drawn with --no-reference\n"
+    assert not Path("drawn").exists()
 
 
 SKIN_MISTAKES = [
@@ -219,7 +247,7 @@ def test_a_list_of_scenes_is_enough_to_refuse(small):
             import_module(home).read("here", {"scene": "skin", "other": 1})
 
 
-FILE = 'scene = "toy"\n[technique]\nsamples = 4\nchart = [1, 16]\n[camera]\nresolution = [24, 8]\n'
+FILE = 'scene = "toy"\n[technique]\nsamples = 4\nchart = [1, 16]\n[camera]\nresolution = [24, 8]\nreference_pixel = 1\n'
 
 
 @pytest.fixture
@@ -233,7 +261,7 @@ def toy(monkeypatch, tmp_path):
 def test_it_is_drawn_by_the_command(done, opengl, toy):
     told = json.loads(done("scene", toy, "--out", "drawn", "--json", "--quiet"))
     assert sorted(path.name for path in Path("drawn").iterdir()) == [
-        *(f"toy{end}" for end in ("-chart.png", "-error.png", "-truth.png", ".json", ".png"))
+        *(f"toy{end}" for end in ("-chart.png", "-comparison.png", "-error.png", "-truth.png", ".json", ".png"))
     ]
     assert [one["samples"] for one in told["chart"]] == [1, 4, 16]
     one, four, sixteen = (one["rmse"] for one in told["chart"])

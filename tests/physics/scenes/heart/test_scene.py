@@ -71,10 +71,12 @@ def test_the_split_is_nearest_to_the_truth(context, coarse):
 
 
 def test_a_picture_beside_its_truth(context, coarse):
-    told = content("surface", {"kind": "ball", "size": 15.0}) | {"camera": {"resolution": [32, 24]}}
+    told = content("surface", {"kind": "ball", "size": 15.0}) | {"camera": {"resolution": [64, 48]}}
     told |= {"technique": {"kind": "texture", "gaussians": 1, "samples": 4}}
     found = scene.draw(context, scene.read("ball.toml", told))
-    assert found.picture.shape == found.truth.shape == (24, 32, 3)
+    assert (found.picture.shape, found.truth.shape) == ((48, 64, 3), (24, 32, 3))
+    assert [one.point.label for one in found.rivals] == ["screen", "split"]
+    assert all(one.picture.shape == found.picture.shape for one in found.rivals)
     assert found.point.label == "texture"
     assert 0.003 < found.point.rmse < 0.03
 

@@ -35,7 +35,11 @@ KEYS = "keys must be of "
 REFUSED = [
     ("colour", 1, f"{KEYS}unit, .*, got 'colour'"),
     ("technique.colour", 1, rf"\[technique\] {KEYS}samples, chart, kind, single, tolerance, got 'colour'"),
-    ("camera.zoom", 1, rf"\[camera\] {KEYS}resolution, distance, direction, height, target, got 'zoom'"),
+    (
+        "camera.zoom",
+        1,
+        rf"\[camera\] {KEYS}resolution, reference_pixel, distance, direction, height, target, got 'zoom'",
+    ),
     ("light.colour", 1, rf"\[light\] {KEYS}direction, irradiance, ambient, got 'colour'"),
     ("layers.2.colour", 1, rf"\[layers 2\] {KEYS}name, .*, got 'colour'"),
     ("camera", 3, r"camera must be a table \[camera\], got 3"),
@@ -48,8 +52,8 @@ REFUSED = [
     ("technique.chart", [0], r"\[technique\] chart must be at most 8 numbers of samples in 1 ... 256, got \[0\]"),
     ("technique.chart", [1] * 9, r"\[technique\] chart must be at most 8 numbers"),
     ("technique.single", "no", r"\[technique\] single must be true, false or auto, got 'no'"),
-    ("camera.resolution", [257, 256], r"\[camera\] resolution must be 65536 pixels at most, .*, got \[257, 256\]"),
-    ("camera.resolution", [0, 9], r"\[camera\] resolution must be two whole numbers of pixels in 1 ... 1024"),
+    ("camera.reference_pixel", 0, r"\[camera\] reference_pixel must be a whole number in 1 ... 16"),
+    ("camera.resolution", [0, 9], r"\[camera\] resolution must be two whole numbers of pixels in 1 ... 4096"),
     ("camera.distance", 10.0, r"\[camera\] distance must be a number in 300 ... 10000, got 10.0"),
     ("camera.target", [0.0, 0.0, 151.0], r"\[camera\] target must be three numbers in -150 ... 150"),
     ("camera.direction", [0.0, 0.0, 0.0], r"\[camera\] direction must be a direction, not 0"),
@@ -76,7 +80,7 @@ def test_uneven_beside_an_image(image):
 def test_what_a_file_says():
     found = scene.read("head.toml", EXAMPLE)
     assert (found.thickness.least, found.thickness.most) == pytest.approx((0.125, 0.375))
-    assert (found.pose, found.kind, found.sampling, found.size) == ("rest", "stack", Sampling(16), (160, 120))
+    assert (found.pose, found.kind, found.sampling, found.size) == ("rest", "stack", Sampling(64), (960, 540))
     assert 0.0 <= found.thickness.values.min() < 0.5 <= found.thickness.values.max() <= 1.0
     even = scene.read("head.toml", content("uneven", 0))
     assert even.thickness.mean == pytest.approx(0.25)
@@ -182,14 +186,14 @@ def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, mon
     monkeypatch.setattr(fit, "stack_law", lambda *_: pytest.fail("skin has a record"))
     monkeypatch.setattr(scene, "stack_table", lru_cache(scene.stack_table))  # no pose changes it
     request = scene.read("head.toml", EXAMPLE)
-    request = request.changed(camera_table={"resolution": (96, 72)}, technique={"samples": 64})
+    request = request.changed(camera_table={"resolution": (96, 72), "reference_pixel": 1}, technique={"samples": 64})
     errors = {}
     for pose in scene.POSES:
         for kind in ("stack", "dipole"):
             drawn = scene.draw(context, request.changed(pose=pose, technique={"kind": kind}))
             errors[pose, kind] = drawn.point.rmse
             assert drawn.picture.shape == drawn.truth.shape == (72, 96, 3)
-            assert drawn.truth_error.rms < 0.01
+            assert drawn.truth_error.rms < 0.05
             assert drawn.point.samples == 64
     stack, dipole = (np.array([errors[pose, kind] for pose in scene.POSES]) for kind in ("stack", "dipole"))
     assert np.all(stack < 0.02), errors

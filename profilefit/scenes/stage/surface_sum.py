@@ -1,0 +1,254 @@
+"""Sums of Gaussians over a surface, at many points, in N log N.
+
+At a point P each Gaussian of standard deviation sigma has the sum over elements i of the surface
+
+    sum_i area_i (1, E_i) exp(-|P_i - P|^2 / 2 sigma^2) / (2 pi sigma^2)
+
+A wide Gaussian takes elements merged in cubes whose side is a part of sigma, a narrow one Gauss points on each element,
+and one far narrower than the elements leaves the light where it came in. Beyond `REACH` sigma nothing counts.
+
+Any profile is a sum of such Gaussians (`gaussian_weights`), with widths that all albedos and channels share.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.spatial import cKDTree
+
+from mcml_sim.media.arrays import Floats
+from profilefit.recipes.stack.gaussians import ring_shares
+from profilefit.scenes.stage.world import Singles
+
+REACH = 4.3  # sigma: a ten-thousandth of a plane's light lies beyond
+MERGED = 0.3  # side of the cubes in which elements are merged [sigma]
+# Gauss points on a side of an element, for Gaussians up to so many of the elements' sides wide; wider ones take the
+# middle, and narrower ones than `LOCAL` are local (than `POINT`, where elements have no sides).
+LOCAL, POINT = 0.2, 0.6
+RULE = ((0.35, 6), (0.6, 4), (1.5, 2))
+LONGEST = 1.5  # side of an element, in the typical one: longer ones are cut
+# Points that gather together, at least, and where elements are merged; most elements of a row; pairs of a call.
+TOGETHER, MANY, LISTED, AT_ONCE = 16, 64, 256, 2**22
+SMOOTH = 0.02  # range of the light near some points, over its mean, below which a narrow Gaussian is local
+RINGS, FLOOR = 360, 1e-5  # of a profile that Gaussians are fitted to; least share that counts, of the largest
+
+
+class Elements(NamedTuple):
+    """Surface in parallelograms.
+
+    Attributes:
+        points: (n, 3) of their middles [length].
+        areas: (n,) [length^2].
+        irradiance: (n, c) [any unit].
+        spacing: their typical side [length].
+        sides: (2, n, 3), the sides of each [length]; None where they are not known.
+        spread: variance along the surface of what was merged into an element [length^2].
+        shift: (n, 3) from the middle to the middle of the light, where elements were merged [length].
+    """
+
+    points: Floats
+    areas: Floats
+    irradiance: Floats
+    spacing: float
+    sides: Floats | None = None
+    spread: float = 0.0
+    shift: Floats | None = None
+
+    @classmethod
+    def of_sides(cls, points: Floats, sides: Floats, irradiance: Floats) -> Elements:
+        """Return parallelograms; those with a long side are cut."""
+        areas = np.linalg.norm(np.cross(*sides), axis=1)
+        spacing = float(np.sqrt(np.median(areas)))
+        counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=2) / (LONGEST * spacing)), 1.0).astype(int)
+        parts = counts.prod(axis=0)
+        of = np.repeat(np.arange(len(points)), parts)
+        number = np.arange(of.size) - np.repeat(np.cumsum(parts) - parts, parts)
+        place = np.stack([number % counts[0, of], number // counts[0, of]])
+        share = (place + 0.5) / counts[:, of] - 0.5
+        cut = sides[:, of] / counts[:, of, None]
+        moved = points[of] + np.sum(share[..., None] * sides[:, of], axis=0)
+        return cls(moved, (areas / parts)[of], irradiance[of], spacing, cut)
+
+    def within(self, side: float) -> Elements:
+        """Return the surface with elements in each cube of a side as one: area, light and its first moments stay."""
+        if side <= self.spacing:
+            return self
+        cells = np.floor((self.points - self.points.min(axis=0)) / side).astype(np.int64)
+        _, of = np.unique(cells @ (1, 2**21, 2**42), return_inverse=True)
+        area = np.bincount(of, self.areas).astype(float)
+        power = self.areas[:, None] * self.irradiance
+        middle, light = (
+            np.stack([np.bincount(of, column) for column in value.T], axis=1) / area[:, None]
+            for value in (self.areas[:, None] * self.points, power)
+        )
+        away = self.points - middle[of]
+        spread = float(np.average(np.sum(away**2, axis=1), weights=self.areas) / 2.0)
+        bright = power.sum(axis=1)
+        whole = np.maximum(np.bincount(of, bright), np.finfo(float).tiny)
+        shift = np.stack([np.bincount(of, bright * axis) for axis in away.T], axis=1) / whole[:, None]
+        return Elements(middle, area, light, side, None, spread, shift)
+
+
+def gaussian_sums(
+    elements: Elements, at: Floats, own: Floats, sigmas: Floats, merged: float = MERGED
+) -> Iterator[Floats]:
+    """Yield the sums (m, 1 + c) of each Gaussian: of 1, and of the irradiance.
+
+    Args:
+        elements: of the surface.
+        at: (m, 3) points that gather [length].
+        own: (m, c) irradiance there, which local Gaussians leave there.
+        sigmas: standard deviations [length].
+        merged: side of the cubes in which elements are merged [sigma]. On a sphere of radius R, merged elements lie
+            inside, so that the sums are too large by (merged sigma / R)^2 / 12.
+    """
+    local = LOCAL if elements.sides is not None else POINT
+    centre = elements.points.mean(axis=0)
+    near = elements._replace(points=elements.points - centre)
+    groups = _groups(at - centre)
+    for sigma in sigmas:
+        if sigma <= local * elements.spacing:
+            yield np.concatenate([np.ones((len(at), 1)), own], axis=1)
+        else:
+            yield _sums(near, at - centre, own, groups, float(sigma), merged)
+
+
+def gaussian_weights(edges: Floats, shares: Floats, variances: Floats) -> Floats:
+    """Return weights (N,) >= 0 of Gaussians that hold a profile's shares of energy in rings.
+
+    Args:
+        edges: (n + 1,) of the rings, from 0 to infinity [length].
+        shares: (n,) of the energy [-].
+        variances: (N,) of the Gaussians [length^2].
+    """
+    scale = 1.0 / (shares + FLOOR * shares.max())
+    weights, _ = nnls(ring_shares(edges, variances) * scale[:, None], shares * scale, maxiter=100 * variances.size)
+    return np.asarray(weights)
+
+
+def _groups(points: Floats) -> NDArray[np.intp]:
+    """Return (2^d, n) numbers of points, neighbours in a row and in rows next to each other; some stand twice."""
+    depth = max(int(np.ceil(np.log2(len(points) / TOGETHER))), 0)
+    groups = np.resize(np.arange(len(points)), (1, 2**depth * -(-len(points) // 2**depth)))
+    for _ in range(depth):
+        places = points[groups]
+        widest = np.argmax(np.ptp(places, axis=1), axis=1)
+        key = np.take_along_axis(places, widest[:, None, None], axis=2)[..., 0]
+        half = groups.shape[1] // 2
+        groups = np.take_along_axis(groups, np.argpartition(key, half, axis=1), axis=1).reshape(-1, half)
+    return np.concatenate([groups, np.repeat(groups[:, -1:], TOGETHER - groups.shape[1], axis=1)], axis=1)
+
+
+def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp], sigma: float, merged: float) -> Floats:
+    """Return the sums of one Gaussian (m, 1 + c)."""
+    count = next((points for most, points in RULE if sigma < most * elements.spacing), 1)
+    parts = elements.within(merged * sigma) if count == 1 or elements.sides is None else elements
+    # As many groups as one as are no wider than the Gaussian.
+    extent = float(np.median(np.linalg.norm(np.ptp(at[groups], axis=1), axis=1)))
+    joined = int(np.clip(2.0 * np.log2(max(2.0 * sigma / max(extent, 1e-30), 1.0)), 0, 7))
+    joined = max(joined, 0 if parts.shift is None else MANY // TOGETHER // 2)
+    wide = groups.reshape(-1, groups.shape[1] * 2 ** min(joined, int(np.log2(len(groups)))))
+    places = at[wide]
+    low, high = places.min(axis=1), places.max(axis=1)
+    radius = 0.5 * np.linalg.norm(high - low, axis=1) + REACH * sigma + (parts.spacing if count > 1 else 0.0)
+    near = cKDTree(parts.points).query_ball_point(0.5 * (low + high), radius, workers=-1)
+    result = np.concatenate([np.ones((len(at), 1)), own], axis=1)
+    if count > RULE[-1][1]:
+        wide, near = _uneven(elements.irradiance, wide, near)
+        places = at[wide]
+    if not len(wide):
+        return result
+    rows, listed = _rows(near, len(parts.points))
+    # Elements that are taken at their middle lack the variance that they have along the surface.
+    variance = (
+        sigma**2 + parts.spread + (elements.spacing**2 / 12.0 if count == 1 and elements.sides is not None else 0)
+    )
+    power = np.concatenate([parts.areas[:, None], parts.areas[:, None] * parts.irradiance], axis=1)
+    sides = parts.sides if count > 1 and parts.sides is not None else ()
+    values = parts.points, power / (2.0 * np.pi * variance), *(() if parts.shift is None else (parts.shift,)), *sides
+    surface = tuple(jnp.asarray(np.pad(value, ((0, 1), (0, 0))), jnp.float32) for value in values)
+    found = np.empty((len(rows), wide.shape[1], power.shape[1]), np.float32)
+    step = max(AT_ONCE // (listed.shape[1] * wide.shape[1]), 1)
+
+    def some(first: int) -> None:
+        of = slice(first, first + step)
+        given, here = listed[of], places[rows[of]].astype(np.float32)
+        spare = ((0, step - len(given)), (0, 0))
+        full = np.pad(given, spare, constant_values=len(parts.points))
+        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, np.float32(0.5 / variance), count)
+        found[of] = np.asarray(lit)[: len(given)]
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(some, range(0, len(rows), step)))
+    starts = np.searchsorted(rows, np.arange(len(wide)))
+    result[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, power.shape[1])
+    return result
+
+
+def _uneven(light: Floats, groups: NDArray[np.intp], near: NDArray[np.object_]) -> tuple[NDArray[np.intp], Any]:
+    """Return groups, and their lists of elements, whose light is not the same all over."""
+    lengths = np.array([len(one) for one in near])
+    listed = light[np.concatenate([np.asarray(one, np.int64) for one in near])]
+    starts = np.cumsum(lengths) - lengths
+    spread = np.maximum.reduceat(listed, starts) - np.minimum.reduceat(listed, starts)
+    some = np.any(spread > SMOOTH * light.mean(axis=0), axis=1)
+    return groups[some], near[some]
+
+
+def _rows(near: NDArray[np.object_], nothing: int) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+    """Return lists as rows of a length, filled with `nothing`: the list of each row (n,), and the rows (n, length)."""
+    lengths = np.array([len(one) for one in near])
+    length = int(min(2.0 ** np.ceil(np.log2(max(lengths.mean(), 32.0))), LISTED))
+    counts = np.maximum(-(-lengths // length), 1)
+    rows = np.full((counts.sum(), length), nothing, np.int32)
+    starts = length * (np.cumsum(counts) - counts)
+    place = np.arange(lengths.sum()) + np.repeat(starts - np.cumsum(lengths) + lengths, lengths)
+    rows.ravel()[place] = np.concatenate([np.asarray(one, np.int32) for one in near])
+    return np.repeat(np.arange(len(near)), counts), rows
+
+
+@partial(jax.jit, static_argnames="count")
+def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], rate: Singles, count: int) -> Array:
+    """Return sums (rows, points, 1 + c) of each row's elements at its points.
+
+    Args:
+        surface: middle (n, 3) and power (n, 1 + c) of elements, the last of no power; then their shift (n, 3) where
+            they were merged, or their two sides (n, 3) where each has count x count Gauss points.
+        at: points (rows, points, 3).
+        listed: elements (rows, length).
+        rate: 1 / 2 sigma^2.
+        count: of Gauss points along a side.
+    """
+    rule = list(zip(*np.polynomial.legendre.leggauss(count), strict=True))
+    grid = [(0.5 * a, 0.5 * b, 0.25 * u * v) for a, u in rule for b, v in rule]
+
+    def row(given: tuple[Array, Array]) -> Array:
+        places, of = given
+        middle, power, *more = (value[of] for value in surface)
+        # About one of the points, so that small differences keep their digits.
+        here, middle = places - places[0], middle - places[0]
+        from_here = rate * jnp.sum(here**2, axis=1)[:, None]
+
+        def light(place: Array) -> Array:
+            return jnp.exp(2.0 * rate * here @ place.T - from_here - rate * jnp.sum(place**2, axis=1))
+
+        if len(more) == 2:
+            side, other = more
+            return sum(share * light(middle + a * side + b * other) for a, b, share in grid) @ power
+        whole = light(middle)
+        if not more:
+            return whole @ power
+        tilt = 1.0 + 2.0 * rate * (here @ more[0].T - jnp.sum(middle * more[0], axis=1))
+        return jnp.concatenate([whole @ power[:, :1], (whole * tilt) @ power[:, 1:]], axis=1)
+
+    return jax.lax.map(row, (at, listed))
