@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +14,7 @@ from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")
+MOST_FRAMES = 9999
 
 
 def scene(
@@ -26,6 +27,10 @@ def scene(
     ],
     out: Annotated[Path, typer.Option(help="Folder for pictures (PNG) and numbers (JSON).")] = OUT,
     no_reference: Annotated[bool, typer.Option("--no-reference", help="Draw the picture alone, of any size.")] = False,
+    frames: Annotated[
+        int | None, typer.Option(min=1, max=MOST_FRAMES, help="Number of pictures of a scene that moves.")
+    ] = None,
+    fps: Annotated[float, typer.Option(min=1e-3, max=1e3, help="Frames per second [1/s].")] = 24.0,
     example: Annotated[bool, typer.Option("--example", help="Print an example file of a scene.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -43,7 +48,7 @@ def scene(
     from mcml_sim.cli.screen import notes, print_json, screen, typed
     from mcml_sim.files.version import __version__
     from mcml_sim.files.whole_file import as_json as json_text
-    from mcml_sim.files.whole_file import read_toml, require_writable, write_together
+    from mcml_sim.files.whole_file import read_toml, require_writable, write_together, write_whole
     from mcml_sim.runs.progress import working
     from profilefit.shader.context import opened, renderer
 
@@ -63,18 +68,25 @@ def scene(
     request = home.read(file, content)
     if not no_reference:
         request.require_reference()
+    moments = [request] if frames is None else [request.after(number / fps) for number in range(frames)]
     stem = out / Path(file).stem
-    for end in (".json", ".png", "-truth.png", "-error.png", "-comparison.png"):
-        require_writable(Path(f"{stem}{end}"))
+    stems = [f"{stem}"] if frames is None else [f"{stem}-{number:04d}" for number in range(1, frames + 1)]
+    for one in (str(stem), *stems):
+        for end in (".json", ".png", "-truth.png", "-error.png", "-comparison.png"):
+            require_writable(Path(f"{one}{end}"))
+    bodies: list[dict[str, Any]] = []
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
-        drawn, device = (home.picture if no_reference else home.draw)(context, request), renderer(context)
-    figures = report.scene_figures(drawn, device.partition(",")[0])
-    files: dict[Path, bytes | str] = {Path(f"{stem}{end}.png"): png for end, png in figures.items()}
-    body = {"made": {"by": typed(), "version": __version__}, "of": content, **report.content(drawn, device)}
-    files[Path(f"{stem}.json")] = json_text(body)
-    write_together(files)
+        device = renderer(context)
+        for moment, name in zip(moments, stems, strict=True):
+            drawn = (home.picture if no_reference else home.draw)(context, moment)
+            pictures = report.scene_figures(drawn, device.partition(",")[0])
+            write_together({Path(f"{name}{end}.png"): png for end, png in pictures.items()})
+            bodies.append(report.content(drawn, device))
+            for line in () if as_json else report.scene_lines(drawn, device):
+                screen().print(line, markup=False, soft_wrap=True)
+    body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
+    body |= bodies[0] if frames is None else {"frames": bodies}
+    write_whole(Path(f"{stem}.json"), json_text(body))
     if as_json:
         print_json(body)
-    for line in () if as_json else report.scene_lines(drawn, device):
-        screen().print(line, markup=False, soft_wrap=True)
-    notes(quiet).print(f"wrote {', '.join(map(str, files))}", markup=False)
+    notes(quiet).print(f"wrote {stem}.json and {', '.join(f'{one}*.png' for one in stems)}", markup=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import moderngl
 import numpy as np
@@ -21,8 +21,9 @@ from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
 from profilefit.scenes.stage.drawing import Drawer
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, Rendering, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import Samples, TechniqueTable, Viewpoint, ViewRequest
+from profilefit.scenes.stage.request import Samples, Seconds, TechniqueTable, Viewpoint, ViewRequest
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
+from profilefit.scenes.stage.world import Rgb, rgb
 
 KINDS = ("swept", "shells")
 VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
@@ -41,13 +42,17 @@ class FurTable(Declared):
     """Table [fur]: strands of a ball's skin.
 
     density  of strands [1/mm^2];  radius, length  of a strand [mm], along the skin's normal
-    force    of the tips, by the length [-];  ball  its radius [mm];  colour, skin  reflectances
+    force    displacement of the tips, over the length [-];  ball  its radius [mm];  colour, skin  reflectances
+    gust     largest displacement that wind adds, over the length [-], as a sine of period [s] at a time [s]
     """
 
     density: Annotated[float, Field(gt=0.0)] = 0.64
     radius: Length = 0.5
     length: Length = 10.0
     force: Annotated[tuple[Force, Force, Force], LISTED] = (0.0, -0.4, 0.0)
+    gust: Annotated[tuple[Force, Force, Force], LISTED] = (0.0, 0.0, 0.0)
+    period: Annotated[float, Field(gt=0.0, le=1e3)] = 2.0
+    time: Seconds = 0.0
     ball: Length = 30.0
     colour: Shares = (0.55, 0.38, 0.22)
     skin: Shares = (0.35, 0.22, 0.16)
@@ -61,7 +66,12 @@ class FurTable(Declared):
     @property
     def reach(self) -> float:
         """Distance from the ball's middle that no tip is beyond [mm]."""
-        return self.ball + self.length * (1.0 + float(np.linalg.norm(self.force)))
+        return self.ball + self.length * (1.0 + float(np.linalg.norm(self.force) + np.linalg.norm(self.gust)))
+
+    @property
+    def lean(self) -> Rgb:
+        """Displacement of the tips at the time, over the length [-]."""
+        return rgb(np.add(self.force, np.sin(2.0 * np.pi * self.time / self.period) * np.array(self.gust)))
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -74,9 +84,11 @@ class FurTable(Declared):
         if not self.density * area <= MOST_STRANDS:
             most = f"{MOST_STRANDS} at most, {MOST_STRANDS / area:.4g}"
             raise Refused(f"so many strands [1/mm^2] that the ball has {most}", self.density, "density")
+        accepted = f"three numbers whose root of squares is {MOST_FORCE:g} at most"
         if not np.linalg.norm(self.force) <= MOST_FORCE:
-            accepted = f"three numbers whose root of squares is {MOST_FORCE:g} at most"
             raise Refused(accepted, list(self.force), "force")
+        if not np.linalg.norm(self.force) + np.linalg.norm(self.gust) <= MOST_FORCE:
+            raise Refused(f"{accepted}, together with the force's", list(self.gust), "gust")
         return self
 
 
@@ -118,6 +130,7 @@ class FurTechnique(TechniqueTable):
 class FurRequest(ViewRequest):
     """Picture of a furred ball that a file requests."""
 
+    moving: ClassVar[str] = "fur"
     scene: Annotated[str, OneOf("fur")] = "fur"
     unit: Text = "mm"
     fur: FurTable = FurTable()
@@ -183,7 +196,7 @@ class FurRender(NamedTuple):
 def reference_render(context: moderngl.Context, of: FurRequest, has_reference: bool = True) -> Iterator[FurRender]:
     """Open the passes and the reference image of a request; without one, all is black that is judged."""
     fur, each = of.fur, of.technique.supersampling
-    ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.force, fur.seed)
+    ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.lean, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
     shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table).shade(view)
     with Renderer(context, size) as renderer:

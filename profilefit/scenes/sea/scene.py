@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import moderngl
 import numpy as np
@@ -84,12 +84,13 @@ class WaterTable(Declared):
 
 
 class SeaTable(Declared):
-    """Table [sea]: root mean square slope [-], side of the tile [m], wind [m/s]."""
+    """Table [sea]: root mean square slope [-], side of the tile [m], wind [m/s]; time  for which waves move [s]."""
 
     slope: Slope = 0.12
     tile: Length = 5.0
     wind: Annotated[tuple[Speed, Speed], LISTED, words(WINDS)] = (WIND, 0.0)
     seed: Seed = 4
+    time: request.Seconds = 0.0
 
     @model_validator(mode="after")
     def _blows(self) -> Self:
@@ -166,6 +167,7 @@ class SeaLight(request.LightTable):
 class SeaRequest(request.ViewRequest):
     """Picture of a sea that a file requests; lengths are metres, and z is up."""
 
+    moving: ClassVar[str] = "sea"
     scene: Annotated[str, OneOf("sea")] = "sea"
     unit: Text = "m"
     water: WaterTable
@@ -188,7 +190,7 @@ class SeaRequest(request.ViewRequest):
         water, sea, floor = self.water, self.sea, self.floor
         waves, bed = Waves(sea.tile), Waves(sea.tile, mean=-float(floor.depth))
         if sea.slope:
-            waves = random_sea(sea.slope, sea.tile, sea.seed, wind=sea.wind)
+            waves = random_sea(sea.slope, sea.tile, sea.seed, sea.wind).after(sea.time, sea.wind, floor.depth)
         if floor.slope:
             bed = random_floor(floor.slope, sea.tile, floor.depth, floor.seed)
         x, _, z = self.light.direction

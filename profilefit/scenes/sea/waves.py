@@ -128,6 +128,15 @@ class Waves:
         """Return waves so many times as high about their mean, and as steep and as curved."""
         return replace(self, amplitudes=self.amplitudes * factor)
 
+    def after(self, time: float, wind: tuple[float, float], depth: float) -> Waves:
+        """Return the waves after a time [s]: each moves downwind with its own speed in water of a depth [m].
+
+        omega^2 = g k tanh(k depth) (Airy's linear waves; Lamb, Hydrodynamics, section 229).
+        """
+        k = np.linalg.norm(self.vectors, axis=1)
+        rate = np.sqrt(GRAVITY * k * np.tanh(k * depth)) * np.where(self.vectors @ np.asarray(wind) < 0, -1.0, 1.0)
+        return replace(self, phases=self.phases - rate * time)
+
     @cached_property
     def texels(self) -> NDArray[np.float32]:
         """Table (1, n, 4) for glsl/waves.glsl: whole waves in the tile along x and y, amplitude [m], phase [turns]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -32,6 +32,7 @@ Direction = Annotated[tuple[Component, Component, Component], LISTED, AfterValid
 Place = Annotated[float, Field(ge=-150.0, le=150.0)]
 Irradiance = Annotated[float, Field(ge=0.0, le=MOST_LIGHT)]
 Irradiances = Annotated[tuple[Irradiance, Irradiance, Irradiance], LISTED]
+Seconds = Annotated[float, Field(ge=0.0, le=1e4)]
 Samples = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 OfChoose = Annotated[Any, words("what `profilefit choose` reads")]
 Pixels = Annotated[int, Field(ge=1, le=MOST_SIDE)]
@@ -99,8 +100,9 @@ HEAD = Viewpoint((4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0)
 
 
 class ViewRequest(Declared):
-    """Picture that a file requests, in the scene's unit of length."""
+    """Picture that a file requests, in the scene's unit of length; moving  its table with a time, if it has one."""
 
+    moving: ClassVar[str] = ""
     title: Text = ""
     unit: Annotated[str, OneOf("mm")] = "mm"
     technique: TechniqueTable = TechniqueTable()
@@ -142,6 +144,13 @@ class ViewRequest(Declared):
             return self
         columns, rows = (max(side // self.camera_table.reference_pixel, 1) for side in self.size)
         return self.changed(camera_table={"resolution": (columns, rows), "reference_pixel": 1})
+
+    def after(self, seconds: float) -> Self:
+        """Return the request some seconds later. InputError where nothing moves."""
+        if not self.moving:
+            raise InputError(f"{self.file}: --frames must be left out where nothing moves; sea and fur move")
+        values: dict[str, Any] = {self.moving: {"time": getattr(self, self.moving).time + seconds}}
+        return self.changed(None, **values)
 
     def require_reference(self) -> None:
         """Raise InputError where the reference would have too many pixels."""

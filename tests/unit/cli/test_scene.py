@@ -116,6 +116,24 @@ def test_a_picture_without_a_reference(done, small, opengl):
     assert "rmse" not in told
 
 
+def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_path, opengl):
+    fur = tmp_path / "fur.toml"
+    words = "density = 0.1\ngust = [0.3, 0.0, 0.0]\nperiod = 4.0"
+    size = "supersampling = 1\n[camera]\nresolution = [32, 24]\nreference_pixel = 1"
+    fur.write_text(f'scene = "fur"\n[fur]\n{words}\n[technique]\n{size}\n', encoding="utf-8")
+    told = json.loads(done("scene", str(fur), "--frames", "3", "--fps", "1", "--out", "drawn", "--json", "--quiet"))
+    names = sorted(path.name for path in Path("drawn").iterdir())
+    ends = ("-comparison.png", "-error.png", "-truth.png", ".png")
+    assert names == sorted(["fur.json", *(f"fur-000{number}{end}" for number in (1, 2, 3) for end in ends)])
+    pictures = [image.imread(f"drawn/fur-000{number}.png")[..., :3] for number in (1, 2, 3)]
+    np.testing.assert_array_equal(pictures[0], pictures[2])  # half a period later the wind is still, too
+    assert np.abs(pictures[0] - pictures[1]).max() > 0.1
+    assert [0 < one["rmse"] < 1 for one in told["frames"]] == [True] * 3
+    said = f"profilefit: {small}: --frames must be left out where nothing moves; sea and fur move\n"
+    assert command("scene", str(small), "--frames", "2", "--out", "other") == (2, "", said)
+    assert not Path("other").exists()
+
+
 def test_a_reference_has_a_largest_size(command, small):
     small.write_text(SMALL.replace("[64, 48]", "[4096, 4096]\nreference_pixel = 2"), encoding="utf-8")
     said = (

@@ -287,3 +287,20 @@ test_what_has_no_hit = refusals(
     ({"steps": 0}, "^steps must be a whole number >= 1 and <= 1024, got 0$"),
     ({"steps": 1025}, "^steps must be a whole number >= 1 and <= 1024, got 1025$"),
 )
+
+
+@pytest.mark.parametrize(("k", "depth"), [(3.0, 0.2), (3.0, 50.0), (0.5, 1.0)])
+def test_waves_move_downwind_with_the_speed_of_their_length_and_depth(k, depth):
+    """Long waves of shallow water at sqrt(g h), short ones of deep water at sqrt(g / k), and back after a period."""
+    tile, seconds = 2.0 * np.pi / k, 0.3
+    speed = np.sqrt(9.81 / k * np.tanh(k * depth))
+    waves = Waves(tile, np.array([0.1]), np.array([[k, 0.0]]), np.array([0.7]))
+    x = np.linspace(0.0, tile, 50)
+    later = waves.after(seconds, (5.0, 0.0), depth)
+    np.testing.assert_allclose(later.height(x, 0.0), waves.height(x - speed * seconds, 0.0), atol=1e-12)
+    against = waves.after(seconds, (-5.0, 0.0), depth)
+    np.testing.assert_allclose(against.height(x, 0.0), waves.height(x + speed * seconds, 0.0), atol=1e-12)
+    period = tile / speed
+    np.testing.assert_allclose(waves.after(period, (5.0, 0.0), depth).height(x, 0.0), waves.height(x, 0.0), atol=1e-12)
+    assert np.max(np.abs(later.height(x, 0.0) - waves.height(x, 0.0))) > 0.01
+    assert speed <= np.sqrt(9.81 * depth) * (1.0 + 1e-12)
