@@ -36,6 +36,8 @@ MERGED = 0.3  # side of the cubes in which elements are merged [sigma]
 # middle, and narrower ones than `LOCAL` are local (than `POINT`, where elements have no sides).
 LOCAL, POINT = 0.2, 0.6
 RULE = ((0.35, 6), (0.6, 4), (1.5, 2))
+# The same where elements are few: pixels are wide then, and narrow Gaussians have more of the light.
+FEW, FINE_RULE = 2**16, ((0.35, 8), (0.8, 6), (5.0, 2))
 LONGEST = 1.5  # side of an element, in the typical one: longer ones are cut
 # Points that gather together, at least, and where elements are merged; most elements of a row; pairs of a call.
 TOGETHER, MANY, LISTED, AT_ONCE = 16, 64, 256, 2**22
@@ -52,7 +54,7 @@ class Elements(NamedTuple):
         irradiance: (n, c) [any unit].
         spacing: their typical side [length].
         sides: (2, n, 3), the sides of each [length]; None where they are not known.
-        spread: variance along the surface of what was merged into an element [length^2].
+        spread: (n,) variance of each along the surface [length^2]; 0 where it is a point.
         shift: (n, 3) from the middle to the middle of the light, where elements were merged [length].
     """
 
@@ -61,7 +63,7 @@ class Elements(NamedTuple):
     irradiance: Floats
     spacing: float
     sides: Floats | None = None
-    spread: float = 0.0
+    spread: Floats | float = 0.0
     shift: Floats | None = None
 
     @classmethod
@@ -77,7 +79,8 @@ class Elements(NamedTuple):
         share = (place + 0.5) / counts[:, of] - 0.5
         cut = sides[:, of] / counts[:, of, None]
         moved = points[of] + np.sum(share[..., None] * sides[:, of], axis=0)
-        return cls(moved, (areas / parts)[of], irradiance[of], spacing, cut)
+        each = (areas / parts)[of]
+        return cls(moved, each, irradiance[of], spacing, cut, each / 12.0)
 
     def within(self, side: float) -> Elements:
         """Return the surface with elements in each cube of a side as one: area, light and its first moments stay."""
@@ -92,7 +95,7 @@ class Elements(NamedTuple):
             for value in (self.areas[:, None] * self.points, power)
         )
         away = self.points - middle[of]
-        spread = float(np.average(np.sum(away**2, axis=1), weights=self.areas) / 2.0)
+        spread = np.bincount(of, self.areas * (self.spread + np.sum(away**2, axis=1) / 2.0)) / area
         bright = power.sum(axis=1)
         whole = np.maximum(np.bincount(of, bright), np.finfo(float).tiny)
         shift = np.stack([np.bincount(of, bright * axis) for axis in away.T], axis=1) / whole[:, None]
@@ -151,7 +154,8 @@ def _groups(points: Floats) -> NDArray[np.intp]:
 
 def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp], sigma: float, merged: float) -> Floats:
     """Return the sums of one Gaussian (m, 1 + c)."""
-    count = next((points for most, points in RULE if sigma < most * elements.spacing), 1)
+    rule = FINE_RULE if len(elements.points) < FEW else RULE
+    count = next((points for most, points in rule if sigma < most * elements.spacing), 1)
     parts = elements.within(merged * sigma) if count == 1 or elements.sides is None else elements
     # As many groups as one as are no wider than the Gaussian.
     extent = float(np.median(np.linalg.norm(np.ptp(at[groups], axis=1), axis=1)))
@@ -163,21 +167,20 @@ def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp],
     radius = 0.5 * np.linalg.norm(high - low, axis=1) + REACH * sigma + (parts.spacing if count > 1 else 0.0)
     near = cKDTree(parts.points).query_ball_point(0.5 * (low + high), radius, workers=-1)
     result = np.concatenate([np.ones((len(at), 1)), own], axis=1)
-    if count > RULE[-1][1]:
+    if count > 2:
         wide, near = _uneven(elements.irradiance, wide, near)
         places = at[wide]
     if not len(wide):
         return result
     rows, listed = _rows(near, len(parts.points))
     # Elements that are taken at their middle lack the variance that they have along the surface.
-    variance = (
-        sigma**2 + parts.spread + (elements.spacing**2 / 12.0 if count == 1 and elements.sides is not None else 0)
-    )
+    variance = np.broadcast_to(sigma**2 + (parts.spread if count == 1 else 0.0), parts.areas.shape)
     power = np.concatenate([parts.areas[:, None], parts.areas[:, None] * parts.irradiance], axis=1)
     sides = parts.sides if count > 1 and parts.sides is not None else ()
-    values = parts.points, power / (2.0 * np.pi * variance), *(() if parts.shift is None else (parts.shift,)), *sides
+    power = np.concatenate([0.5 / variance[:, None], power / (2.0 * np.pi * variance[:, None])], axis=1)
+    values = parts.points, power, *(() if parts.shift is None else (parts.shift,)), *sides
     surface = tuple(jnp.asarray(np.pad(value, ((0, 1), (0, 0))), jnp.float32) for value in values)
-    found = np.empty((len(rows), wide.shape[1], power.shape[1]), np.float32)
+    found = np.empty((len(rows), wide.shape[1], result.shape[1]), np.float32)
     step = max(AT_ONCE // (listed.shape[1] * wide.shape[1]), 1)
 
     def some(first: int) -> None:
@@ -185,13 +188,13 @@ def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp],
         given, here = listed[of], places[rows[of]].astype(np.float32)
         spare = ((0, step - len(given)), (0, 0))
         full = np.pad(given, spare, constant_values=len(parts.points))
-        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, np.float32(0.5 / variance), count)
+        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count)
         found[of] = np.asarray(lit)[: len(given)]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(some, range(0, len(rows), step)))
     starts = np.searchsorted(rows, np.arange(len(wide)))
-    result[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, power.shape[1])
+    result[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, result.shape[1])
     return result
 
 
@@ -218,15 +221,14 @@ def _rows(near: NDArray[np.object_], nothing: int) -> tuple[NDArray[np.intp], ND
 
 
 @partial(jax.jit, static_argnames="count")
-def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], rate: Singles, count: int) -> Array:
+def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], count: int) -> Array:
     """Return sums (rows, points, 1 + c) of each row's elements at its points.
 
     Args:
-        surface: middle (n, 3) and power (n, 1 + c) of elements, the last of no power; then their shift (n, 3) where
-            they were merged, or their two sides (n, 3) where each has count x count Gauss points.
+        surface: middle (n, 3) of elements, 1 / 2 variance and power (n, 1 + 1 + c), the last of no power; then their
+            shift (n, 3) where they were merged, or their two sides (n, 3) where each has count x count Gauss points.
         at: points (rows, points, 3).
         listed: elements (rows, length).
-        rate: 1 / 2 sigma^2.
         count: of Gauss points along a side.
     """
     rule = list(zip(*np.polynomial.legendre.leggauss(count), strict=True))
@@ -235,12 +237,13 @@ def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], r
     def row(given: tuple[Array, Array]) -> Array:
         places, of = given
         middle, power, *more = (value[of] for value in surface)
+        rate, power = power[:, 0], power[:, 1:]
         # About one of the points, so that small differences keep their digits.
         here, middle = places - places[0], middle - places[0]
-        from_here = rate * jnp.sum(here**2, axis=1)[:, None]
+        from_here = jnp.sum(here**2, axis=1)[:, None]
 
         def light(place: Array) -> Array:
-            return jnp.exp(2.0 * rate * here @ place.T - from_here - rate * jnp.sum(place**2, axis=1))
+            return jnp.exp(rate * (2.0 * here @ place.T - from_here - jnp.sum(place**2, axis=1)))
 
         if len(more) == 2:
             side, other = more
