@@ -55,10 +55,10 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
 def atlas_line(answer: AtlasNeed) -> str:
     """Return whether a heart's scene needs an atlas."""
     error, hidden = (significant(100 * one) for one in (answer.error, answer.hidden))
-    misses = f"the screen by itself is wrong by {error} % of the light, by {hidden} % for what it does not see"
+    misses = f"screen space alone has an error of {error} % of the light, and hidden surface causes {hidden} %"
     is_coarse = answer.is_broken and answer.verdict == "no atlas"
     advice = "; finer pixels would mend it" if is_coarse else ""
-    return f"{answer.verdict}: {misses} (requested: {_percent(answer.tolerance)} %){advice}"
+    return f"{answer.verdict}: {misses} (tolerance: {_percent(answer.tolerance)} %){advice}"
 
 
 def atlas_content(answer: AtlasNeed) -> dict[str, Any]:

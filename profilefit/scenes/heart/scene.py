@@ -64,7 +64,7 @@ class SurfaceTable(Declared):
 class HeartTechnique(TechniqueTable):
     """Table [technique]: kind;  gaussians  of its kernel;  texel  mean side of the atlas's [mm].
 
-    tolerance  of what the screen by itself may be wrong by, over the mean of the light [-]
+    tolerance  largest error of screen space alone, over the mean of the light [-]
     """
 
     kind: Annotated[str, OneOf(*KINDS)] = SPLIT

@@ -40,7 +40,7 @@ TEXELS = 6 * CHARTS_END  # of a side, of what light goes in
 class AtlasNeed:
     """Root mean squares over the mean light [-].
 
-    error   of the screen by itself, with many samples;  hidden  of what it is wrong by for what it does not see
+    error   of screen space alone, with many samples;  hidden  the part that hidden surface causes
     """
 
     error: float
@@ -49,7 +49,7 @@ class AtlasNeed:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the screen by itself breaks the tolerance."""
+        """Whether screen space alone exceeds the tolerance."""
         return self.error > self.tolerance
 
     @property

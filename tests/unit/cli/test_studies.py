@@ -230,7 +230,9 @@ def test_whether_a_heart_needs_an_atlas(chosen, opengl):
     assert told["verdict"] == "no atlas"
     assert 0 < told["hidden"] < told["error"] < told["tolerance"] == 0.02
     error, hidden = (f"{100 * told[key]:.2g} %" for key in ("error", "hidden"))
-    assert line.startswith(f"no atlas: the screen by itself is wrong by {error} of the light, by {hidden} for what it")
+    assert line.startswith(
+        f"no atlas: screen space alone has an error of {error} of the light, and hidden surface causes {hidden} "
+    )
 
 
 def test_what_a_sea_needs(chosen):
