@@ -292,7 +292,7 @@ class SeaDrawing:
         maps = [self.render.light() for _ in range(turns)]
         radiance = self.render.picture(kind, samples)
         view = tuple(self.render.time(kind, samples) for _ in range(turns))
-        passes = {**{name: tuple(one[name] for one in maps) for name in maps[0]}, "view": view}
+        passes = {name: tuple(one[name] for one in maps) for name in self.render.passes.light} | {"view": view}
         return Rendering(kind, radiance, tuple(map(sum, zip(*passes.values(), strict=True))), passes)
 
     def points(self, of: SeaRequest, numbers: Sequence[int]) -> list[ChartPoint]:

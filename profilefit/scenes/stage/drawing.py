@@ -26,7 +26,7 @@ from profilefit.scenes.stage.request import ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
 
-RIVALS = 2
+RIVALS, FRAMES = 2, 3  # other techniques in a comparison; turns in which a frame of full size is timed
 
 
 class Drawing(Protocol):
@@ -37,7 +37,7 @@ class Drawing(Protocol):
         """Judge with the reference; None where the drawing was opened without."""
 
     def shot(self, of: Any, turns: int) -> Rendering:
-        """Draw the picture by the technique of a request, its frame timed in so many turns."""
+        """Draw the picture by the technique of a request, its frame timed in so many turns, or in none."""
 
     def points(self, of: Any, numbers: Sequence[int]) -> list[ChartPoint]:
         """Return error and cost of the technique of a request with each number of samples."""
@@ -66,7 +66,7 @@ class Drawer:
     def picture(self, context: moderngl.Context, of: ViewRequest) -> SceneImage:
         """Draw the picture without a reference."""
         with self.opened(context, of, False) as drawing:
-            shot = drawing.shot(of, TURNS)
+            shot = drawing.shot(of, FRAMES)
             image = to_srgb(shot.radiance[::-1], drawing.exposure(shot.radiance))
         return SceneImage(image, shot.label, of.technique.samples, shot.frame, shot.passes)
 
@@ -86,9 +86,9 @@ class Drawer:
         if small.size == of.size:
             return replace(result, rivals=tuple(others))
         with self.opened(context, of, False) as drawing:
-            shot = drawing.shot(of, TURNS)
+            shot = drawing.shot(of, FRAMES)
             images = [
-                to_srgb(drawing.shot(of.changed(technique=one), 1).radiance[::-1], judge.exposure) for one in rivals
+                to_srgb(drawing.shot(of.changed(technique=one), 0).radiance[::-1], judge.exposure) for one in rivals
             ]
         others = [replace(one, picture=image) for one, image in zip(others, images, strict=True)]
         picture = to_srgb(shot.radiance[::-1], judge.exposure)
@@ -98,7 +98,7 @@ class Drawer:
     def _rival(drawing: Drawing, judge: Judge, of: ViewRequest, change: Mapping[str, Any]) -> Rival:
         other = of.changed(technique=dict(change))
         [point] = drawing.points(other, [other.technique.samples])
-        return Rival(point, to_srgb(drawing.shot(other, 1).radiance[::-1], judge.exposure))
+        return Rival(point, to_srgb(drawing.shot(other, 0).radiance[::-1], judge.exposure))
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class StageDrawing:
         """See `Drawing`."""
         (named, shown), sampling = self.technique(of), of.sampling
         radiance = self.stage.render(shown, named.mfp, sampling, named.alpha)
-        frame = self.stage.time(shown, named.mfp, sampling, turns, "frame", named.alpha)
+        frame = self.stage.time(shown, named.mfp, sampling, turns, "frame", named.alpha) if turns else ()
         judged = self.stage.scatter(named.by, named.mfp, sampling, named.alpha)
         return Rendering(named.label, radiance, tuple(frame), {}, judged)
 
