@@ -112,7 +112,7 @@ def opened(context: moderngl.Context, of: LayersRequest, has_reference: bool) ->
         judge = None
         if has_reference:
             table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
-            judge = surface_judge(stage, of.mfp, table)
+            judge = surface_judge(stage, scene, of.mfp, table)
         yield StageDrawing(stage, technique_of, judge)
 
 
@@ -124,7 +124,7 @@ def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
     scene = scene_of(of)
     request.draw_lit(stage, scene, of.file)
-    return surface_judge(stage, of.mfp, table, has_error=False)
+    return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 
 def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> NamedTechnique:

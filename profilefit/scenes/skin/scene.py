@@ -208,7 +208,7 @@ def opened(context: moderngl.Context, of: SceneRequest, has_reference: bool) -> 
 
     with Stage(context, of.size) as stage:
         request.draw_lit(stage, scene, of.file)
-        judge = surface_judge(stage, scene.material.mfp, of.setting) if has_reference else None
+        judge = surface_judge(stage, scene, scene.material.mfp, of.setting) if has_reference else None
         yield StageDrawing(stage, technique_of, judge)
 
 
