@@ -71,7 +71,7 @@ class Atlas(GpuOwner):
     def draw(self, stage: Unwraps, part: Part) -> None:
         """Draw irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
         if self._links is None:
-            _require_charts(part.mesh)
+            require_charts(part.mesh)
         self.renderer.run(stage.unwrapping(part, self.inset))
         if self._links is None:
             place = self.read("position_map")
@@ -175,7 +175,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     return (columns, rows), margin
 
 
-def _require_charts(mesh: Mesh) -> None:
+def require_charts(mesh: Mesh) -> None:
     """Raise InputError on a mesh that cannot be laid out."""
     count = len(mesh.position)
     if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):

@@ -15,8 +15,9 @@ from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error, wider_error
 from profilefit.scenes.stage.technique import NamedTechnique
+from profilefit.scenes.stage.whole import whole_elements
 from profilefit.scenes.stage.world import INSIDE, Scene
 
 Bytes = NDArray[np.uint8]
@@ -209,6 +210,18 @@ def points(
         return stage.time(named.by, named.mfp, replace(sampling, samples=number), 1, fixed_alpha=named.alpha)[0]
 
     return judge.points(named.label, samples, draw, time, turns)
+
+
+def whole_judge(stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | Setting) -> Judge:
+    """Return the judge of a scene that a stage has drawn: the integral over its whole surface, hidden parts included.
+
+    scene  whose parts do not lie inside each other;  mfp, table  see `surface_judge`
+    """
+    buffers, camera = stage.buffers(), scene.camera
+    side = camera.pixel(stage.size[1]) * (camera.distance if camera.is_perspective else 1.0)
+    whole, wider = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
+    error = wider_error(buffers, mfp, table, whole, wider)
+    return Judge(exitance_of(buffers, mfp, table, whole), buffers.mask > INSIDE, error)
 
 
 def surface_judge(

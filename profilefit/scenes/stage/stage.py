@@ -20,13 +20,15 @@ from numpy.typing import ArrayLike
 from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
+from profilefit.scenes.stage.renderer import NEAREST, POINTS, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
 from profilefit.scenes.stage.world import (
+    EVEN,
     INSIDE,
     PLACE,
     SURFACE,
     Buffers,
+    Mesh,
     Part,
     Scene,
     Singles,
@@ -43,6 +45,7 @@ MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
 PASSES = ("scatter", "frame")
 SIDES = "width", "height"
 SHADOW, SHADOW_SIDE = "shadow_map", 2048  # of one channel, and of that many texels a side
+COLUMNS = 2048  # of points that are drawn
 NOWHERE = 1e6  # depth along the light where nothing is [mm]
 MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
 LEAST, MOST = np.nextafter(0.0, 1.0), np.finfo(float).max  # lengths > 0, finite
@@ -76,11 +79,19 @@ class Stage(GpuOwner):
 
         inset  share of the maps that u and v from 0 to 1 take [-];  InputError on a part of another scene
         """
-        self._alive()
-        if self._scene is None or not any(one is part for one in self._scene.parts):
-            raise InputError("part must be one of the scene last drawn, got another one")
-        values = {**_lit(self._scene, self._shadow_side), "view": np.eye(4), "inset": inset}
-        return _surface("atlas", part, self.renderer.map(SHADOW), values, clear=0.0)
+        return _surface("atlas", part, self.renderer.map(SHADOW), {**self._light_on(part), "inset": inset}, clear=0.0)
+
+    def irradiance(self, part: Part, points: Mesh) -> Floats:
+        """Return the irradiance (n, 3) at the vertices of a mesh, which lie on a part of the scene last drawn [-]."""
+        count = len(points.position)
+        columns = min(count, COLUMNS)
+        size = columns, -(-count // columns)
+        drawn = replace(points, triangles=np.arange(count, dtype=np.int32))
+        values = {**self._light_on(part), "sides": tuple(map(float, size))}
+        with Renderer(self.context, size) as renderer:
+            shadow, lit = self.renderer.map(SHADOW), replace(part, mesh=drawn)
+            light = renderer.image(_surface("points", lit, shadow, values, shape=POINTS, clear=0.0))
+        return light.reshape(-1, light.shape[-1])[:count, :3].astype(float)
 
     def upload(self, buffers: Buffers) -> None:
         """Take a G-buffer of numpy arrays in place of a scene; no light shines then, and `render` has no highlights."""
@@ -174,6 +185,13 @@ class Stage(GpuOwner):
             for i, part in enumerate(scene.parts)
         ]
 
+    def _light_on(self, part: Part) -> dict[str, Any]:
+        """Return uniforms of the light on a part of the scene last drawn, in the world. InputError on another part."""
+        self._alive()
+        if self._scene is None or not any(one is part for one in self._scene.parts):
+            raise InputError("part must be one of the scene last drawn, got another one")
+        return {**_lit(self._scene, self._shadow_side), "view": np.eye(4)}
+
     def _seen(self, pixel: float, is_perspective: bool, scene: Scene | None) -> None:
         self._view, self._scene, self._mean_reflectance = (pixel, is_perspective), scene, None
 
@@ -232,7 +250,13 @@ def _three(name: str, value: ArrayLike, accepted: str, low: float, high: float) 
 
 def _surface(vertex: str, part: Part, shadow: Read, values: dict[str, Any], **more: Any) -> Pass:
     own = {"translucent": float(part.is_translucent), "roughness": part.roughness}
-    reads: dict[str, Read] = {"skin": Smooth(part.reflectance), "shadow_map": shadow}
+    v = part.mesh.uv[:, 1]
+    tiles = v.size > 0 and (float(v.min()) < 0.0 or float(v.max()) > 1.0)
+    reads: dict[str, Read] = {
+        "skin": Smooth(part.reflectance, tiles),
+        "relief": Smooth(EVEN if part.relief is None else part.relief, tiles),
+        "shadow_map": shadow,
+    }
     fragment, text = _text("surface.frag"), _text(f"{vertex}.vert")
     return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, text, part.mesh, **more)
 

@@ -1,7 +1,7 @@
 """Surface that a view sees, and the reference of a screen-space gather over it.
 
 The G-buffer of a render as float64 arrays, the patch that each pixel shows, and the exact profile summed over the
-whole visible surface, offline:
+whole visible surface, offline, or over elements of the whole surface:
 
     L_c(o) = A_c(o) sum_i W_ci E_c(i) / sum_i W_ci,   W_ci = int over the surface in pixel i of R_d(|P - P_o|) / A_c dS
 
@@ -154,13 +154,19 @@ class Gathered:
 
 
 def gathered(
-    surface: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, pixels: ArrayLike | None = None
+    surface: Surface,
+    view: View,
+    mfp: ArrayLike,
+    table: CurveTable | Setting = DIFFUSE,
+    pixels: ArrayLike | None = None,
+    whole: Elements | None = None,
 ) -> Gathered:
     """Return the reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 
     mfp  of the three channels (3,), in the unit of the positions
     table  of the curves, by the surface's `reflectance`; of a setting, that of the exact half space by A
-    Raises InputError; SettingError of a setting with g. A picture of 1280 x 720 takes about a minute on two cores.
+    whole  elements from which light is gathered, in view space, in place of those that are seen
+    Raises InputError; SettingError of a setting with g. `benchmarks.render reference` prints what a picture takes.
     """
     lengths = np.asarray(mfp, float)
     are_lengths = lengths.shape == (3,) and np.all((lengths > 0) & np.isfinite(lengths))
@@ -170,7 +176,7 @@ def gathered(
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     if not len(chosen):
         return Gathered(*np.zeros((2, *(surface.mask.shape if pixels is None else (0,)), 3)))
-    elements = surface.elements(view)
+    elements = surface.elements(view) if whole is None else whole
     at, own, values = (value[tuple(chosen.T)] for value in (surface.position, surface.irradiance, surface.reflectance))
     sums = CurveSums.fitted(curves, values, lengths, elements)
     light, share = np.zeros((2, *values.shape))
@@ -201,9 +207,11 @@ def refined(
     return mean, gathered(coarse, wide, mfp, table, chosen).light - mean
 
 
-def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
+def exitance_of(
+    buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, whole: Elements | None = None
+) -> Floats:
     """Return radiant exitance (h, w, 3) in diffuse light: the reference; Lambert's where nothing scatters."""
-    light = gathered(*seen(buffers), mfp, table).light
+    light = gathered(*seen(buffers), mfp, table, whole=whole).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
@@ -227,6 +235,16 @@ class TruthError(NamedTuple):
 
 
 UNKNOWN = TruthError(np.nan, np.nan, np.nan)
+
+
+def wider_error(
+    buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting, whole: Elements, wider: Elements
+) -> TruthError:
+    """Return what elements of twice the side change in `exitance_of`, at some pixels: a bound of its error."""
+    surface, view = seen(buffers)
+    chosen = np.stack(evenly(surface.mask, CHECKED), axis=1)
+    light, other = (gathered(surface, view, mfp, table, chosen, one).light for one in (whole, wider))
+    return TruthError.of(np.abs(other - light) / np.mean(light))
 
 
 def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:

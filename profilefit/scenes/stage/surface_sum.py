@@ -46,14 +46,14 @@ RINGS, FLOOR = 360, 1e-5  # of a profile that Gaussians are fitted to; least sha
 
 
 class Elements(NamedTuple):
-    """Surface in parallelograms.
+    """Surface in parallelograms, or in triangles.
 
     Attributes:
         points: (n, 3) of their middles [length].
         areas: (n,) [length^2].
         irradiance: (n, c) [any unit].
         spacing: their typical side [length].
-        sides: (2, n, 3), the sides of each [length]; None where they are not known.
+        sides: (2, n, 3), two sides of each [length]; None where they are not known.
         spread: (n,) variance of each along the surface [length^2]; 0 where it is a point.
         shift: (n, 3) from the middle to the middle of the light, where elements were merged [length].
     """
@@ -65,6 +65,15 @@ class Elements(NamedTuple):
     sides: Floats | None = None
     spread: Floats | float = 0.0
     shift: Floats | None = None
+    are_triangles: bool = False
+
+    @classmethod
+    def of_triangles(cls, points: Floats, sides: Floats, irradiance: Floats) -> Elements:
+        """Return triangles by their centroids and two sides that begin at one corner."""
+        (a, b), areas = sides, 0.5 * np.linalg.norm(np.cross(*sides), axis=1)
+        spread = (np.sum(a * a, axis=1) + np.sum(b * b, axis=1) - np.sum(a * b, axis=1)) / 36.0
+        spacing = float(np.sqrt(np.average(areas, weights=areas)))  # few large ones are most of the surface
+        return cls(points, areas, irradiance, spacing, sides, spread, None, True)
 
     @classmethod
     def of_sides(cls, points: Floats, sides: Floats, irradiance: Floats) -> Elements:
@@ -193,7 +202,7 @@ def _add_sums(
         given, here = listed[of], places[rows[of]].astype(np.float32)
         spare = ((0, step - len(given)), (0, 0))
         full = np.pad(given, spare, constant_values=len(parts.points))
-        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count)
+        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count, elements.are_triangles)
         found[of] = np.asarray(lit)[: len(given)]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -224,8 +233,10 @@ def _rows(near: NDArray[np.object_], nothing: int) -> tuple[NDArray[np.intp], ND
     return np.repeat(np.arange(len(near)), counts), rows
 
 
-@partial(jax.jit, static_argnames="count")
-def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], count: int) -> Array:
+@partial(jax.jit, static_argnames=("count", "are_triangles"))
+def _pairs(
+    surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], count: int, are_triangles: bool = False
+) -> Array:
     """Return sums (rows, points, 1 + c) of each row's elements at its points.
 
     Args:
@@ -235,9 +246,13 @@ def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], c
         at: points (rows, points, 3).
         listed: elements (rows, length).
         count: of Gauss points along a side.
+        are_triangles: whether the sides are two of a triangle's.
     """
     rule = list(zip(*np.polynomial.legendre.leggauss(count), strict=True))
     grid = [(0.5 * a, 0.5 * b, 0.25 * u * v) for a, u in rule for b, v in rule]
+    if are_triangles:  # the square is folded onto the triangle; both are about their middle
+        corner = [(0.5 + a, (0.5 - a) * (0.5 + b), 2.0 * (0.5 - a) * share) for a, b, share in grid]
+        grid = [(a - 1.0 / 3.0, b - 1.0 / 3.0, share) for a, b, share in corner]
 
     def row(given: tuple[Array, Array]) -> Array:
         places, of = given

@@ -2,12 +2,14 @@
 in vec3 world_position;
 in vec3 world_normal;
 in vec2 texture_place;
+in vec4 world_tangent; // in which u grows, and the hand of u, v and the normal; 0 where there is no relief
 uniform mat4 view;
 uniform mat4 light_clip;
 uniform vec3 toward_light; // in the world
 uniform vec3 light; // irradiance of a surface that faces it [-]
 uniform vec3 ambient; // [-]
 uniform sampler2D skin;
+uniform sampler2D relief; // normals along the tangent, across it and outwards; a factor of the roughness
 uniform sampler2D shadow_map; // depth along the light [mm]
 uniform float shadow_pixel; // side of a texel [mm]
 uniform float translucent;
@@ -68,13 +70,22 @@ float thickness(vec3 normal) {
     return weight > 0.0 ? total / weight : EMPTY;
 }
 
+vec3 bent(vec3 normal, vec3 bump) {
+    vec3 along = world_tangent.xyz - dot(world_tangent.xyz, normal) * normal;
+    float size = length(along);
+    if (size < 1e-3) return normal;
+    along /= size;
+    return normalize(bump.x * along + bump.y * world_tangent.w * cross(normal, along) + bump.z * normal);
+}
+
 void main() {
-    vec3 normal = normalize(world_normal);
+    vec4 texel = texture(relief, texture_place);
+    vec3 normal = bent(normalize(world_normal), texel.xyz);
     float facing = dot(normal, toward_light);
     float seen = facing > 0.0 ? visibility(normal) : 0.0;
     irradiance_thickness = vec4(light * max(facing, 0.0) * seen + ambient, thickness(normal));
     reflectance_visibility = vec4(texture(skin, texture_place).rgb, seen);
     position_mask = vec4((view * vec4(world_position, 1.0)).xyz, translucent);
-    normal_roughness = vec4(mat3(view) * normal, roughness);
+    normal_roughness = vec4(mat3(view) * normal, roughness * texel.w);
     place = vec4(texture_place, 0.0, 1.0);
 }
