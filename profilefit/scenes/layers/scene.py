@@ -165,7 +165,7 @@ def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 
 
 def scene_of(of: LayersRequest) -> Scene:
-    """Return the head in its pose, or a mesh; the texture is the share of the way from the least thickness to the most."""
+    """Return the head in its pose, or a mesh; the texture is the share of the way from least to most thickness."""
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
     if of.surface.parts:

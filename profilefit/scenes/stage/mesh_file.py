@@ -33,7 +33,7 @@ from profilefit.scenes.stage.world import EVEN, Mesh, Part, Singles, unit
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 UNITS = {"m": 1000.0, "cm": 10.0, "mm": 1.0, "in": 25.4}  # [mm]
 MOST_BYTES, MOST_JSON = 200 << 20, 32 << 20
-MOST_TRIANGLES, MOST_PARTS, MOST_ENTRIES = 2_000_000, 32, 4096
+MOST_TRIANGLES, MOST_PARTS, MOST_ENTRIES = 2_000_000, 64, 4096
 LISTS = "accessors", "bufferViews", "buffers", "images", "materials", "meshes", "nodes", "textures", "scenes"
 MOST_SIDE, MOST_PIXELS = 8192, 1 << 25  # of a texture, and of all textures of a file
 LEAST_SIZE, MOST_SIZE = 0.1, 2000.0  # of a mesh [mm]
@@ -124,8 +124,12 @@ def read_mesh(path: Path, factor: float, name: str = "") -> tuple[FilePart, ...]
     content = folder.content(path.name)
     if kind in (".glb", ".gltf"):
         _require_bounded(_header(content, kind, name), folder, name)
-    with _sound(name):
-        scene = trimesh.load_scene(BytesIO(content), file_type=kind[1:], resolver=folder, process=False)
+    try:
+        with _sound(name):
+            scene = trimesh.load_scene(BytesIO(content), file_type=kind[1:], resolver=folder, process=False)
+    finally:
+        if folder.refused:
+            raise folder.refused[0]
     with _sound(name):
         shapes = [(scene.graph[node][1], scene.graph[node][0]) for node in scene.graph.nodes_geometry]
         shapes = [(scene.geometry[key], matrix) for key, matrix in shapes]
@@ -154,22 +158,20 @@ def _placed(parts: list[FilePart], factor: float, name: str) -> tuple[FilePart, 
         accepted = f"{LEAST_SIZE:g} ... {MOST_SIZE:g} mm large, by unit and scale"
         raise InputError(f"mesh must be {accepted}, got {size:.4g} mm of {name}")
 
-    def placed(one: FilePart) -> FilePart:
-        return replace(one, mesh=replace(one.mesh, position=factor * (one.mesh.position - 0.5 * (low + high))))
-
-    return tuple(map(placed, parts))
+    meshes = (replace(part.mesh, position=factor * (part.mesh.position - 0.5 * (low + high))) for part in parts)
+    return tuple(replace(part, mesh=mesh) for part, mesh in zip(parts, meshes, strict=True))
 
 
-def _mesh(one: Any, matrix: Floats, is_soup: bool, name: str) -> Mesh:
+def _mesh(shape: Any, matrix: Floats, is_soup: bool, name: str) -> Mesh:
     """Return a mesh of trimesh's in its place, without what has no area."""
-    position, triangles = np.asarray(one.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(one.faces)
+    position, triangles = np.asarray(shape.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(shape.faces)
     if not np.all(np.isfinite(position)):
         raise InputError(f"mesh must have finite coordinates, got others in {name}")
     if triangles.min() < 0 or triangles.max() >= len(position):
         raise InputError(f"mesh must have triangles of its {len(position)} vertices, got others in {name}")
     if is_soup:  # each triangle has vertices of its own, which have no normal but its
-        one.merge_vertices()
-        position, triangles = np.asarray(one.vertices, float), np.asarray(one.faces)
+        shape.merge_vertices()
+        position, triangles = np.asarray(shape.vertices, float), np.asarray(shape.faces)
     face = _crosses(position, triangles)
     area = np.linalg.norm(face, axis=1)
     good = area > 1e-12 * area.max()
@@ -177,14 +179,14 @@ def _mesh(one: Any, matrix: Floats, is_soup: bool, name: str) -> Mesh:
         raise InputError(f"mesh must have an area, got none in {name}")
     used, numbers = np.unique(triangles[good], return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int32)
-    position, normal = position[used], np.asarray(one.vertex_normals, float)[used] @ np.linalg.inv(matrix[:3, :3])
+    position, normal = position[used], np.asarray(shape.vertex_normals, float)[used] @ np.linalg.inv(matrix[:3, :3])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     of_face = np.empty_like(position)
     of_face[triangles.ravel()] = np.repeat(face[good], 3, axis=0)
     normal = unit(np.where((length > 1e-6) & np.isfinite(length), normal, of_face))
     if np.sum((position - position.mean(axis=0)) * normal) < 0:  # inside out
         normal = -normal
-    uv = _uv(one, used, name)
+    uv = _uv(shape, used, name)
     if uv is None:
         return Mesh(position, normal, np.zeros((len(position), 2)), triangles)
     mesh = Mesh(position, normal, uv, triangles)
@@ -215,9 +217,9 @@ def _tangents(mesh: Mesh) -> Floats:
     return np.concatenate([first, np.where(hand < 0, -1.0, 1.0)], axis=1)
 
 
-def _uv(one: Any, used: NDArray[np.int64], name: str) -> Floats | None:
-    uv = getattr(one.visual, "uv", None)
-    if uv is None or np.shape(uv) != (len(one.vertices), 2):
+def _uv(shape: Any, used: NDArray[np.int64], name: str) -> Floats | None:
+    uv = getattr(shape.visual, "uv", None)
+    if uv is None or np.shape(uv) != (len(shape.vertices), 2):
         return None
     found = np.asarray(uv, float)[used]
     if not np.all(np.abs(found) <= MOST_UV):
@@ -277,6 +279,7 @@ class _Folder(Mapping[str, bytes]):
 
     def __init__(self, path: Path, name: str):
         self.folder, self.name, self.read = path.parent, name, 0
+        self.refused: list[InputError] = []  # of files that trimesh would go on without
 
     def content(self, given: str) -> bytes:
         """Return the content of a file in the folder. InputError."""
@@ -295,7 +298,11 @@ class _Folder(Mapping[str, bytes]):
         return read_whole(path, MOST_BYTES)
 
     def __getitem__(self, given: str) -> bytes:
-        return self.content(given.strip())
+        try:
+            return self.content(given.strip())
+        except InputError as error:
+            self.refused.append(error)
+            raise
 
     def __iter__(self) -> Iterator[str]:
         return iter(())
@@ -342,12 +349,25 @@ def _require_bounded(header: dict[str, Any], folder: _Folder, name: str) -> None
         raise InputError(f"mesh must be without required extensions, got {header['extensionsRequired']!r} in {name}")
 
 
+class _Heard(logging.Handler):
+    """Messages of trimesh, which goes on without an image that it cannot read."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.DEBUG)
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append(record.getMessage())
+
+
 @contextmanager
 def _sound(name: str) -> Iterator[None]:
     """Raise InputError in one line whatever trimesh and Pillow raise at a damaged file, and hide what they print."""
-    logger = logging.getLogger("trimesh")
-    before = logger.disabled
-    logger.disabled = True
+    logger, heard = logging.getLogger("trimesh"), _Heard()
+    before = logger.level, logger.propagate
+    logger.addHandler(heard)
+    logger.setLevel(logging.DEBUG)
+    logger.propagate = False
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
@@ -358,7 +378,11 @@ def _sound(name: str) -> Iterator[None]:
         told = " ".join(str(error).split())[:120] or type(error).__name__
         raise InputError(f"mesh must be {MESH}, got {name}, which is damaged: {told}") from None
     finally:
-        logger.disabled = before
+        logger.removeHandler(heard)
+        logger.setLevel(before[0])
+        logger.propagate = before[1]
+    if any("image" in message for message in heard.messages):
+        raise InputError(f"textures must be PNG or JPEG files that can be read, got others in {name}")
 
 
 def _library() -> ModuleType:
