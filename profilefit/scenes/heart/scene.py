@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from mcml_sim import Setting
+from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import normal_reflectance
 from profilefit.errors import InputError
@@ -33,6 +35,9 @@ from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.mesh_file import MeshTable
 from profilefit.scenes.stage.request import (
     MOST_PIXELS,
+    Irradiances,
+    LightTable,
+    Samples,
     TechniqueTable,
     Viewpoint,
     ViewRequest,
@@ -43,12 +48,13 @@ from profilefit.scenes.stage.request import (
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, evenly, world
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
+from profilefit.scenes.stage.whole import whole_elements
 from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
-FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
+ELEMENT, FINEST = 0.5, 400  # side of an element of the reference [pixels], and so many of the surface's size at least
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
@@ -57,12 +63,14 @@ class SurfaceTable(MeshTable):
 
     kind  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period.
 
+    paint  whether a heart has colours of muscle, fat and vessels as A, in place of the A of the layers
     roughness  of the one lobe that is mirrored, GGX [-]
     """
 
     kind: Annotated[str, OneOf(*meshes.KINDS)] = meshes.KINDS[0]
     size: Annotated[float, Field(gt=0.0, le=LARGEST)] = 15.0
     steepness: Tolerance = 0.15
+    paint: bool = True
     roughness: Tolerance = 0.2
 
     @model_validator(mode="after")
@@ -74,7 +82,21 @@ class SurfaceTable(MeshTable):
             raise Refused("a file of one part", f"{len(self.parts)} parts", "mesh")
         if self.kind != "bumps" and "steepness" in self.model_fields_set:
             raise Refused("left out where kind is not bumps", self.steepness, "steepness")
+        if (self.parts or self.kind != "heart") and "paint" in self.model_fields_set:
+            raise Refused("left out where kind is not heart", self.paint, "paint")
         return self
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether a heart has colours of its own."""
+        return self.paint and self.kind == "heart" and not self.parts
+
+
+class HeartLight(LightTable):
+    """Table [light]: direction toward the lamp, irradiance of a surface that faces it, and ambient irradiance."""
+
+    irradiance: Irradiances = (5.0, 4.7, 4.3)
+    ambient: Irradiances = (0.4, 0.4, 0.42)
 
 
 class HeartTechnique(TechniqueTable):
@@ -84,6 +106,7 @@ class HeartTechnique(TechniqueTable):
     """
 
     kind: Annotated[str, OneOf(*KINDS)] = SPLIT
+    samples: Samples = 64
     gaussians: Annotated[int, Field(ge=1, le=MOST)] = 6
     texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = 0.4
     tolerance: Tolerance = 0.02
@@ -95,13 +118,17 @@ class HeartRequest(ViewRequest, StackRequest):
     scene: Annotated[str, OneOf("heart")] = "heart"
     surface: SurfaceTable = SurfaceTable()
     technique: HeartTechnique = HeartTechnique()
+    light_table: HeartLight = Field(HeartLight(), alias="light")
 
     @property
     def viewpoint(self) -> Viewpoint:
         """Camera of a file that says nothing."""
         if self.surface.parts:
             return seen_whole(self.surface.extent)
-        return Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * self.surface.size)
+        size = self.surface.size
+        if self.surface.kind == "heart":
+            return Viewpoint((0.0, 0.25 * size, 0.0), 650.0, (0.866, 0.1, 0.5), 3.4 * size)
+        return Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * size)
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -200,15 +227,19 @@ class HeartRender:
 
 
 @contextmanager
-def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
-    """Open a stage that has drawn what is requested, and its one part."""
-    own = of.surface.parts[0] if of.surface.parts else None
-    roughness = own.roughness if own is not None and own.roughness is not None else of.surface.roughness
-    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), roughness, relief=own.relief if own else None)
-    f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
+def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Scene]]:
+    """Open a stage that has drawn what is requested, and the scene, of one part."""
+    n = of.media[0].layers[0].n
+    even, most = np.full((1, 1, 3), light.colour, np.float32), float(entered(Setting("diffuse", n=n)))
+    if of.surface.parts:
+        part = of.surface.parts[0].part(even, of.surface.roughness, most)
+    else:
+        part = Part(of.mesh, meshes.paint() if of.surface.is_painted else even, of.surface.roughness)
+    f0 = normal_reflectance(1.0, n)
     with Stage(context, of.size) as stage:
-        draw_lit(stage, Scene((part,), of.light, of.ambient, of.camera, f0), of.file)
-        yield stage, part
+        scene = Scene((part,), of.light, of.ambient, of.camera, f0)
+        draw_lit(stage, scene, of.file)
+        yield stage, scene
 
 
 @contextmanager
@@ -221,7 +252,8 @@ def reference_render(
 ) -> Iterator[HeartRender]:
     """Open the passes and the reference image of a request, judged at so many pixels at most, or with no reference."""
     size, margin = atlas_size(of.mesh, of.technique.texel, MOST_TEXELS)
-    with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
+    with staged(context, of, light) as (stage, scene), Atlas(context, size, margin) as atlas:
+        [part] = scene.parts
         buffers = stage.buffers()
         atlas.draw(stage, part)
         places, inside = world(buffers, of.camera), buffers.mask > INSIDE
@@ -235,32 +267,31 @@ def reference_render(
             inside = judged
         reference, error = buffers.irradiance.astype(float), UNKNOWN
         if has_reference:
-            reference, error = _reference(stage, part, places, inside, light)
+            side = min(ELEMENT * of.pixel, float(np.ptp(of.mesh.position, axis=0).max()) / FINEST)
+            reference, error = _reference(stage, scene, inside, light, side)
         judge = Judge(reference, judged, error)
         yield HeartRender(stage, judge, atlas, part, light, of.pixel)
 
 
 def _reference(
-    stage: Stage, part: Part, places: Floats, inside: NDArray[np.bool_], light: Scattering
+    stage: Stage, scene: Scene, inside: NDArray[np.bool_], light: Scattering, side: float
 ) -> tuple[Floats, TruthError]:
-    """Return radiant exitance (h, w, 3) from the whole surface, and what a coarser surface changes.
+    """Return radiant exitance (h, w, 3) from the whole surface, and what elements of twice the side change.
 
     Args:
         stage: that has drawn the scene.
-        part: the surface.
-        places: (h, w, 3) of the pixels in the world [mm].
+        scene: of the surface.
         inside: (h, w), where light is summed: elsewhere it is Lambert's.
         light: of the stack.
+        side: of an element [mm].
     """
     buffers = stage.buffers()
-    own, exact = buffers.irradiance[inside].astype(float), light.exact
-    sums: list[Floats] = []
-    for most in (FINE, FINE // 2):
-        size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
-        with Atlas(stage.context, size, margin) as fine:
-            fine.draw(stage, part)
-            gathered = summed(fine.elements(), exact.variances, exact.weights, places[inside], own)
-            sums.append(np.multiply(light.colour, gathered))
+    places, own = (value[inside].astype(float) for value in (buffers.position, buffers.irradiance))
+    elements = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
+    sums = [
+        buffers.reflectance[inside] * summed(one, light.exact.variances, light.exact.weights, places, own)
+        for one in elements
+    ]
     reference = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
     reference[inside] = sums[0]
     return reference, TruthError.of(np.abs(sums[1] - sums[0]) / np.mean(sums[0]))

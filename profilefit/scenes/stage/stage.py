@@ -250,8 +250,8 @@ def _three(name: str, value: ArrayLike, accepted: str, low: float, high: float) 
 
 def _surface(vertex: str, part: Part, shadow: Read, values: dict[str, Any], **more: Any) -> Pass:
     own = {"translucent": float(part.is_translucent), "roughness": part.roughness}
-    v = part.mesh.uv[:, 1]
-    tiles = v.size > 0 and (float(v.min()) < 0.0 or float(v.max()) > 1.0)
+    uv = part.mesh.uv
+    tiles = uv.size > 0 and (float(uv[:, 1].min()) < 0.0 or float(uv[:, 1].max()) > 1.0)
     reads: dict[str, Read] = {
         "skin": Smooth(part.reflectance, tiles),
         "relief": Smooth(EVEN if part.relief is None else part.relief, tiles),

@@ -61,7 +61,8 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     """Return what a heart's scene needs, by sums at some hundred pixels; a minute where no record has its layers."""
     light = light_of(of, of.technique.gaussians)
     size, margin = atlas_size(of.mesh, 0.0, TEXELS, CHARTS_END)
-    with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as fine:
+    with staged(context, of, light) as (stage, scene), Atlas(context, size, margin) as fine:
+        [part] = scene.parts
         fine.draw(stage, part)
         elements, buffers = fine.elements(), stage.buffers()
         by = Balanced.of(fine, part, light.kernel, np.inf, ATLAS, light.mfp)
@@ -70,10 +71,9 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     inside = buffers.mask > INSIDE
     judged = inside & off_edges(of.surface.kind, of.surface.size, places, light.mfp[0])
     at = evenly(judged if judged.any() else inside, CHOSEN)
-    places, own = places[at], buffers.irradiance[at].astype(float)
+    places, own, colour = places[at], buffers.irradiance[at].astype(float), buffers.reflectance[at].astype(float)
     off = occlusion_error(elements, sees(buffers, of.camera, elements.points), light.kernel, places, own)
     whole = summed(elements, light.kernel.variances, light.kernel.weights, places, own)
-    colour = np.array(light.colour)
     error, hidden = (np.sqrt(np.mean(one**2)) for one in (gathered[at] - colour * whole, colour * off))
     mean = np.mean(colour * whole)
     return AtlasNeed(float(error / mean), float(hidden / mean), of.technique.tolerance)

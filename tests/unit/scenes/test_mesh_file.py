@@ -286,7 +286,9 @@ def test_what_scenes_refuse(tmp_path):
     assert "pose must be left out of a mesh of a file" in told(layered + '\n[surface]\nmesh = "ball.stl"\n')
     walls = walls.replace("[surface]\n", '[surface]\nmesh = "ball.stl"\n')
     assert "[surface] kind must be left out where there is a mesh" in told(walls)
-    walls = "\n".join(line for line in walls.splitlines() if not line.startswith(('kind = "heart"', "size = ")))
+    walls = "\n".join(
+        line for line in walls.splitlines() if not line.startswith(('kind = "heart"', "size =", "paint ="))
+    )
     assert "[surface] triangles must have an area in the atlas, got 0" in told(walls)
 
 

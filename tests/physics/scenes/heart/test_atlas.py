@@ -239,7 +239,7 @@ def area_of(mesh) -> float:
 def test_elements_are_the_surface(stage):
     """Texels of skewed charts are smaller than their sides make them; of a ball, where they are not, as large."""
     for mesh, skewed in ((heart(RADIUS, 32), True), (ball(RADIUS), False)):
-        with laid_out(stage, mesh, *atlas_size(mesh, 0.0, 2 * CHARTS_END, CHARTS_END)) as atlas:
+        with laid_out(stage, mesh, *atlas_size(mesh, 0.0, 10 * CHARTS_END, CHARTS_END)) as atlas:
             found, stretch = atlas.elements(), atlas.read("stretch_map")
         assert found.areas.sum() == pytest.approx(area_of(mesh), rel=0.003)
         sides = np.prod(stretch[stretch[..., 2] > 0.5][:, :2], axis=1).sum()
@@ -250,7 +250,7 @@ def test_elements_are_the_surface(stage):
 @pytest.mark.parametrize("apart", [4, 1])
 def test_a_heart_is_blurred_as_its_sum(stage, apart):
     """All of it, and next to the seams of six charts; where they lie nearer than margins are wide, that is refused."""
-    part = Part(heart(2.0 * RADIUS), WHITE)
+    part = Part(heart(3.0 * RADIUS), WHITE)
     stage.draw(Scene((part,)))
     size, margin = atlas_size(part.mesh, 0.25, 400)
     finest, least = atlas_size(part.mesh, 0.0, 12 * CHARTS_END, CHARTS_END)
