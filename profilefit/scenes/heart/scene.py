@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
+from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import normal_reflectance
@@ -40,6 +41,7 @@ SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
 FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
+MOST_SKY = 2**15  # texels at which the sky's light is summed for the reference
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
@@ -226,18 +228,37 @@ def _reference(
         inside: (h, w), where light is summed: elsewhere it is Lambert's.
         light: of the stack.
     """
-    buffers = stage.buffers()
+    buffers = stage.true_buffers()
     own, exact = buffers.irradiance[inside].astype(float), light.exact
     sums: list[Floats] = []
+    sky: Callable[[Floats], Floats] | None = None
     for most in (FINE, FINE // 2):
         size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
         with Atlas(stage.context, size, margin) as fine:
-            fine.draw(stage, part)
-            gathered = summed(fine.elements(), exact.variances, exact.weights, places[inside], own)
+            fine.draw(stage, part, has_sky=False)
+            elements = fine.elements()
+            sky = sky or _sky(stage, fine)
+            elements = elements._replace(irradiance=elements.irradiance + sky(elements.points))
+            gathered = summed(elements, exact.variances, exact.weights, places[inside], own)
             sums.append(np.multiply(light.colour, gathered))
     reference = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
     reference[inside] = sums[0]
     return reference, TruthError.of(np.abs(sums[1] - sums[0]) / np.mean(sums[0]))
+
+
+def _sky(stage: Stage, atlas: Atlas) -> Callable[[Floats], Floats]:
+    """Return a function from points (n, 3) of a surface to the sky's irradiance, between texels where it is known."""
+    place, normal = (atlas.read(name).astype(float) for name in ("position_map", "normal_map"))
+    chosen = evenly(place[..., 3] > INSIDE, MOST_SKY)
+    points = place[chosen][:, :3]
+    known, tree = stage.sky(points, normal[chosen][:, :3]), cKDTree(points)
+
+    def sky(at: Floats) -> Floats:
+        distance, nearest = tree.query(at, 4)
+        weight = 1.0 / np.maximum(distance, 1e-6 * LARGEST)
+        return np.asarray(np.einsum("nk,nkc->nc", weight, known[nearest]) / weight.sum(axis=1)[:, None])
+
+    return sky
 
 
 def light_of(of: StackRequest, count: int) -> Scattering:

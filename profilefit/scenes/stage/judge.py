@@ -216,7 +216,7 @@ def surface_judge(stage: Stage, mfp: ArrayLike, table: CurveTable | Setting = DI
 
     mfp    of the three channels (3,) [mm];  table  of curves, or the setting of the exact half space
     """
-    buffers = stage.buffers()
+    buffers = stage.true_buffers()
     light = exitance_of(buffers, mfp, table)
     error = own_error(*seen(buffers), light, mfp, table) if has_error else UNKNOWN
     return Judge(light, buffers.mask > INSIDE, error)
