@@ -75,6 +75,7 @@ def scene(
         for end in (".json", ".png", "-truth.png", "-error.png", "-comparison.png"):
             require_writable(Path(f"{one}{end}"))
     bodies: list[dict[str, Any]] = []
+    sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
         device = renderer(context)
         for moment, name in zip(moments, stems, strict=True):
@@ -86,6 +87,10 @@ def scene(
                 screen().print(line, markup=False, soft_wrap=True)
     body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
     body |= bodies[0] if frames is None else {"frames": bodies}
+    if sky is not None:
+        body["environment"] = {"harmonics_error": sky.error._asdict()}
+        if not as_json:
+            screen().print(report.sky_line(sky), markup=False, soft_wrap=True)
     write_whole(Path(f"{stem}.json"), json_text(body))
     if as_json:
         print_json(body)

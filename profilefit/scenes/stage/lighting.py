@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
+from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.renderer import NEAREST, SUM, Pass, Read
-from profilefit.scenes.stage.world import MOST_LAMPS, Camera, Light, Part, Scene, looking, orthographic, unit
+from profilefit.scenes.stage.world import MOST_LAMPS, Camera, Light, Part, Rgb, Scene, looking, orthographic, rgb, unit
 from profilefit.shader.emit import text_beside
 
 IRRADIANCE, OCCLUSION, BACK = "irradiance_map", "occlusion_map", "back_map"
@@ -103,16 +104,22 @@ def ambient_pass(scene: Scene, screen: Mapping[str, Any], reads: Mapping[str, Re
     screen  the camera's uniforms of the picture in which occlusion was found;  reads  its `seen_map`, `occlusion_map`
     to_world  from the maps' space to the world
     """
-    sky = scene.environment
     uniforms = {
         **screen,
         "to_world": to_world,
         "to_view": scene.camera.view() @ to_world,
         "ambient": scene.ambient,
-        "harmonics": [(0.0,) * 3] * 9 if sky is None else [tuple(row) for row in sky.harmonics.tolist()],
+        "harmonics": harmonics_of(scene.environment),
         "occluded": float(scene.has_occlusion),
     }
-    return Pass("ambient", {**_surface(), **reads}, IRRADIANCE, text("ambient.frag"), uniforms, kept=SUM)
+    return Pass(
+        "ambient", {**_surface(), **reads}, IRRADIANCE, text("harmonics.glsl", "ambient.frag"), uniforms, kept=SUM
+    )
+
+
+def harmonics_of(sky: Environment | None) -> list[Rgb]:
+    """Return the nine coefficients of an environment as a uniform, 0 where there is none."""
+    return [(0.0, 0.0, 0.0)] * 9 if sky is None else [rgb(row) for row in sky.harmonics]
 
 
 def screen_uniforms(camera: Camera, size: tuple[int, int]) -> dict[str, Any]:

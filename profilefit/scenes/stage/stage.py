@@ -216,7 +216,7 @@ class Stage(GpuOwner):
             _surface("surface", part, SHADOWS[0], values, kept=NEAREST, clear=None if i else 0.0)
             for i, part in enumerate(scene.parts)
         ]
-        to_world = np.linalg.inv(camera.view())
+        to_world = np.asarray(np.linalg.inv(camera.view()), float)
         for lamp in other_lamps(scene, self._shadow_side):
             passes += shadow_passes(scene.parts, lamp.uniforms, lamp.shadow)
             passes.append(lamp_pass(lamp, lamp.shadow, to_world))

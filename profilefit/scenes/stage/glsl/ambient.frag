@@ -5,7 +5,6 @@ uniform sampler2D seen_map, occlusion_map; // of the screen: its positions in vi
 uniform mat4 to_world; // from the maps' space
 uniform mat4 to_view; // from the maps' space to that of the screen
 uniform vec3 ambient; // [-]
-uniform vec3 harmonics[9]; // of 1, y, z, x, xy, yz, 3 z^2 - 1, zx, x^2 - y^2
 uniform float occluded; // 1, or 0 for light that nothing occludes
 uniform vec2 size; // of the screen [pixels]
 uniform float pixel; // its side [mm], in perspective at a depth of 1 mm
@@ -14,12 +13,6 @@ uniform float perspective;
 out vec4 irradiance;
 
 const float SHOWN = 1.5, LEAST_SHOWN = 0.25; // pixels, over the cosine of normal and ray, that a point may lie off
-
-vec3 by_harmonics(vec3 n) {
-    vec3 even = harmonics[4] * n.x * n.y + harmonics[5] * n.y * n.z + harmonics[7] * n.z * n.x;
-    even += harmonics[6] * (3.0 * n.z * n.z - 1.0) + harmonics[8] * (n.x * n.x - n.y * n.y);
-    return max(harmonics[0] + harmonics[1] * n.y + harmonics[2] * n.z + harmonics[3] * n.x + even, 0.0);
-}
 
 // Share at the pixel that shows a point; 1 where none does.
 float open(vec3 point, vec3 normal) {
