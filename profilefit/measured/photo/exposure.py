@@ -118,10 +118,10 @@ def radiance(path: Path, most_bytes: int, largest: tuple[int, int]) -> Plane:
         is_regular, size = stat.S_ISREG(status.st_mode), status.st_size
         content = path.read_bytes() if is_regular and 0 < size <= most_bytes else b""
     except (OSError, ValueError) as error:
-        raise InputError(f"{path.name}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not content:
         got = f"{size} bytes" if is_regular else "no regular file"
-        raise InputError(f"{path.name}: expected a file of 1 byte to {most_bytes >> 20} MiB, got {got}")
+        raise InputError(f"{path}: expected a file of 1 byte to {most_bytes >> 20} MiB, got {got}")
     with _silent():
         return _exr_radiance(path, largest) if path.suffix.lower() in EXR else _rgbe(path, content, largest)
 
@@ -130,7 +130,7 @@ def _exr_radiance(path: Path, largest: tuple[int, int]) -> Plane:
     values = _exr(path, largest)
     if values.ndim != 3 or values.shape[2] not in (3, 4) or values.dtype not in (np.float32, np.float16):
         got = f"{values.dtype} of shape {values.shape}"
-        raise InputError(f"{path.name}: expected floats of red, green and blue, got {got}")
+        raise InputError(f"{path}: expected floats of red, green and blue, got {got}")
     return np.asarray(values[..., :3], np.float32)
 
 
@@ -138,19 +138,19 @@ def _rgbe(path: Path, content: bytes, largest: tuple[int, int]) -> Plane:
     header = content[:LONGEST_HEADER]
     size = SIZE.search(header)
     if not header.startswith(RADIANCE) or size is None or XYZ in header[: size.start()]:
-        raise InputError(f"{path.name}: expected a Radiance file of RGBE, with -Y rows +X columns, got another one")
+        raise InputError(f"{path}: expected a Radiance file of RGBE, with -Y rows +X columns, got another one")
     _require_within(path, int(size[2]), int(size[1]), largest)
     cv2 = library("cv2")
     with _refused(path, "a Radiance file", cv2.error, *DAMAGED):
         values = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if values is None or values.ndim != 3 or values.shape[2] != 3:
-        raise InputError(f"{path.name}: cannot be read as a Radiance file: it is damaged")
+        raise InputError(f"{path}: cannot be read as a Radiance file: it is damaged")
     return np.asarray(values[..., ::-1], np.float32)
 
 
 def _require_within(path: Path, columns: int, rows: int, largest: tuple[int, int]) -> None:
     if not (0 < columns <= largest[0] and 0 < rows <= largest[1]):
-        raise InputError(f"{path.name}: expected 1 ... {largest[0]} x {largest[1]} pixels, got {columns} x {rows}")
+        raise InputError(f"{path}: expected 1 ... {largest[0]} x {largest[1]} pixels, got {columns} x {rows}")
 
 
 def _raw(path: Path) -> Exposure:

@@ -183,7 +183,7 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
     part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.surface.roughness)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
-        draw_lit(stage, of.lit(Scene((part,), camera=of.camera, f0=f0)), of.file)
+        draw_lit(stage, of.under_light(Scene((part,), camera=of.camera, f0=f0)), of.file)
         yield stage, part
 
 

@@ -168,7 +168,7 @@ def scene_of(of: LayersRequest) -> Scene:
     values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
     parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
-    return of.lit(Scene(parts, camera=of.camera, f0=f0))
+    return of.under_light(Scene(parts, camera=of.camera, f0=f0))
 
 
 def posed(points: Floats, pose: str) -> Floats:

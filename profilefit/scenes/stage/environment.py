@@ -184,16 +184,16 @@ def read_map(path: Path) -> NDArray[np.float32]:
     """Read a map (rows, 2 rows, 3) of radiance from a .hdr or an .exr. InputError in one line."""
     kind = path.suffix.lower()
     if kind not in KINDS:
-        raise InputError(f"{path.name}: expected a map of radiance, {' or '.join(KINDS)}, got {kind or 'no suffix'!r}")
+        raise InputError(f"{path}: expected a map of radiance, {' or '.join(KINDS)}, got {kind or 'no suffix'!r}")
     values = exposure.radiance(path, MOST_BYTES, (MOST_COLUMNS, MOST_COLUMNS // 2))
     rows, columns = values.shape[:2]
     if columns != 2 * rows:
         accepted = "latitude and longitude, twice as wide as high"
-        raise InputError(f"{path.name}: expected {accepted}, got {columns} x {rows} pixels")
+        raise InputError(f"{path}: expected {accepted}, got {columns} x {rows} pixels")
     with np.errstate(invalid="ignore"):
         wrong = values[~((values >= 0) & (values <= MOST_RADIANCE))]
     if wrong.size:
-        raise InputError(f"{path.name}: expected radiance in 0 ... {MOST_RADIANCE:g}, got {wrong[0]:g}")
+        raise InputError(f"{path}: expected radiance in 0 ... {MOST_RADIANCE:g}, got {wrong[0]:g}")
     return values
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Refused, Text, words
@@ -82,6 +82,13 @@ class LampTable(Declared):
     irradiance: Irradiances
 
 
+def _few(content: Any) -> Any:
+    """Return tables [[light.more]] before they are looked at; Refused where there are too many."""
+    if isinstance(content, list) and len(content) >= MOST_LAMPS:
+        raise Refused(f"at most {MOST_LAMPS - 1} lamps beside the first", len(content))
+    return content
+
+
 class OneLampTable(Declared):
     """Table [light]: direction toward the lamp, irradiance of a surface that faces it, and ambient irradiance."""
 
@@ -122,8 +129,8 @@ class LightTable(OneLampTable):
     more: Annotated[
         tuple[LampTable, ...],
         LISTED,
-        Field(max_length=MOST_LAMPS - 1),
-        words(f"at most {MOST_LAMPS - 1} lamps beside the first"),
+        BeforeValidator(_few),
+        Field(json_schema_extra={"maxItems": MOST_LAMPS - 1}),
     ] = ()
     environment: Annotated[Line, words(ENVIRONMENT)] | None = None
     rotation: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
@@ -208,7 +215,7 @@ class ViewRequest(Declared):
         """Irradiance from everywhere."""
         return self.light_table.ambient
 
-    def lit(self, scene: AnyScene) -> AnyScene:
+    def under_light(self, scene: AnyScene) -> AnyScene:
         """Return a scene under the lamps and the sky of the file."""
         table = self.light_table
         return replace(scene, light=self.light, ambient=self.ambient, more=table.lamps, environment=table.sky)

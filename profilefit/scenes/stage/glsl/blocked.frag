@@ -5,10 +5,15 @@ uniform mat3 moment; // of the patch: integral of radiance times direction, a co
 
 out vec4 kept;
 
+const float AWAY = 1.0; // from the surface, against shadows of itself: more than half a texel's diagonal [texels]
+
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec3 normal = texelFetch(normal_map, here, 0).xyz, light = max(normal * moment, 0.0);
     kept = vec4(0.0);
     if (!any(greaterThan(light, vec3(0.0)))) return;
-    kept.rgb = light * (1.0 - visibility(texelFetch(position_map, here, 0).xyz, normal));
+    // One texel and no filter: many directions are averaged.
+    vec3 point = texelFetch(position_map, here, 0).xyz + AWAY * shadow_pixel * normal;
+    float nearest = depth_at(ivec2(floor(texel_of(point) + 0.5)));
+    if (nearest < -dot(point, toward_light)) kept.rgb = light;
 }
