@@ -81,8 +81,9 @@ class Environment:
         if values.ndim != 3 or values.shape[2] != 3 or values.shape[1] != 2 * values.shape[0] or not values.size:
             raise InputError(f"map must have shape (rows, 2 rows, 3), got {values.shape}")
         require(bool(np.all((values >= 0) & (values <= MOST_RADIANCE))), "map", f"in 0 ... {MOST_RADIANCE:g}", values)
-        fine = -(-ROWS // len(values)) if len(values) < ROWS else 1
-        values = np.repeat(np.repeat(values, fine, axis=0), fine, axis=1)
+        if len(values) < ROWS:
+            fine = -(-ROWS // len(values))
+            values = np.repeat(np.repeat(values, fine, axis=0), fine, axis=1)
         rows, columns = values.shape[:2]
         theta, phi = np.linspace(0.0, np.pi, rows + 1), np.pi * np.linspace(-1.0, 1.0, columns + 1)
         phi = phi + np.radians(rotation)

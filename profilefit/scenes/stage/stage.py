@@ -35,7 +35,7 @@ from profilefit.scenes.stage.lighting import (
     sphere,
     text,
 )
-from profilefit.scenes.stage.occlusion import sky_irradiance
+from profilefit.scenes.stage.occlusion import PATCHES, sky_irradiance
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
@@ -135,12 +135,12 @@ class Stage(GpuOwner):
         irradiance[shown] += self.sky(points, normals).astype(np.float32)
         return replace(buffers, irradiance=irradiance)
 
-    def sky(self, points: Floats, normals: Floats) -> Floats:
+    def sky(self, points: Floats, normals: Floats, patches: int = PATCHES) -> Floats:
         """Return `sky_irradiance` (n, 3) at points of the scene last drawn."""
         self._ready()
         if self._scene is None:
             return np.zeros((len(points), 3))
-        return sky_irradiance(self.context, self._scene, points, normals)
+        return sky_irradiance(self.context, self._scene, points, normals, patches)
 
     def scatter(
         self,

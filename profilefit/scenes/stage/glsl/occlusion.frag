@@ -75,9 +75,10 @@ void main() {
                 vec2 away = float(s) * step_of, place = vec2(here) + 0.5 + radius * away;
                 if (!(all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size)))) break;
                 ivec2 there = ivec2(place);
-                vec3 hit = texelFetch(position_map, there, 0).xyz, plate = texelFetch(normal_map, there, 0).xyz;
-                if (there == here || dot(plate, plate) == 0.0) continue;
-                if (dot(hit - point, normal) < FACETS * length(hit - point)) continue;
+                vec3 hit = texelFetch(position_map, there, 0).xyz, off = hit - point;
+                if (!(dot(off, normal) > FACETS * length(off))) continue;
+                vec3 plate = texelFetch(normal_map, there, 0).xyz;
+                if (dot(plate, plate) == 0.0) continue; // nothing is there
                 float thickness = texelFetch(back_map, there, 0).r + hit.z;
                 if (!(thickness > 0.0)) thickness = ENDLESS;
                 float low = PI, high = -PI; // angles from the line of sight
