@@ -64,6 +64,8 @@ def shadow_passes(parts: Sequence[Part], uniforms: Mapping[str, Any], into: str)
 
 def other_lamps(scene: Scene, side: int) -> tuple[OtherLamp, ...]:
     """Return the lamps of a scene beside the first."""
+    if not scene.more:
+        return ()
     around, to_world = sphere(scene), np.linalg.inv(scene.camera.view())
     return tuple(
         OtherLamp(name, {**lamp_uniforms(around, lamp, side), "to_world": to_world})
