@@ -12,17 +12,29 @@ uniform float perspective;
 
 out vec4 irradiance;
 
+const int ACROSS = 1; // neighbours to each side, over which the noise of the search is a mean
+const float LEVEL = 1.0; // pixels off the plane, within which they are of the same surface
 const float SHOWN = 1.5, LEAST_SHOWN = 0.25; // pixels, over the cosine of normal and ray, that a point may lie off
 
-// Share at the pixel that shows a point; 1 where none does.
+// Share at the pixel that shows a point, and a mean over its neighbours in the same plane; 1 where none shows it.
 float open(vec3 point, vec3 normal) {
     float depth = perspective > 0.5 ? -point.z : 1.0, side = pixel * depth;
     vec2 place = point.xy / side + 0.5 * size;
     if (!(depth > 0.0 && all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size)))) return 1.0;
-    vec3 there = texelFetch(seen_map, ivec2(place), 0).xyz;
     vec3 ray = perspective > 0.5 ? normalize(point) : vec3(0.0, 0.0, -1.0);
     float near = SHOWN * side / max(abs(dot(normal, ray)), LEAST_SHOWN);
-    return length(there - point) < near ? texelFetch(occlusion_map, ivec2(place), 0).r : 1.0;
+    if (!(length(texelFetch(seen_map, ivec2(place), 0).xyz - point) < near)) return 1.0;
+    float total = 0.0, weight = 0.0;
+    for (int y = -ACROSS; y <= ACROSS; ++y) {
+        for (int x = -ACROSS; x <= ACROSS; ++x) {
+            ivec2 there = clamp(ivec2(place) + ivec2(x, y), ivec2(0), ivec2(size) - 1);
+            vec3 apart = texelFetch(seen_map, there, 0).xyz - point;
+            if (abs(dot(apart, normal)) > LEVEL * side) continue;
+            total += texelFetch(occlusion_map, there, 0).r;
+            weight += 1.0;
+        }
+    }
+    return weight > 0.0 ? total / weight : texelFetch(occlusion_map, ivec2(place), 0).r;
 }
 
 void main() {
