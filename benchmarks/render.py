@@ -1,10 +1,10 @@
 """Renders judged: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
 
-    python -m benchmarks.render errors|table2|fig14|variance|pictures|choices|refracting
+    python -m benchmarks.render errors|table2|fig14|variance|pictures|choices|refracting|reference
                                 [--quick] [--size WxH] [--figure FILE] [--json FILE]
 
-Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. All but `refracting` is of
-n = 1, as published.
+Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. All but `refracting` and
+`reference` are of n = 1, as published.
 README.md beside this file says what the numbers mean.
 """
 
@@ -19,7 +19,14 @@ from pathlib import Path
 
 import moderngl
 
-from benchmarks import render_errors, render_pictures, render_refracting, render_table2, render_variance
+from benchmarks import (
+    render_errors,
+    render_pictures,
+    render_reference,
+    render_refracting,
+    render_table2,
+    render_variance,
+)
 from benchmarks.render_laws import contenders, variants
 from benchmarks.render_view import judged
 from profilefit.errors import ShaderError
@@ -99,8 +106,15 @@ def refracting(context: moderngl.Context, options: argparse.Namespace) -> dict:
         return render_refracting.as_json(found)
 
 
+def reference(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """Time the reference, and compare it with a double sum over pixels."""
+    found = render_reference.measured(context, options.size or render_reference.SIZE)
+    render_reference.report(found)
+    return found
+
+
 WHAT: dict[str, Callable[[moderngl.Context, argparse.Namespace], dict]] = {
-    one.__name__: one for one in (errors, table2, fig14, variance, pictures, choices, refracting)
+    one.__name__: one for one in (errors, table2, fig14, variance, pictures, choices, refracting, reference)
 }
 
 

@@ -64,7 +64,7 @@ def judged(
     mfp = scale * red, scale * green, scale * blue
     with Stage(context, size) as stage:
         stage.draw(scene)
-        known = surface_judge(stage, mfp, setting, not quick)
+        known = surface_judge(stage, scene, mfp, setting, not quick)
         yield Judged(known.reference, known.mask, known.truth_error, stage=stage, mfp=mfp)
 
 

@@ -183,8 +183,8 @@ def over_maps(drawn: SeaRender) -> Rows:
     for name, by, count in cases:
         with Renderer(drawn.passes.renderer.context, of.size) as maps:
             own = drawn._replace(passes=SeaPasses(maps, of.world, by, named.vertices, named.texels, count))
-            own.light()  # compiled
-            least = min(sum(own.light().values()) for _ in range(TURNS))
+            own.maps()  # compiled
+            least = min(sum(own.maps().values()) for _ in range(TURNS))
             rows.append((name, "", own.judge.rmse(own.picture(named.kind, of.sampling.samples)), least))
     return rows
 

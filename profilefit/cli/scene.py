@@ -14,7 +14,7 @@ from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")
-MOST_FRAMES = 9999
+MOST_FRAMES, FPS = 9999, 24.0
 
 
 def scene(
@@ -30,7 +30,9 @@ def scene(
     frames: Annotated[
         int | None, typer.Option(min=1, max=MOST_FRAMES, help="Number of pictures of a scene that moves.")
     ] = None,
-    fps: Annotated[float, typer.Option(min=1e-3, max=1e3, help="Frames per second [1/s].")] = 24.0,
+    fps: Annotated[
+        float | None, typer.Option(min=1e-3, max=1e3, help="Frames per second of --frames [1/s], 24 by default.")
+    ] = None,
     example: Annotated[bool, typer.Option("--example", help="Print an example file of a scene.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -48,7 +50,7 @@ def scene(
     from mcml_sim.cli.screen import notes, print_json, screen, typed
     from mcml_sim.files.version import __version__
     from mcml_sim.files.whole_file import as_json as json_text
-    from mcml_sim.files.whole_file import read_toml, require_writable, write_together, write_whole
+    from mcml_sim.files.whole_file import read_toml, require_writable, write_together
     from mcml_sim.runs.progress import working
     from profilefit.shader.context import opened, renderer
 
@@ -58,6 +60,8 @@ def scene(
             raise refused("NAME", f"one of {known} with --example", file)
         typer.echo((shipped("examples") / SCENES[file][1]).read_text(encoding="utf-8"), nl=False)
         return
+    if fps is not None and frames is None:
+        raise InputError(f"--fps must be left out without --frames, got {fps:g}")
     content = read_toml(file)
     name = content.get("scene")
     if not isinstance(name, str) or name not in SCENES:
@@ -68,30 +72,33 @@ def scene(
     request = home.read(file, content)
     if not no_reference:
         request.require_reference()
-    moments = [request] if frames is None else [request.after(number / fps) for number in range(frames)]
+    moments = [request] if frames is None else [request.after(number / (fps or FPS)) for number in range(frames)]
     stem = out / Path(file).stem
     stems = [f"{stem}"] if frames is None else [f"{stem}-{number:04d}" for number in range(1, frames + 1)]
-    for one in (str(stem), *stems):
-        for end in (".json", ".png", "-truth.png", "-error.png", "-comparison.png"):
-            require_writable(Path(f"{one}{end}"))
+    numbers = Path(f"{stem}.json")
+    for path in (numbers, *(Path(f"{one}{end}.png") for one in stems for end in report.ENDS)):
+        require_writable(path)
+    body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
     bodies: list[dict[str, Any]] = []
     sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
         device = renderer(context)
         for moment, name in zip(moments, stems, strict=True):
             drawn = (home.picture if no_reference else home.draw)(context, moment)
-            pictures = report.scene_figures(drawn, device.partition(",")[0])
-            write_together({Path(f"{name}{end}.png"): png for end, png in pictures.items()})
             bodies.append(report.content(drawn, device))
+            figures = report.scene_figures(drawn, device.partition(",")[0])
+            files: dict[Path, bytes | str] = {Path(f"{name}{end}.png"): png for end, png in figures.items()}
+            if moment is moments[-1]:
+                body |= bodies[0] if frames is None else {"frames": bodies}
+                body |= {} if sky is None else {"environment": {"harmonics_error": sky.error._asdict()}}
+                files[numbers] = json_text(body)
+            write_together(files)
             for line in () if as_json else report.scene_lines(drawn, device):
                 screen().print(line, markup=False, soft_wrap=True)
-    body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
-    body |= bodies[0] if frames is None else {"frames": bodies}
-    if sky is not None:
-        body["environment"] = {"harmonics_error": sky.error._asdict()}
-        if not as_json:
-            screen().print(report.sky_line(sky), markup=False, soft_wrap=True)
-    write_whole(Path(f"{stem}.json"), json_text(body))
+    if sky is not None and not as_json:
+        screen().print(report.sky_line(sky), markup=False, soft_wrap=True)
     if as_json:
         print_json(body)
-    notes(quiet).print(f"wrote {stem}.json and {', '.join(f'{one}*.png' for one in stems)}", markup=False)
+    last = "" if frames is None else f" to {stems[-1]}.png"
+    more = ", ".join(f"{end}.png" for end in figures if end)
+    notes(quiet).print(f"wrote {numbers}, {stems[0]}.png{last}{more and f', with {more}'}", markup=False)

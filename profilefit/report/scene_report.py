@@ -24,9 +24,11 @@ NOWHERE = "#BBBBBB"  # where no error is measured
 # Comparison: its width, pictures side by side, and the height of a label [pixels]; pixels per inch; sizes of letters.
 WIDE, COLUMNS, LABEL, SCREEN, LARGE, SMALL = 1920, 3, 76, 100, 17.0, 15.0
 
+ENDS = ("", "-truth", "-error", "-comparison", "-chart")  # of names of pictures
+
 
 def scene_figures(drawn: SceneImage, device: str) -> dict[str, bytes]:
-    """Return PNG files by the ends of their names: "" the picture; with a reference "-truth", "-error" and more."""
+    """Return PNG files by the ends of their names, in `ENDS`: all but the picture where there is a reference."""
     files = {"": _png(image.imsave, drawn.picture)}
     if isinstance(drawn, RenderResult):
         files |= {"-truth": _png(image.imsave, drawn.truth), "-error": _error_map(drawn)}

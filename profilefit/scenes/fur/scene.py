@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
@@ -18,8 +17,8 @@ from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, 
 from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
 from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
-from profilefit.scenes.stage.drawing import Drawer
-from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, Rendering, exposure_of
+from profilefit.scenes.stage.drawing import Drawer, RayDrawing
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import Samples, Seconds, TechniqueTable, Viewpoint, ViewRequest
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
@@ -188,6 +187,10 @@ class FurRender(NamedTuple):
         """Return the milliseconds of all passes."""
         return self.renderer.time(*self._passes(by, layers))
 
+    def maps(self) -> dict[str, float]:
+        """Return nothing: no map is drawn before the picture."""
+        return {}
+
     def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, ...]:
         return self.surface.layered(self.view, by, layers), *self.shade
 
@@ -207,7 +210,7 @@ def reference_render(context: moderngl.Context, of: FurRequest, has_reference: b
         fine = renderer.image(*shade)[..., :3].astype(float)
         mask = averaged((hits[..., 3:] > NOTHING).astype(float), each)[..., 0] > 0
         reference = averaged(fine, each)
-        exposure = exposure_of(reference[mask].max(axis=-1), WHITE)
+        exposure = _exposure(reference[mask])
         error = _standard_error(fine, each, mask) if each > 1 else UNKNOWN
         judge = Judge(reference, mask, error, exposure)
         yield FurRender(of, renderer, FurSurface.of_ball(ball), shade, view, fine, judge)
@@ -223,33 +226,16 @@ def _standard_error(fine: Floats, each: int, mask: NDArray[np.bool_]) -> TruthEr
     return TruthError.of(0.5 * np.sqrt(np.mean(halves**2, axis=-1))[mask] / mean)
 
 
-@dataclass(frozen=True)
-class FurDrawing:
-    """Drawing of fur by `FurRender`."""
-
-    render: FurRender
-    judge: Judge | None
-
-    def shot(self, of: FurRequest, turns: int) -> Rendering:
-        """See `Drawing`."""
-        way, samples = of.technique.way, of.technique.samples
-        radiance = self.render.picture(way, samples)
-        return Rendering(way.name, radiance, tuple(self.render.time(way, samples) for _ in range(turns)))
-
-    def points(self, of: FurRequest, numbers: Sequence[int]) -> list[ChartPoint]:
-        """See `Drawing`."""
-        return self.render.points(of.technique.way, numbers)
-
-    def exposure(self, radiance: Floats) -> float:
-        """See `Drawing`."""
-        return exposure_of(radiance.max(axis=-1), WHITE)
+def _exposure(radiance: Floats) -> float:
+    return exposure_of(radiance.max(axis=-1), WHITE)
 
 
 @contextmanager
-def opened(context: moderngl.Context, of: FurRequest, has_reference: bool) -> Iterator[FurDrawing]:
+def opened(context: moderngl.Context, of: FurRequest, has_reference: bool) -> Iterator[RayDrawing]:
     """Open the drawing of a request."""
     with reference_render(context, of, has_reference) as drawn:
-        yield FurDrawing(drawn, drawn.judge if has_reference else None)
+        judge = drawn.judge if has_reference else None
+        yield RayDrawing(drawn, judge, lambda of: (of.technique.way.name, of.technique.way), _exposure)
 
 
 SHELLS = {"kind": "shells", "exponent": 1.0}

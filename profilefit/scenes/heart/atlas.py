@@ -74,7 +74,7 @@ class Atlas(GpuOwner):
         has_sky  whether irradiance has the light of the sky, as far as the screen shows what occludes it
         """
         if self._links is None:
-            _require_charts(part.mesh)
+            require_charts(part.mesh)
         self.renderer.run(*stage.unwrapping(part, self.inset, has_sky))
         if self._links is None:
             place = self.read("position_map")
@@ -178,7 +178,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     return (columns, rows), margin
 
 
-def _require_charts(mesh: Mesh) -> None:
+def require_charts(mesh: Mesh) -> None:
     """Raise InputError on a mesh that cannot be laid out."""
     count = len(mesh.position)
     if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):

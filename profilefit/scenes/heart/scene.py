@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,26 +12,34 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
-from profilefit.recipes.declared import Declared, OneOf, Refused, Tolerance
+from profilefit.recipes.declared import OneOf, Refused, Tolerance, at
 from profilefit.recipes.folder import LOCAL, fits_folder
 from profilefit.recipes.kinds import gaussians
 from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.gaussians import SumLight, dense, joint, lights_of
 from profilefit.scenes.heart import meshes
-from profilefit.scenes.heart.atlas import Atlas, atlas_size
+from profilefit.scenes.heart.atlas import Atlas, atlas_size, require_charts
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.request import MOST_PIXELS, TechniqueTable, Viewpoint, ViewRequest, draw_lit
+from profilefit.scenes.stage.mesh_file import MeshTable
+from profilefit.scenes.stage.request import (
+    MOST_PIXELS,
+    TechniqueTable,
+    Viewpoint,
+    ViewRequest,
+    draw_lit,
+    require_outside,
+    seen_whole,
+)
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, evenly, world
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
@@ -41,12 +49,13 @@ SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
 FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
-MOST_SKY = 2**15  # texels at which the sky's light is summed for the reference
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
-class SurfaceTable(Declared):
-    """Table [surface]: kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period.
+class SurfaceTable(MeshTable):
+    """Table [surface]: kind, or a mesh of a file, whose charts must not overlap.
+
+    kind  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period.
 
     roughness  of the one lobe that is mirrored, GGX [-]
     """
@@ -58,6 +67,11 @@ class SurfaceTable(Declared):
 
     @model_validator(mode="after")
     def _of_bumps(self) -> Self:
+        for key in ("kind", "size") if self.parts else ():
+            if key in self.model_fields_set:
+                raise Refused("left out where there is a mesh", getattr(self, key), key)
+        if self.parts and len(self.parts) > 1:
+            raise Refused("a file of one part", f"{len(self.parts)} parts", "mesh")
         if self.kind != "bumps" and "steepness" in self.model_fields_set:
             raise Refused("left out where kind is not bumps", self.steepness, "steepness")
         return self
@@ -85,11 +99,15 @@ class HeartRequest(ViewRequest, StackRequest):
     @property
     def viewpoint(self) -> Viewpoint:
         """Camera of a file that says nothing."""
+        if self.surface.parts:
+            return seen_whole(self.surface.extent)
         return Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * self.surface.size)
 
     @cached_property
     def mesh(self) -> Mesh:
         """Surface."""
+        if self.surface.parts:
+            return self.surface.parts[0].mesh
         return meshes.surface(self.surface.kind, self.surface.size, self.surface.steepness)
 
     @property
@@ -102,6 +120,10 @@ class HeartRequest(ViewRequest, StackRequest):
         fit.require_exact(self.stack)
         if self.stack.map is not None:
             raise Refused("one number: light is blurred alike all over", "an image", "layers", "thickness")
+        if self.surface.parts:
+            with at("surface"):
+                require_charts(self.mesh)
+            require_outside(self, self.surface)
         (columns, rows), margin = atlas_size(self.mesh, self.technique.texel, 10 * MOST_TEXELS)
         if max(columns, rows) - 2 * margin > MOST_TEXELS:
             accepted = f"a length [mm] of which {MOST_TEXELS} at most make a side of the atlas"
@@ -180,7 +202,9 @@ class HeartRender:
 @contextmanager
 def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
     """Open a stage that has drawn what is requested, and its one part."""
-    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.surface.roughness)
+    own = of.surface.parts[0] if of.surface.parts else None
+    roughness = own.roughness if own is not None and own.roughness is not None else of.surface.roughness
+    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), roughness, relief=own.relief if own else None)
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
         draw_lit(stage, of.under_light(Scene((part,), camera=of.camera, f0=f0)), of.file)
@@ -231,34 +255,19 @@ def _reference(
     buffers = stage.true_buffers()
     own, exact = buffers.irradiance[inside].astype(float), light.exact
     sums: list[Floats] = []
-    sky: Callable[[Floats], Floats] | None = None
     for most in (FINE, FINE // 2):
         size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
         with Atlas(stage.context, size, margin) as fine:
             fine.draw(stage, part, has_sky=False)
             elements = fine.elements()
-            sky = sky or _sky(stage, fine)
-            elements = elements._replace(irradiance=elements.irradiance + sky(elements.points))
+            normals = fine.read("normal_map")[fine.read("position_map")[..., 3] > INSIDE][:, :3]
+            light_of_sky = stage.sky(elements.points, normals.astype(float))
+            elements = elements._replace(irradiance=elements.irradiance + light_of_sky)
             gathered = summed(elements, exact.variances, exact.weights, places[inside], own)
             sums.append(np.multiply(light.colour, gathered))
     reference = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
     reference[inside] = sums[0]
     return reference, TruthError.of(np.abs(sums[1] - sums[0]) / np.mean(sums[0]))
-
-
-def _sky(stage: Stage, atlas: Atlas) -> Callable[[Floats], Floats]:
-    """Return a function from points (n, 3) of a surface to the sky's irradiance, between texels where it is known."""
-    place, normal = (atlas.read(name).astype(float) for name in ("position_map", "normal_map"))
-    chosen = evenly(place[..., 3] > INSIDE, MOST_SKY)
-    points = place[chosen][:, :3]
-    known, tree = stage.sky(points, normal[chosen][:, :3]), cKDTree(points)
-
-    def sky(at: Floats) -> Floats:
-        distance, nearest = tree.query(at, 4)
-        weight = 1.0 / np.maximum(distance, 1e-6 * LARGEST)
-        return np.asarray(np.einsum("nk,nkc->nc", weight, known[nearest]) / weight.sum(axis=1)[:, None])
-
-    return sky
 
 
 def light_of(of: StackRequest, count: int) -> Scattering:

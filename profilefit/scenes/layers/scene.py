@@ -29,10 +29,10 @@ from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
-from profilefit.scenes.stage.judge import Judge, surface_judge
+from profilefit.scenes.stage.judge import Judge, surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
-from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
+from profilefit.scenes.stage.world import ROUGHNESS, Part, Rgb, Scene, deformed, rgb
 
 KINDS = ("stack", "dipole", "half space", "none")
 OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
@@ -51,7 +51,7 @@ class LayersTechnique(request.TechniqueTable):
     tolerance: Tolerance = 0.02
 
 
-class LayersRequest(request.ViewRequest, StackRequest):
+class LayersRequest(request.MeshRequest, StackRequest):
     """Picture of a layered head that a file requests; `choose` is read by `profilefit choose`."""
 
     scene: Annotated[str, OneOf("layers")] = "layers"
@@ -90,6 +90,8 @@ class LayersRequest(request.ViewRequest, StackRequest):
         fit.require_exact(self.stack)
         if self.stack.map is not None and "uneven" in self.model_fields_set:
             raise Refused("left out where the thickness is an image", self.uneven, "uneven")
+        if self.surface.parts and "pose" in self.model_fields_set:
+            raise Refused("left out of a mesh of a file", self.pose, "pose")
         return self
 
 
@@ -112,7 +114,7 @@ def opened(context: moderngl.Context, of: LayersRequest, has_reference: bool) ->
         judge = None
         if has_reference:
             table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
-            judge = surface_judge(stage, of.mfp, table)
+            judge = (whole_judge if of.surface.parts else surface_judge)(stage, scene, of.mfp, table)
         yield StageDrawing(stage, technique_of, judge)
 
 
@@ -124,7 +126,7 @@ def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     """Draw the scene, and return its judge: the stack at each point, by the surface integral."""
     scene = scene_of(of)
     request.draw_lit(stage, scene, of.file)
-    return surface_judge(stage, of.mfp, table, has_error=False)
+    return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 
 def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> NamedTechnique:
@@ -163,9 +165,12 @@ def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 
 
 def scene_of(of: LayersRequest) -> Scene:
-    """Return the head in its pose; its texture is the share of the way from the least thickness to the most."""
+    """Return the head in its pose, or a mesh; the texture is the share of the way from least to most thickness."""
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
+    if of.surface.parts:
+        own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
+        return Scene(own, of.light, of.ambient, of.camera, f0)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
     parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
     return of.under_light(Scene(parts, camera=of.camera, f0=f0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
@@ -23,8 +22,8 @@ from profilefit.scenes.sea.paths import Sunlight, traced
 from profilefit.scenes.sea.water import World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.drawing import Drawer
-from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, Rendering, exposure_of
+from profilefit.scenes.stage.drawing import Drawer, RayDrawing
+from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.surface import averaged
 from profilefit.scenes.stage.world import Camera
@@ -237,7 +236,7 @@ class SeaRender(NamedTuple):
         views = self.passes.renderer.image(self._view(kind, samples))[..., :3].astype(float)
         return averaged(views, self.request.technique.supersampling)
 
-    def light(self) -> dict[str, float]:
+    def maps(self) -> dict[str, float]:
         """Draw all maps of light, and return the milliseconds of the floor's, and of those in depths."""
         return {name: self.passes.renderer.time(*own) for name, own in self.passes.light.items()}
 
@@ -262,7 +261,7 @@ def reference_render(context: moderngl.Context, of: SeaRequest, paths: int = PAT
         passes = SeaPasses(renderer, world, of.splat, named.vertices, named.texels, named.slices)
         halves = halves_of(of, world, paths) if paths else np.ones((2, of.size[1], of.size[0], 3))
         drawn = SeaRender(of, passes, Judge.of_halves(halves, WHITE))
-        drawn.light()
+        drawn.maps()
         yield drawn
 
 
@@ -279,36 +278,12 @@ def halves_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -
     return halves.reshape(2, rows, columns, 3)
 
 
-@dataclass(frozen=True)
-class SeaDrawing:
-    """Drawing of a sea by `SeaRender`."""
-
-    render: SeaRender
-    judge: Judge | None
-
-    def shot(self, of: SeaRequest, turns: int) -> Rendering:
-        """See `Drawing`."""
-        kind, samples = of.technique.kind, of.technique.samples
-        maps = [self.render.light() for _ in range(turns)]
-        radiance = self.render.picture(kind, samples)
-        view = tuple(self.render.time(kind, samples) for _ in range(turns))
-        passes = {name: tuple(one[name] for one in maps) for name in self.render.passes.light} | {"view": view}
-        return Rendering(kind, radiance, tuple(map(sum, zip(*passes.values(), strict=True))), passes)
-
-    def points(self, of: SeaRequest, numbers: Sequence[int]) -> list[ChartPoint]:
-        """See `Drawing`."""
-        return self.render.points(of.technique.kind, numbers)
-
-    def exposure(self, radiance: Floats) -> float:
-        """See `Drawing`."""
-        return exposure_of(radiance, WHITE)
-
-
 @contextmanager
-def opened(context: moderngl.Context, of: SeaRequest, has_reference: bool) -> Iterator[SeaDrawing]:
+def opened(context: moderngl.Context, of: SeaRequest, has_reference: bool) -> Iterator[RayDrawing]:
     """Open the drawing of a request."""
     with reference_render(context, of, PATHS if has_reference else 0) as drawn:
-        yield SeaDrawing(drawn, drawn.judge if has_reference else None)
+        judge = drawn.judge if has_reference else None
+        yield RayDrawing(drawn, judge, lambda of: (of.technique.kind,) * 2, partial(exposure_of, white=WHITE))
 
 
 drawer = Drawer(opened, ({"kind": "scaled"}, {"kind": "single"}, {"kind": "broadened"}), "light")

@@ -39,10 +39,10 @@ from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.judge import surface_judge
+from profilefit.scenes.stage.judge import surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
-from profilefit.scenes.stage.world import Camera, Part, Scene
+from profilefit.scenes.stage.world import ROUGHNESS, Camera, Part, Scene
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class SkinTechnique(request.TechniqueTable):
         return self
 
 
-class SceneRequest(request.ViewRequest):
+class SceneRequest(request.MeshRequest):
     """Scene of skin that a file requests; `layers` and `choose` are read by `profilefit choose`."""
 
     scene: Annotated[str, OneOf("skin")] = "skin"
@@ -199,7 +199,7 @@ read = SceneRequest.of
 @contextmanager
 def opened(context: moderngl.Context, of: SceneRequest, has_reference: bool) -> Iterator[StageDrawing]:
     """Open the drawing of a request."""
-    scene = of.under_light(head_scene(of.material, of.camera, setting=of.setting))
+    scene = of.under_light(_scene_of(of))
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
 
@@ -208,8 +208,21 @@ def opened(context: moderngl.Context, of: SceneRequest, has_reference: bool) -> 
 
     with Stage(context, of.size) as stage:
         request.draw_lit(stage, scene, of.file)
-        judge = surface_judge(stage, scene.material.mfp, of.setting) if has_reference else None
+        judge = None
+        if has_reference:
+            judged = whole_judge if of.surface.parts else surface_judge  # parts of the head lie inside each other
+            judge = judged(stage, scene, scene.material.mfp, of.setting)
         yield StageDrawing(stage, technique_of, judge)
+
+
+def _scene_of(of: SceneRequest) -> Head:
+    if not of.surface.parts:
+        return head_scene(of.material, of.camera, setting=of.setting)
+    given = of.material
+    what = given.middle(of.setting) if isinstance(given, Painted) else translucent(given, of.setting)
+    most = float(entered(of.setting))
+    parts = tuple(one.part(plain(what.reflectance), ROUGHNESS, most) for one in of.surface.parts)
+    return Head(parts, camera=of.camera, material=what)
 
 
 drawer = Drawer(opened, ({"kind": SEPARABLE}, {"kind": NONE}, {"kind": SAMPLED}))

@@ -80,7 +80,7 @@ class Drawer:
             judge = drawing.judge
             assert judge is not None
             chart = drawing.points(small, small.numbers)
-            shot = drawing.shot(small, TURNS)
+            shot = drawing.shot(small, TURNS if small.size == of.size else 0)
             result = judge.result(shot, chart, samples, self.light)
             others = [self._rival(drawing, judge, small, one) for one in rivals]
         if small.size == of.size:
@@ -99,6 +99,54 @@ class Drawer:
         other = of.changed(technique=dict(change))
         [point] = drawing.points(other, [other.technique.samples])
         return Rival(point, to_srgb(drawing.shot(other, 0).radiance[::-1], judge.exposure))
+
+
+class RayRender(Protocol):
+    """Render whose pixels are means of rays, by techniques `by` of its scene."""
+
+    def picture(self, by: Any, samples: int) -> Floats:
+        """Return the radiance (h, w, 3) of pixels."""
+
+    def points(self, by: Any, numbers: Sequence[int]) -> list[ChartPoint]:
+        """Return error and cost of each number of samples."""
+
+    def time(self, by: Any, samples: int) -> float:
+        """Return the milliseconds of a picture."""
+
+    def maps(self) -> dict[str, float]:
+        """Draw what comes before the picture, and return the milliseconds of each part."""
+
+
+@dataclass(frozen=True)
+class RayDrawing:
+    """Drawing by a render.
+
+    Attributes:
+        render: of a scene.
+        judge: of radiance.
+        technique: from a request to the technique's name and what the render takes as such.
+        exposure: see `Drawing`.
+    """
+
+    render: RayRender
+    judge: Judge | None
+    technique: Callable[[Any], tuple[str, Any]]
+    exposure: Callable[[Floats], float]
+
+    def shot(self, of: ViewRequest, turns: int) -> Rendering:
+        """See `Drawing`."""
+        (label, by), samples = self.technique(of), of.technique.samples
+        maps = [self.render.maps() for _ in range(turns)]
+        radiance = self.render.picture(by, samples)
+        view = [self.render.time(by, samples) for _ in range(turns)]
+        frame = tuple(sum(before.values()) + own for before, own in zip(maps, view, strict=True))
+        names = maps[0] if maps else {}
+        passes = {name: tuple(one[name] for one in maps) for name in names} | ({"view": tuple(view)} if names else {})
+        return Rendering(label, radiance, frame, passes)
+
+    def points(self, of: ViewRequest, numbers: Sequence[int]) -> list[ChartPoint]:
+        """See `Drawing`."""
+        return self.render.points(self.technique(of)[1], numbers)
 
 
 @dataclass(frozen=True)

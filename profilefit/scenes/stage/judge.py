@@ -15,9 +15,10 @@ from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error, seen
+from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error, wider_error
 from profilefit.scenes.stage.technique import NamedTechnique
-from profilefit.scenes.stage.world import INSIDE
+from profilefit.scenes.stage.whole import whole_elements
+from profilefit.scenes.stage.world import INSIDE, Scene
 
 Bytes = NDArray[np.uint8]
 TURNS = 5
@@ -211,15 +212,33 @@ def points(
     return judge.points(named.label, samples, draw, time, turns)
 
 
-def surface_judge(stage: Stage, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, has_error: bool = True) -> Judge:
-    """Return the judge of the scene that a stage has drawn: the surface integral, all over its pixels.
+def whole_judge(stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | Setting) -> Judge:
+    """Return the judge of a scene that a stage has drawn: the integral over its whole surface, hidden parts included.
 
+    scene  whose parts do not lie inside each other;  mfp, table  see `surface_judge`
+    """
+    buffers, camera = stage.true_buffers(), scene.camera
+    side = camera.pixel(stage.size[1]) * (camera.distance if camera.is_perspective else 1.0)
+    whole, wider = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
+    error = wider_error(buffers, mfp, table, whole, wider)
+    return Judge(exitance_of(buffers, mfp, table, whole), buffers.mask > INSIDE, error)
+
+
+def surface_judge(
+    stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, has_error: bool = True
+) -> Judge:
+    """Return the judge of a scene that a stage has drawn: the surface integral, all over its pixels.
+
+    scene  drawn once more, with pixels of half the side, if the error of the reference is to be estimated
     mfp    of the three channels (3,) [mm];  table  of curves, or the setting of the exact half space
     """
+    error = UNKNOWN
+    if has_error:  # of the sum over pixels alone, without the noise of the screen's occlusion
+        with Stage(stage.context, (2 * stage.size[0], 2 * stage.size[1])) as fine:
+            fine.draw(replace(scene, has_occlusion=False))
+            error = own_error(fine.buffers(), mfp, table)
     buffers = stage.true_buffers()
-    light = exitance_of(buffers, mfp, table)
-    error = own_error(*seen(buffers), light, mfp, table) if has_error else UNKNOWN
-    return Judge(light, buffers.mask > INSIDE, error)
+    return Judge(exitance_of(buffers, mfp, table), buffers.mask > INSIDE, error)
 
 
 def exposure_of(light: NDArray[np.floating], white: float) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.environment import SkyCells, even_cells, even_directions
@@ -19,6 +20,8 @@ from profilefit.scenes.stage.renderer import SUM, Pass, Renderer
 from profilefit.scenes.stage.world import Scene
 
 PATCHES, SIDE = 256, 1024  # of the sky, and texels of a side of their shadow maps
+MOST_POINTS = 1 << 17  # at which the sky is looked at: between more it is interpolated
+NEIGHBOURS, NORMAL = 4, 0.02  # points; a normal's share of a distance, in the radius of the scene
 KEPT = "kept_map"
 ROW = 1024  # points of a row
 
@@ -47,7 +50,18 @@ def sky_irradiance(
 def blocked(
     context: moderngl.Context, scene: Scene, points: Floats, normals: Floats, patches: int = PATCHES, side: int = SIDE
 ) -> Floats:
-    """Return the irradiance (n, 3) of the sky that parts keep from points; arguments of `sky_irradiance`."""
+    """Return the irradiance (n, 3) of the sky that parts keep from points; arguments of `sky_irradiance`.
+
+    Of more than `MOST_POINTS` that many are looked at, and others are between the nearest of these.
+    """
+    if len(points) > MOST_POINTS:
+        scale = NORMAL * sphere(scene)[1]
+        places = np.concatenate([points, scale * normals], axis=1)
+        chosen = np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)
+        known = blocked(context, scene, points[chosen], normals[chosen], patches, side)
+        away, nearest = cKDTree(places[chosen]).query(places, NEIGHBOURS)
+        weight = 1.0 / np.maximum(away, 1e-6 * scale)
+        return np.asarray(np.einsum("nk,nkc->nc", weight / weight.sum(axis=1, keepdims=True), known[nearest]))
     cells, around = sky_cells(scene, patches), sphere(scene)
     rows = -(-len(points) // ROW)
     with Renderer(context, (ROW, rows)) as renderer:

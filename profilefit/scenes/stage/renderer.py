@@ -22,15 +22,16 @@ UNIFORM = re.compile(r"\buniform\s+(?:(?:low|medium|high)p\s+)?\w+\s+([^;]+);")
 # What a fragment does to those before it in its place: it replaces them, only if it is nearer, or is added to them.
 REPLACE, NEAREST, SUM = "replace", "nearest", "sum"
 FLAGS = {REPLACE: moderngl.NOTHING, NEAREST: moderngl.DEPTH_TEST, SUM: moderngl.BLEND}
-ATTRIBUTES = {"position": 3, "normal": 3, "uv": 2}  # numbers of a vertex, in the order of `Mesh.vertices`
+ATTRIBUTES = {"position": 3, "normal": 3, "uv": 2, "tangent": 4}  # numbers of a vertex, in the order of `Mesh.vertices`
 ANISOTROPY = 8.0
 MOST_SENT = 64  # arrays and meshes that stay on the GPU: of more, those are released that were used longest ago
 
 
 class Smooth(NamedTuple):
-    """Image (rows, columns, 3) that is read between its texels and at all levels of detail; u repeats, v does not."""
+    """Image (rows, columns, 3 or 4) that is read between its texels and at all levels of detail; u repeats, v may."""
 
     image: Singles
+    repeats_v: bool = False
 
 
 Read = str | Singles | Smooth | moderngl.Texture
@@ -196,7 +197,7 @@ class Renderer(GpuOwner):
         if isinstance(read, moderngl.Texture):
             return read
         if isinstance(read, Smooth):
-            return self._kept(read.image, lambda: _smooth_texture(self.context, read.image))
+            return self._kept(read.image, lambda: _smooth_texture(self.context, read))
         rows, columns, channels = read.shape
         return self._kept(read, lambda: float_texture(self.context, (columns, rows), channels, read))
 
@@ -284,10 +285,10 @@ def float_texture(
     return texture
 
 
-def _smooth_texture(context: moderngl.Context, image: Singles) -> moderngl.Texture:
-    rows, columns, channels = image.shape
-    texture = float_texture(context, (columns, rows), channels, image)
-    texture.repeat_y = False
+def _smooth_texture(context: moderngl.Context, read: Smooth) -> moderngl.Texture:
+    rows, columns, channels = read.image.shape
+    texture = float_texture(context, (columns, rows), channels, read.image)
+    texture.repeat_y = read.repeats_v
     texture.build_mipmaps()
     texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
     texture.anisotropy = ANISOTROPY

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Refused, Text, words
 from profilefit.scenes.stage.environment import Environment, read_map
+from profilefit.scenes.stage.mesh_file import MeshTable
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb, Scene, unit
@@ -21,6 +22,7 @@ MOST_SIDE = 4096  # of a picture [pixels]
 MOST_PIXELS = 2**21  # of a reference: two minutes on two cores for a head that fills half of them
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
 LARGEST_VIEW = 1000.0  # [mm]
+FAR_OFF, MARGIN = 3.0, 1.2  # distance to a mesh, and height of its view, in its size
 MOST_LIGHT = 1000.0
 
 
@@ -258,6 +260,35 @@ class ViewRequest(Declared):
     def numbers(self) -> list[int]:
         """Numbers of samples of picture and chart, the least first."""
         return sorted({self.technique.samples, *self.technique.chart})
+
+
+class MeshRequest(ViewRequest):
+    """Picture of a head, or of a mesh of one's own."""
+
+    surface: MeshTable = MeshTable()
+
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """Camera of a file that says nothing."""
+        return seen_whole(self.surface.extent) if self.surface.parts else HEAD
+
+    @model_validator(mode="after")
+    def _outside(self) -> Self:
+        require_outside(self, self.surface)
+        return self
+
+
+def seen_whole(extent: float) -> Viewpoint:
+    """Return a camera that sees all of a mesh of so large a box, from the front [mm]."""
+    return Viewpoint((0.0, 0.0, 0.0), max(NEAREST, FAR_OFF * extent), (0.0, 0.0, 1.0), MARGIN * extent)
+
+
+def require_outside(of: ViewRequest, surface: MeshTable) -> None:
+    """Refuse a camera inside the box around a mesh."""
+    eye = np.abs(of.camera.eye)
+    if surface.parts and np.all(eye < 0.5 * surface.extent):
+        accepted = f"so long that the eye is outside the mesh, {surface.extent:.4g} mm large"
+        raise Refused(accepted, of.camera.distance, "camera", "distance")
 
 
 def draw_lit(stage: Stage, scene: Scene, file: str) -> None:

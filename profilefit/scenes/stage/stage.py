@@ -37,13 +37,15 @@ from profilefit.scenes.stage.lighting import (
 )
 from profilefit.scenes.stage.occlusion import PATCHES, sky_irradiance
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import NEAREST, GpuOwner, Pass, Read, Renderer, Smooth
+from profilefit.scenes.stage.renderer import NEAREST, POINTS, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
 from profilefit.scenes.stage.world import (
+    EVEN,
     INSIDE,
     PLACE,
     SURFACE,
     Buffers,
+    Mesh,
     Part,
     Scene,
     Singles,
@@ -56,6 +58,7 @@ MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
 PASSES = ("scatter", "frame")
 SIDES = "width", "height"
 SHADOW_SIDE = 2048  # texels of a side of a shadow map
+COLUMNS = 2048  # of points that are drawn
 LEAST, MOST = np.nextafter(0.0, 1.0), np.finfo(float).max  # lengths > 0, finite
 
 
@@ -93,19 +96,36 @@ class Stage(GpuOwner):
         inset  share of the maps that u and v from 0 to 1 take [-];  has_sky  whether irradiance has the sky's light
         InputError on a part of another scene.
         """
-        self._alive()
-        if self._scene is None or not any(one is part for one in self._scene.parts):
-            raise InputError("part must be one of the scene last drawn, got another one")
-        scene, here = self._scene, np.eye(4)
-        values = {**self._lit(scene), "view": here, "inset": inset}
-        passes = [_surface("atlas", part, self.renderer.map(SHADOWS[0]), values, clear=0.0)]
-        for lamp in other_lamps(scene, self._shadow_side):
-            passes.append(lamp_pass(lamp, self.renderer.map(lamp.shadow), here))
-        if scene.has_sky and has_sky:
+        values = {**self._light_on(part), "inset": inset}
+        passes = [_surface("atlas", part, self.renderer.map(SHADOWS[0]), values, clear=0.0), *self._lamps()]
+        scene = self._scene
+        if scene is not None and scene.has_sky and has_sky:
             seen, open_share = (self.renderer.map(name) for name in ("position_map", OCCLUSION))
             screen = screen_uniforms(scene.camera, self.size)
-            passes.append(ambient_pass(scene, screen, {"seen_map": seen, OCCLUSION: open_share}, here))
+            passes.append(ambient_pass(scene, screen, {"seen_map": seen, OCCLUSION: open_share}, np.eye(4)))
         return passes
+
+    def irradiance(self, part: Part, points: Mesh) -> Floats:
+        """Return the irradiance (n, 3) at the vertices of a mesh, which lie on a part of the scene last drawn [-].
+
+        It is a reference's: the light of the sky is that of `sky`.
+        """
+        count = len(points.position)
+        columns = min(count, COLUMNS)
+        size = columns, -(-count // columns)
+        drawn = replace(points, triangles=np.arange(count, dtype=np.int32))
+        values = {**self._light_on(part), "sides": tuple(map(float, size))}
+        with Renderer(self.context, size) as renderer:
+            shadow, lit = self.renderer.map(SHADOWS[0]), replace(part, mesh=drawn)
+            renderer.run(_surface("points", lit, shadow, values, shape=POINTS, clear=0.0), *self._lamps())
+            names = IRRADIANCE, "position_map", "normal_map"
+            light, where, normals = (renderer.read(name).reshape(-1, 4)[:count, :3].astype(float) for name in names)
+        return light + self.sky(where, normals)
+
+    def _lamps(self) -> list[Pass]:
+        """Return passes that add lamps beside the first to maps of places in the world."""
+        lamps = () if self._scene is None else other_lamps(self._scene, self._shadow_side)
+        return [lamp_pass(lamp, self.renderer.map(lamp.shadow), np.eye(4)) for lamp in lamps]
 
     def upload(self, buffers: Buffers) -> None:
         """Take a G-buffer of numpy arrays in place of a scene; no light shines then, and `render` has no highlights."""
@@ -231,6 +251,13 @@ class Stage(GpuOwner):
     def _lit(self, scene: Scene) -> dict[str, Any]:
         return lamp_uniforms(sphere(scene), scene.light, self._shadow_side)
 
+    def _light_on(self, part: Part) -> dict[str, Any]:
+        """Return uniforms of the light on a part of the scene last drawn, in the world. InputError on another part."""
+        self._alive()
+        if self._scene is None or not any(one is part for one in self._scene.parts):
+            raise InputError("part must be one of the scene last drawn, got another one")
+        return {**self._lit(self._scene), "view": np.eye(4)}
+
     def _seen(self, pixel: float, is_perspective: bool, scene: Scene | None) -> None:
         self._view, self._scene, self._mean_reflectance = (pixel, is_perspective), scene, None
 
@@ -290,6 +317,12 @@ def _three(name: str, value: ArrayLike, accepted: str, low: float, high: float) 
 
 def _surface(vertex: str, part: Part, shadow: Read, values: dict[str, Any], **more: Any) -> Pass:
     own = {"translucent": float(part.is_translucent), "roughness": part.roughness}
-    reads: dict[str, Read] = {"skin": Smooth(part.reflectance), "shadow_map": shadow}
+    v = part.mesh.uv[:, 1]
+    tiles = v.size > 0 and (float(v.min()) < 0.0 or float(v.max()) > 1.0)
+    reads: dict[str, Read] = {
+        "skin": Smooth(part.reflectance, tiles),
+        "relief": Smooth(EVEN if part.relief is None else part.relief, tiles),
+        "shadow_map": shadow,
+    }
     fragment, source = text("shadow.glsl", "surface.frag"), text(f"{vertex}.vert")
     return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, source, part.mesh, **more)

@@ -1,7 +1,7 @@
 """Surface that a view sees, and the reference of a screen-space gather over it.
 
 The G-buffer of a render as float64 arrays, the patch that each pixel shows, and the exact profile summed over the
-whole visible surface, offline:
+whole visible surface, offline, or over elements of the whole surface:
 
     L_c(o) = A_c(o) sum_i W_ci E_c(i) / sum_i W_ci,   W_ci = int over the surface in pixel i of R_d(|P - P_o|) / A_c dS
 
@@ -38,6 +38,7 @@ FORWARD = np.array([0.0, 0.0, -1.0])
 LEAST_COSINE = 0.05
 # A point may lie so many pixels off the one that shows it, over the cosine of normal and ray, that at least.
 SHOWN, LEAST_SHOWN = 1.5, 0.25
+CHECKED = 60  # pixels at which the reference is compared with one of half the pixel
 # Gaussians of a profile: ratio of neighbouring widths, the narrowest in its mean free paths or in pixels, the widest in
 # its mean free paths, or as wide as the surface; and values of the surface's reflectance whose weights are fitted.
 RATIO, NARROWEST, OF_PIXEL, WIDEST, VALUES = 1.5, 0.001, 0.1, 60.0, 65
@@ -153,13 +154,19 @@ class Gathered:
 
 
 def gathered(
-    surface: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, pixels: ArrayLike | None = None
+    surface: Surface,
+    view: View,
+    mfp: ArrayLike,
+    table: CurveTable | Setting = DIFFUSE,
+    pixels: ArrayLike | None = None,
+    whole: Elements | None = None,
 ) -> Gathered:
     """Return the reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 
     mfp  of the three channels (3,), in the unit of the positions
     table  of the curves, by the surface's `reflectance`; of a setting, that of the exact half space by A
-    Raises InputError; SettingError of a setting with g. A picture of 1280 x 720 takes about a minute on two cores.
+    whole  elements from which light is gathered, in view space, in place of those that are seen
+    Raises InputError; SettingError of a setting with g. `benchmarks.render reference` prints what a picture takes.
     """
     lengths = np.asarray(mfp, float)
     are_lengths = lengths.shape == (3,) and np.all((lengths > 0) & np.isfinite(lengths))
@@ -169,7 +176,7 @@ def gathered(
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     if not len(chosen):
         return Gathered(*np.zeros((2, *(surface.mask.shape if pixels is None else (0,)), 3)))
-    elements = surface.elements(view)
+    elements = surface.elements(view) if whole is None else whole
     at, own, values = (value[tuple(chosen.T)] for value in (surface.position, surface.irradiance, surface.reflectance))
     sums = CurveSums.fitted(curves, values, lengths, elements)
     light, share = np.zeros((2, *values.shape))
@@ -185,9 +192,26 @@ def gathered(
     return Gathered(*full)
 
 
-def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
+def refined(
+    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Return light at pixels (m, 2) of a coarser view, from a surface twice as fine, and the error without it.
+
+    view  the fine one. -> the means of the fine light over each pixel (m, 3), and the coarse light less these (m, 3):
+    an estimate of the error of the coarse one, and a bound for that of the fine one.
+    """
+    coarse, wide = fine.coarsened(2), view._replace(pixel=2 * view.pixel)
+    chosen = _chosen(coarse, pixels)
+    parts = (2 * chosen[:, None] + [(0, 0), (0, 1), (1, 0), (1, 1)]).reshape(-1, 2)
+    mean = gathered(fine, view, mfp, table, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
+    return mean, gathered(coarse, wide, mfp, table, chosen).light - mean
+
+
+def exitance_of(
+    buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE, whole: Elements | None = None
+) -> Floats:
     """Return radiant exitance (h, w, 3) in diffuse light: the reference; Lambert's where nothing scatters."""
-    light = gathered(*seen(buffers), mfp, table).light
+    light = gathered(*seen(buffers), mfp, table, whole=whole).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
@@ -213,16 +237,28 @@ class TruthError(NamedTuple):
 UNKNOWN = TruthError(np.nan, np.nan, np.nan)
 
 
-def own_error(surface: Surface, view: View, light: Floats, mfp: ArrayLike, table: CurveTable | Setting) -> TruthError:
-    """Return what twice the pixel's side changes in `light` (h, w, 3) of `gathered`: a bound of its error."""
-    rows, columns = (side - side % 2 for side in surface.mask.shape)
-    position, normal, irradiance, reflectance = (value[:rows, :columns] for value in surface[:4])
-    coarse = Surface(position, normal, irradiance, reflectance, surface.mask[:rows, :columns]).coarsened(2)
-    if not coarse.mask.any():
+def wider_error(
+    buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting, whole: Elements, wider: Elements
+) -> TruthError:
+    """Return what elements of twice the side change in `exitance_of`, at some pixels: a bound of its error."""
+    surface, view = seen(buffers)
+    chosen = np.stack(evenly(surface.mask, CHECKED), axis=1)
+    light, other = (gathered(surface, view, mfp, table, chosen, one).light for one in (whole, wider))
+    return TruthError.of(np.abs(other - light) / np.mean(light))
+
+
+def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:
+    """Return what half the pixel's side changes in `exitance_of`, at some pixels of a picture of even size.
+
+    fine  the same picture with pixels of half the side
+    """
+    surface, view = seen(fine)
+    inside = np.argwhere(surface.coarsened(2).mask)
+    if not len(inside):
         return UNKNOWN
-    mean = averaged(light[:rows, :columns], 2)[coarse.mask]
-    wide = gathered(coarse, view._replace(pixel=2 * view.pixel), mfp, table).light[coarse.mask]
-    return TruthError.of(np.abs(wide - mean) / np.mean(mean))
+    chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
+    mean, difference = refined(surface, view, mfp, table, chosen)
+    return TruthError.of(np.abs(difference) / np.mean(mean))
 
 
 class CurveSums(NamedTuple):

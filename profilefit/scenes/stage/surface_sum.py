@@ -37,7 +37,7 @@ MERGED = 0.3  # side of the cubes in which elements are merged [sigma]
 LOCAL, POINT = 0.2, 0.6
 RULE = ((0.35, 6), (0.6, 4), (1.5, 2))
 # The same where elements are few: pixels are wide then, and narrow Gaussians have more of the light.
-FEW, FINE_RULE = 2**16, ((0.35, 8), (0.8, 6), (5.0, 2))
+FEW, FINE_RULE, FINE_MERGED = 2**16, ((0.35, 8), (0.8, 6), (5.0, 2)), 0.1
 LONGEST = 1.5  # side of an element, in the typical one: longer ones are cut
 # Points that gather together, at least, and where elements are merged; most elements of a row; pairs of a call.
 TOGETHER, MANY, LISTED, AT_ONCE = 16, 64, 256, 2**22
@@ -46,14 +46,14 @@ RINGS, FLOOR = 360, 1e-5  # of a profile that Gaussians are fitted to; least sha
 
 
 class Elements(NamedTuple):
-    """Surface in parallelograms.
+    """Surface in parallelograms, or in triangles.
 
     Attributes:
         points: (n, 3) of their middles [length].
         areas: (n,) [length^2].
         irradiance: (n, c) [any unit].
         spacing: their typical side [length].
-        sides: (2, n, 3), the sides of each [length]; None where they are not known.
+        sides: (2, n, 3), two sides of each [length]; None where they are not known.
         spread: (n,) variance of each along the surface [length^2]; 0 where it is a point.
         shift: (n, 3) from the middle to the middle of the light, where elements were merged [length].
     """
@@ -65,6 +65,15 @@ class Elements(NamedTuple):
     sides: Floats | None = None
     spread: Floats | float = 0.0
     shift: Floats | None = None
+    are_triangles: bool = False
+
+    @classmethod
+    def of_triangles(cls, points: Floats, sides: Floats, irradiance: Floats) -> Elements:
+        """Return triangles by their centroids and two sides that begin at one corner."""
+        (a, b), areas = sides, 0.5 * np.linalg.norm(np.cross(*sides), axis=1)
+        spread = (np.sum(a * a, axis=1) + np.sum(b * b, axis=1) - np.sum(a * b, axis=1)) / 36.0
+        spacing = float(np.sqrt(np.average(areas, weights=areas)))  # few large ones are most of the surface
+        return cls(points, areas, irradiance, spacing, sides, spread, None, True)
 
     @classmethod
     def of_sides(cls, points: Floats, sides: Floats, irradiance: Floats) -> Elements:
@@ -112,18 +121,20 @@ def gaussian_sums(
         at: (m, 3) points that gather [length].
         own: (m, c) irradiance there, which local Gaussians leave there.
         sigmas: standard deviations [length].
-        merged: side of the cubes in which elements are merged [sigma]. On a sphere of radius R, merged elements lie
-            inside, so that the sums are too large by (merged sigma / R)^2 / 12.
+        merged: side of the cubes in which elements are merged [sigma]; `FINE_MERGED` at most where they are few. On a
+            sphere of radius R, merged elements lie inside, so that the sums are too large by (merged sigma / R)^2 / 12.
     """
     local = LOCAL if elements.sides is not None else POINT
     centre = elements.points.mean(axis=0)
-    near = elements._replace(points=elements.points - centre)
-    groups = _groups(at - centre)
+    middle = 0.5 * (elements.irradiance.min(axis=0) + elements.irradiance.max(axis=0))
+    near, places = elements._replace(points=elements.points - centre), at - centre
+    groups = _groups(places)
     for sigma in sigmas:
-        if sigma <= local * elements.spacing:
-            yield np.concatenate([np.ones((len(at), 1)), own], axis=1)
-        else:
-            yield _sums(near, at - centre, own, groups, float(sigma), merged)
+        found = np.concatenate([np.ones((len(at), 1)), own - middle], axis=1)
+        if sigma > local * elements.spacing:
+            _add_sums(found, near, middle, places, groups, float(sigma), merged)
+        found[:, 1:] += middle * found[:, :1]
+        yield found
 
 
 def gaussian_weights(edges: Floats, shares: Floats, variances: Floats) -> Floats:
@@ -152,11 +163,14 @@ def _groups(points: Floats) -> NDArray[np.intp]:
     return np.concatenate([groups, np.repeat(groups[:, -1:], TOGETHER - groups.shape[1], axis=1)], axis=1)
 
 
-def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp], sigma: float, merged: float) -> Floats:
-    """Return the sums of one Gaussian (m, 1 + c)."""
-    rule = FINE_RULE if len(elements.points) < FEW else RULE
+def _add_sums(
+    sums: Floats, elements: Elements, middle: Floats, at: Floats, groups: NDArray[np.intp], sigma: float, merged: float
+) -> None:
+    """Write the sums of one Gaussian (m, 1 + c), of 1 and of irradiance - middle, where they are not local."""
+    rule, most_merged = (FINE_RULE, FINE_MERGED) if len(elements.points) < FEW else (RULE, merged)
     count = next((points for most, points in rule if sigma < most * elements.spacing), 1)
-    parts = elements.within(merged * sigma) if count == 1 or elements.sides is None else elements
+    count = 1 if elements.sides is None else count
+    parts = elements if count > 1 else elements.within(min(merged, most_merged) * sigma)
     # As many groups as one as are no wider than the Gaussian.
     extent = float(np.median(np.linalg.norm(np.ptp(at[groups], axis=1), axis=1)))
     joined = int(np.clip(2.0 * np.log2(max(2.0 * sigma / max(extent, 1e-30), 1.0)), 0, 7))
@@ -166,21 +180,21 @@ def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp],
     low, high = places.min(axis=1), places.max(axis=1)
     radius = 0.5 * np.linalg.norm(high - low, axis=1) + REACH * sigma + (parts.spacing if count > 1 else 0.0)
     near = cKDTree(parts.points).query_ball_point(0.5 * (low + high), radius, workers=-1)
-    result = np.concatenate([np.ones((len(at), 1)), own], axis=1)
     if count > 2:
         wide, near = _uneven(elements.irradiance, wide, near)
         places = at[wide]
     if not len(wide):
-        return result
+        return
     rows, listed = _rows(near, len(parts.points))
     # Elements that are taken at their middle lack the variance that they have along the surface.
     variance = np.broadcast_to(sigma**2 + (parts.spread if count == 1 else 0.0), parts.areas.shape)
-    power = np.concatenate([parts.areas[:, None], parts.areas[:, None] * parts.irradiance], axis=1)
-    sides = parts.sides if count > 1 and parts.sides is not None else ()
-    power = np.concatenate([0.5 / variance[:, None], power / (2.0 * np.pi * variance[:, None])], axis=1)
-    values = parts.points, power, *(() if parts.shift is None else (parts.shift,)), *sides
+    share = (parts.areas / (2.0 * np.pi * variance))[:, None]
+    # Differences from the middle, so that even light stays even whatever rounding does to the sums.
+    power = np.concatenate([0.5 / variance[:, None], share, share * (parts.irradiance - middle)], axis=1)
+    more = () if parts.shift is None else (parts.shift, share * parts.irradiance)
+    values = parts.points, power, *(more if count == 1 or parts.sides is None else parts.sides)
     surface = tuple(jnp.asarray(np.pad(value, ((0, 1), (0, 0))), jnp.float32) for value in values)
-    found = np.empty((len(rows), wide.shape[1], result.shape[1]), np.float32)
+    found = np.empty((len(rows), wide.shape[1], sums.shape[1]), np.float32)
     step = max(AT_ONCE // (listed.shape[1] * wide.shape[1]), 1)
 
     def some(first: int) -> None:
@@ -188,14 +202,13 @@ def _sums(elements: Elements, at: Floats, own: Floats, groups: NDArray[np.intp],
         given, here = listed[of], places[rows[of]].astype(np.float32)
         spare = ((0, step - len(given)), (0, 0))
         full = np.pad(given, spare, constant_values=len(parts.points))
-        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count)
+        lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count, elements.are_triangles)
         found[of] = np.asarray(lit)[: len(given)]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(some, range(0, len(rows), step)))
     starts = np.searchsorted(rows, np.arange(len(wide)))
-    result[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, result.shape[1])
-    return result
+    sums[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, sums.shape[1])
 
 
 def _uneven(light: Floats, groups: NDArray[np.intp], near: NDArray[np.object_]) -> tuple[NDArray[np.intp], Any]:
@@ -220,19 +233,26 @@ def _rows(near: NDArray[np.object_], nothing: int) -> tuple[NDArray[np.intp], ND
     return np.repeat(np.arange(len(near)), counts), rows
 
 
-@partial(jax.jit, static_argnames="count")
-def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], count: int) -> Array:
+@partial(jax.jit, static_argnames=("count", "are_triangles"))
+def _pairs(
+    surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], count: int, are_triangles: bool = False
+) -> Array:
     """Return sums (rows, points, 1 + c) of each row's elements at its points.
 
     Args:
-        surface: middle (n, 3) of elements, 1 / 2 variance and power (n, 1 + 1 + c), the last of no power; then their
-            shift (n, 3) where they were merged, or their two sides (n, 3) where each has count x count Gauss points.
+        surface: middle (n, 3) of elements, 1 / 2 variance, power of 1 and of light less its middle (n, 1 + 1 + c), the
+            last of no power. Then, where elements were merged, their shift (n, 3) and the power of light (n, c); or
+            their two sides (n, 3) where each has count x count Gauss points.
         at: points (rows, points, 3).
         listed: elements (rows, length).
         count: of Gauss points along a side.
+        are_triangles: whether the sides are two of a triangle's.
     """
     rule = list(zip(*np.polynomial.legendre.leggauss(count), strict=True))
     grid = [(0.5 * a, 0.5 * b, 0.25 * u * v) for a, u in rule for b, v in rule]
+    if are_triangles:  # the square is folded onto the triangle; both are about their middle
+        corner = [(0.5 + a, (0.5 - a) * (0.5 + b), 2.0 * (0.5 - a) * share) for a, b, share in grid]
+        grid = [(a - 1.0 / 3.0, b - 1.0 / 3.0, share) for a, b, share in corner]
 
     def row(given: tuple[Array, Array]) -> Array:
         places, of = given
@@ -245,13 +265,14 @@ def _pairs(surface: tuple[Array, ...], at: Singles, listed: NDArray[np.int32], c
         def light(place: Array) -> Array:
             return jnp.exp(rate * (2.0 * here @ place.T - from_here - jnp.sum(place**2, axis=1)))
 
-        if len(more) == 2:
+        if count > 1:
             side, other = more
             return sum(share * light(middle + a * side + b * other) for a, b, share in grid) @ power
         whole = light(middle)
         if not more:
             return whole @ power
-        tilt = 1.0 + 2.0 * rate * (here @ more[0].T - jnp.sum(middle * more[0], axis=1))
-        return jnp.concatenate([whole @ power[:, :1], (whole * tilt) @ power[:, 1:]], axis=1)
+        shift, whole_power = more
+        tilt = 2.0 * rate * (here @ shift.T - jnp.sum(middle * shift, axis=1))
+        return whole @ power + jnp.pad((whole * tilt) @ whole_power, ((0, 0), (1, 0)))
 
     return jax.lax.map(row, (at, listed))

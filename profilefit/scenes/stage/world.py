@@ -18,6 +18,8 @@ from mcml_sim.media.arrays import Floats, checked_finite, require, require_all
 from profilefit.errors import InputError
 from profilefit.scenes.stage.environment import Environment
 
+ROUGHNESS = 0.42  # of skin, GGX [-]
+EVEN = np.array([[[0.0, 0.0, 1.0, 1.0]]], np.float32)  # relief of a part that has none
 Rgb = tuple[float, float, float]
 Singles = NDArray[np.float32]
 VECTORS = ("irradiance", "reflectance", "position", "normal")
@@ -73,29 +75,38 @@ class Camera:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Mesh of position (n, 3) [mm], normal (n, 3), uv (n, 2) in [0, 1], triangles (m, 3) counter-clockwise outside."""
+    """Mesh of position (n, 3) [mm], normal (n, 3), uv (n, 2) in [0, 1], triangles (m, 3) counter-clockwise outside.
+
+    tangent  (n, 4) direction in which u grows, and 1 or -1, by which v grows along normal x tangent; where it is 0, as
+             by default, the part has no relief
+    """
 
     position: Floats
     normal: Floats
     uv: Floats
     triangles: NDArray[np.int32]
+    tangent: Floats | None = None
 
     def vertices(self) -> NDArray[np.float32]:
-        """Return (n, 8) position, normal, uv, as a vertex buffer holds them."""
-        return np.concatenate([self.position, self.normal, self.uv], axis=1).astype(np.float32)
+        """Return (n, 12) position, normal, uv, tangent, as a vertex buffer holds them."""
+        tangent = np.zeros((len(self.position), 4)) if self.tangent is None else self.tangent
+        return np.concatenate([self.position, self.normal, self.uv, tangent], axis=1).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class Part:
-    """A mesh with its reflectance A (rows, columns, 3) over u and v, and its GGX roughness [-].
+    """Mesh with its reflectance A (rows, columns, 3) over u and v, and its GGX roughness [-].
 
     is_translucent  light scatters inside; else it is Lambert's
+    relief  (rows, columns, 4) over u and v: normals along tangent, across it and along the normal, and a factor of the
+            roughness
     """
 
     mesh: Mesh
     reflectance: NDArray[np.float32]
-    roughness: float = 0.42
+    roughness: float = ROUGHNESS
     is_translucent: bool = True
+    relief: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -198,7 +209,7 @@ class Buffers:
             self.thickness,
             ones if self.visibility is None else self.visibility,
             self.mask,
-            0.42 * ones if self.roughness is None else self.roughness,
+            ROUGHNESS * ones if self.roughness is None else self.roughness,
         )
         return {
             name: np.concatenate([getattr(self, vector), last[..., None]], axis=-1).astype(np.float32)

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -493,6 +494,41 @@ def toml(path: str) -> Callable[[int], bytes]:
 def tree(path: str) -> Callable[[int], bytes]:
     """Return what mutates a .json of the repository."""
     return lambda seed: json_mutant(random.Random(seed), json.loads(_text(path)))
+
+
+@cache
+def _mesh(kind: str) -> bytes:
+    """Return a small ball with a texture and a normal map, as a file of a kind."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(1, 10.0)
+    pixels = Image.fromarray(np.arange(192, dtype=np.uint8).reshape(8, 8, 3))
+    look = trimesh.visual.material.PBRMaterial(baseColorTexture=pixels, normalTexture=pixels, roughnessFactor=0.3)
+    uv = 0.05 * (ball.vertices[:, :2] + 10.0)
+    textured = trimesh.Trimesh(ball.vertices, ball.faces, process=False)
+    textured.visual = trimesh.visual.TextureVisuals(uv=uv, material=look)
+    made = textured.export(file_type="glb") if kind == "glb" else ball.export(file_type=kind)
+    return made.encode() if isinstance(made, str) else bytes(made)
+
+
+def mesh(kind: str) -> Callable[[int], bytes]:
+    """Return what mutates a mesh file: bytes of any kind; of a GLB the JSON in every other one."""
+
+    def mutant(seed: int) -> bytes:
+        rng, data = random.Random(seed), _mesh(kind)
+        if kind == "obj" and seed % 2:
+            return text_mutant(
+                rng, data.decode(), ("f", "v", "vt", "vn", "usemtl", *NUMBERS), ("f 1 2 3", "mtllib a.mtl")
+            )
+        if kind != "glb" or seed % 2 == 0:
+            return damaged(rng, data)
+        (length,) = struct.unpack("<I", data[12:16])
+        header = json_mutant(rng, json.loads(data[20 : 20 + length]))
+        header += b" " * (-len(header) % 4)
+        rest = data[20 + length :]
+        return data[:8] + struct.pack("<III", 20 + len(header) + len(rest), len(header), 0x4E4F534A) + header + rest
+
+    return mutant
 
 
 def recipe(seed: int) -> bytes:

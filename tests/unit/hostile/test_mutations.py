@@ -53,6 +53,7 @@ from profilefit.report.tables.claims_table import read_claims
 from profilefit.scenes import SCENES
 from profilefit.scenes.heart import scene as heart
 from profilefit.scenes.skin import scene as skin
+from profilefit.scenes.stage.mesh_file import read_mesh
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
 from profilefit.studies.choose import requirements
@@ -126,6 +127,7 @@ def read_heart(path: Path) -> object:
         return heart.read(str(path), read_toml(path))
 
 
+MESHES = "glb", "obj", "ply", "stl"
 SAMPLES = mutations.arrays("fits/albedo-rational.npz")  # beside a record
 # Kind -> the ending of its files, what mutates it, and all that reads it.
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
@@ -140,6 +142,7 @@ KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], objec
     "heart": (".toml", mutations.toml("examples/heart.toml"), (read_heart,)),
     "sea": (".toml", mutations.toml("examples/sea.toml"), (read_scene("sea"),)),
     "fur": (".toml", mutations.toml("examples/fur.toml"), (read_scene("fur"),)),
+    **{f"mesh-{one}": (f".{one}", mutations.mesh(one), (lambda path: read_mesh(path, 1.0),)) for one in MESHES},
     "photo": (".toml", mutations.toml("examples/photo.toml"), (read_setup,)),
     "recipe": (".toml", mutations.recipe, (recipe.read,)),
     "stack": (".toml", mutations.toml("fits/stacks/skin.toml"), (lambda path: stack.request(str(path)),)),

@@ -193,7 +193,7 @@ def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, mon
             drawn = scene.draw(context, request.changed(pose=pose, technique={"kind": kind}))
             errors[pose, kind] = drawn.point.rmse
             assert drawn.picture.shape == drawn.truth.shape == (72, 96, 3)
-            assert drawn.truth_error.rms < 0.05
+            assert drawn.truth_error.rms < 0.01
             assert drawn.point.samples == 64
     stack, dipole = (np.array([errors[pose, kind] for pose in scene.POSES]) for kind in ("stack", "dipole"))
     assert np.all(stack < 0.02), errors
