@@ -80,6 +80,7 @@ def scene(
         require_writable(path)
     body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
     bodies: list[dict[str, Any]] = []
+    sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
         device = renderer(context)
         for moment, name in zip(moments, stems, strict=True):
@@ -89,10 +90,13 @@ def scene(
             files: dict[Path, bytes | str] = {Path(f"{name}{end}.png"): png for end, png in figures.items()}
             if moment is moments[-1]:
                 body |= bodies[0] if frames is None else {"frames": bodies}
+                body |= {} if sky is None else {"environment": {"harmonics_error": sky.error._asdict()}}
                 files[numbers] = json_text(body)
             write_together(files)
             for line in () if as_json else report.scene_lines(drawn, device):
                 screen().print(line, markup=False, soft_wrap=True)
+    if sky is not None and not as_json:
+        screen().print(report.sky_line(sky), markup=False, soft_wrap=True)
     if as_json:
         print_json(body)
     last = "" if frames is None else f" to {stems[-1]}.png"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
 from profilefit.report.tables.cells import significant
+from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.judge import ChartPoint, RenderResult, SceneImage
 
 LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
@@ -148,6 +149,12 @@ def scene_lines(drawn: SceneImage, device: str) -> Iterator[str]:
     rows, columns = judged.truth.shape[:2]
     yield f"errors, at {columns} x {rows} pixels, are root mean squares of {judged.of}, over its mean"
     yield f"times are of {device}"
+
+
+def sky_line(sky: Environment) -> str:
+    """Return the line with the error of an environment's harmonics."""
+    rms, most = (significant(100.0 * one) for one in sky.error)
+    return f"irradiance of the environment by nine harmonics: error {rms} % rms, {most} % at most, over its mean"
 
 
 def content(drawn: SceneImage, device: str) -> dict[str, Any]:

@@ -14,12 +14,15 @@ more. Clipped pixels and their neighbours do not count, nor does what spills alo
 from __future__ import annotations
 
 import importlib
+import io
 import os
+import re
+import stat
 import struct
 import warnings
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -37,6 +40,9 @@ from profilefit.materials import CHANNELS
 Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
+# Of a Radiance file: its first line, its kind of numbers, and the line of its size, after an empty one.
+RADIANCE, XYZ, SIZE = (b"#?RADIANCE", b"#?RGBE"), b"32-bit_rle_xyze", re.compile(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n")
+LONGEST_HEADER = 1 << 16  # of a Radiance file [bytes]
 MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
 GREY = "grey"
 PLATEAU, BELOW = 12, 0.98  # pixels that share the largest value where it clips, of it, others just below
@@ -101,6 +107,52 @@ def read(path: Path) -> Exposure:
         return _raw(path) if kind in RAW else _plain(path, kind)
 
 
+def radiance(path: Path, most_bytes: int, largest: tuple[int, int]) -> Plane:
+    """Return the values (rows, columns, 3) of a Radiance file (.hdr) or an EXR, as they are; its opacity is left out.
+
+    most_bytes, largest  bounds of the file, and of its columns and rows, which are looked at before pixels are read
+    InputError in one line.
+    """
+    try:
+        status = path.stat()
+        is_regular, size = stat.S_ISREG(status.st_mode), status.st_size
+        content = path.read_bytes() if is_regular and 0 < size <= most_bytes else b""
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if not content:
+        got = f"{size} bytes" if is_regular else "no regular file"
+        raise InputError(f"{path}: expected a file of 1 byte to {most_bytes >> 20} MiB, got {got}")
+    with _silent():
+        return _exr_radiance(path, largest) if path.suffix.lower() in EXR else _rgbe(path, content, largest)
+
+
+def _exr_radiance(path: Path, largest: tuple[int, int]) -> Plane:
+    values = _exr(path, largest)
+    if values.ndim != 3 or values.shape[2] not in (3, 4) or values.dtype not in (np.float32, np.float16):
+        got = f"{values.dtype} of shape {values.shape}"
+        raise InputError(f"{path}: expected floats of red, green and blue, got {got}")
+    return np.asarray(values[..., :3], np.float32)
+
+
+def _rgbe(path: Path, content: bytes, largest: tuple[int, int]) -> Plane:
+    header = content[:LONGEST_HEADER]
+    size = SIZE.search(header)
+    if not header.startswith(RADIANCE) or size is None or XYZ in header[: size.start()]:
+        raise InputError(f"{path}: expected a Radiance file of RGBE, with -Y rows +X columns, got another one")
+    _require_within(path, int(size[2]), int(size[1]), largest)
+    cv2 = library("cv2")
+    with _refused(path, "a Radiance file", cv2.error, *DAMAGED):
+        values = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if values is None or values.ndim != 3 or values.shape[2] != 3:
+        raise InputError(f"{path}: cannot be read as a Radiance file: it is damaged")
+    return np.asarray(values[..., ::-1], np.float32)
+
+
+def _require_within(path: Path, columns: int, rows: int, largest: tuple[int, int]) -> None:
+    if not (0 < columns <= largest[0] and 0 < rows <= largest[1]):
+        raise InputError(f"{path}: expected 1 ... {largest[0]} x {largest[1]} pixels, got {columns} x {rows}")
+
+
 def _raw(path: Path) -> Exposure:
     rawpy = library("rawpy")
     with _refused(path, "a raw file", rawpy.LibRawError), rawpy.imread(str(path)) as raw:
@@ -119,11 +171,12 @@ def _raw(path: Path) -> Exposure:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Silence standard error, to which libraries write what their errors say again."""
+    """Silence what libraries write that their errors say again: to standard error, and to Python's output."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
@@ -200,15 +253,7 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             _require_size(path, int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel))
             return np.asarray(page.asarray())
     if kind in EXR:
-        exr = library("OpenEXR")
-        with _refused(path, "an EXR", StopIteration, *DAMAGED):
-            parts = exr.File(str(path), header_only=True).parts
-            if len(parts) != 1:
-                raise InputError(f"{path}: expected an EXR of one part, got {len(parts)}")
-            (left, top), (right, bottom) = parts[0].header["dataWindow"]
-            _require_size(path, int(right - left) + 1, int(bottom - top) + 1, len(parts[0].header["channels"]))
-            channels = exr.File(str(path)).channels()
-            return np.asarray(next(iter(channels.values())).pixels)
+        return _exr(path)
     try:
         with (
             _refused(path, "a picture", OSError, ValueError, SyntaxError),
@@ -219,6 +264,21 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             return np.asarray(ImageOps.exif_transpose(file).convert("RGB"))
     except Image.DecompressionBombError:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got more") from None
+
+
+def _exr(path: Path, largest: tuple[int, int] | None = None) -> NDArray[Any]:
+    exr = library("OpenEXR")
+    with _refused(path, "an EXR", StopIteration, *DAMAGED):
+        parts = exr.File(str(path), header_only=True).parts
+        if len(parts) != 1:
+            raise InputError(f"{path}: expected an EXR of one part, got {len(parts)}")
+        (left, top), (right, bottom) = parts[0].header["dataWindow"]
+        columns, rows = int(right - left) + 1, int(bottom - top) + 1
+        if largest is not None:
+            _require_within(path, columns, rows, largest)
+        _require_size(path, columns, rows, len(parts[0].header["channels"]))
+        channels = exr.File(str(path)).channels()
+        return np.asarray(next(iter(channels.values())).pixels)
 
 
 def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
@@ -235,7 +295,7 @@ def library(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError:
         package = PACKAGES[name]
-        raise InputError(f"this photograph needs the package {package}: pip install {package}") from None
+        raise InputError(f"this picture needs the package {package}: pip install {package}") from None
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -14,7 +15,9 @@ from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import LayerTechnique
-from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.environment import Environment
+from profilefit.scenes.stage.lighting import harmonics_of, text
+from profilefit.scenes.stage.renderer import SUM, Pass
 from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance
 from profilefit.scenes.stage.technique import RADIANCE
 from profilefit.scenes.stage.world import Light, Rgb, Singles, unit
@@ -94,7 +97,10 @@ class ShadingTable(Declared):
 
 
 class Coat(NamedTuple):
-    """Light and colour of a ball's fur; density  strands of the skin [1/length^2], colours are reflectances."""
+    """Light and colour of a ball's fur; density  strands of the skin [1/length^2], colours are reflectances.
+
+    more  lamps beside the first;  environment  sky beside the ambient light
+    """
 
     ball: Ball
     density: float
@@ -103,9 +109,19 @@ class Coat(NamedTuple):
     light: Light
     ambient: Rgb
     shading: ShadingTable
+    more: tuple[Light, ...] = ()
+    environment: Environment | None = None
+
+    def shades(self, view: FurView) -> list[Pass]:
+        """Return the passes from `HITS` to the radiance of all lamps, linear."""
+        passes, dark = [self.shade(view)], self._replace(ambient=(0.0, 0.0, 0.0), environment=None)
+        for lamp in self.more:
+            other = dark._replace(light=lamp).shade(view)
+            passes.append(replace(other, uniforms={**other.uniforms, "background": (0.0, 0.0, 0.0)}, kept=SUM))
+        return passes
 
     def shade(self, view: FurView) -> Pass:
-        """Return the pass from `HITS` to the radiance that the eye sees, linear."""
+        """Return the pass from `HITS` to the radiance that the eye sees by the first lamp and the sky, linear."""
         shading, ball = self.shading, self.ball
         table, widest = _occlusion(self)
         peak = lobe_mean(shading.exponents) if shading.normalised else 1.0 / (4.0 * np.pi)
@@ -119,6 +135,7 @@ class Coat(NamedTuple):
             "to_light": _floats(unit(self.light.direction)),
             "irradiance": self.light.irradiance,
             "ambient": self.ambient,
+            "harmonics": harmonics_of(self.environment),
             "colour": self.colour,
             "skin_colour": self.skin,
             "background": BACKGROUND,
@@ -128,7 +145,7 @@ class Coat(NamedTuple):
             "strengths": _floats(np.array(shading.strengths) / peak),
         }
         given.pop("eye")
-        source = strand_text() + text_beside(__name__, "glsl/shade.frag")
+        source = strand_text() + text("harmonics.glsl") + text_beside(__name__, "glsl/shade.frag")
         return Pass("shade", {HITS: HITS, "occlusion_map": table}, RADIANCE, source, given)
 
 

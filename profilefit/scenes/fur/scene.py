@@ -160,7 +160,7 @@ class FurRender(NamedTuple):
         request: of the file.
         renderer: with a pixel a ray.
         surface: of the ball.
-        shade: pass from hits to radiance.
+        shade: passes from hits to radiance.
         view: of the camera.
         fine: (rows, columns, 3) radiance of the reference at each ray, row 0 at the bottom.
         judge: of pixels that see the ball or its fur.
@@ -169,7 +169,7 @@ class FurRender(NamedTuple):
     request: FurRequest
     renderer: Renderer
     surface: FurSurface
-    shade: Pass
+    shade: tuple[Pass, ...]
     view: FurView
     fine: Floats
     judge: Judge
@@ -184,15 +184,15 @@ class FurRender(NamedTuple):
         return self.judge.points(by.name, layers, partial(self.picture, by), partial(self.time, by), turns)
 
     def time(self, by: LayerTechnique, layers: int) -> float:
-        """Return the milliseconds of both passes."""
+        """Return the milliseconds of all passes."""
         return self.renderer.time(*self._passes(by, layers))
 
     def maps(self) -> dict[str, float]:
         """Return nothing: no map is drawn before the picture."""
         return {}
 
-    def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, Pass]:
-        return self.surface.layered(self.view, by, layers), self.shade
+    def _passes(self, by: LayerTechnique, layers: int) -> tuple[Pass, ...]:
+        return self.surface.layered(self.view, by, layers), *self.shade
 
 
 @contextmanager
@@ -201,11 +201,13 @@ def reference_render(context: moderngl.Context, of: FurRequest, has_reference: b
     fur, each = of.fur, of.technique.supersampling
     ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.lean, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
-    shade = Coat(ball, fur.density, fur.colour, fur.skin, of.light, of.ambient, of.shading_table).shade(view)
+    light, colours = of.light_table, (fur.colour, fur.skin)
+    coat = Coat(ball, fur.density, *colours, of.light, of.ambient, of.shading_table, light.lamps, light.sky)
+    shade = tuple(coat.shades(view))
     with Renderer(context, size) as renderer:
         hits = ball.cast(view, size) if has_reference else np.ones((size[1], size[0], 4), np.float32)
         renderer.write(HITS, hits)
-        fine = renderer.image(shade)[..., :3].astype(float)
+        fine = renderer.image(*shade)[..., :3].astype(float)
         mask = averaged((hits[..., 3:] > NOTHING).astype(float), each)[..., 0] > 0
         reference = averaged(fine, each)
         exposure = _exposure(reference[mask])

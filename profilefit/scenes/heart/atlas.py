@@ -68,11 +68,14 @@ class Atlas(GpuOwner):
         columns, rows = self.size
         return 1.0 - 2.0 * self.margin / columns, 1.0 - 2.0 * self.margin / rows
 
-    def draw(self, stage: Unwraps, part: Part) -> None:
-        """Draw irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
+    def draw(self, stage: Unwraps, part: Part, has_sky: bool = True) -> None:
+        """Draw irradiance and place of a part of the scene that the stage has drawn. Links are made the first time.
+
+        has_sky  whether irradiance has the light of the sky, as far as the screen shows what occludes it
+        """
         if self._links is None:
             require_charts(part.mesh)
-        self.renderer.run(stage.unwrapping(part, self.inset))
+        self.renderer.run(*stage.unwrapping(part, self.inset, has_sky))
         if self._links is None:
             place = self.read("position_map")
             inside = place[..., 3] > INSIDE

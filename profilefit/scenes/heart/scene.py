@@ -237,7 +237,7 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
         part = Part(of.mesh, meshes.paint() if of.surface.is_painted else even, of.surface.roughness)
     f0 = normal_reflectance(1.0, n)
     with Stage(context, of.size) as stage:
-        scene = Scene((part,), of.light, of.ambient, of.camera, f0)
+        scene = of.under_light(Scene((part,), camera=of.camera, f0=f0))
         draw_lit(stage, scene, of.file)
         yield stage, scene
 
@@ -285,7 +285,7 @@ def _reference(
         light: of the stack.
         side: of an element [mm].
     """
-    buffers = stage.buffers()
+    buffers = stage.true_buffers()
     places, own = (value[inside].astype(float) for value in (buffers.position, buffers.irradiance))
     elements = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
     sums = [

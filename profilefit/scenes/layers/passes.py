@@ -16,7 +16,8 @@ from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.scenes.layers.law import Plate, single_scattering
-from profilefit.scenes.stage.renderer import Pass
+from profilefit.scenes.stage.lighting import text
+from profilefit.scenes.stage.renderer import SUM, Pass, Read
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, maps
 from profilefit.scenes.stage.world import Singles
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
@@ -98,10 +99,17 @@ class WithSingle(Technique):
     def passes(self, frame: Frame) -> Sequence[Pass]:
         inner = [replace(one, writes=SCATTERED) if one.writes == EXITANCE else one for one in self.by.passes(frame)]
         head = f"#define THICKNESS(surface) ({thickness_text(self.least, self.most)})\n"
-        source = f"{single_text(self.media, name='once')}{head}{text_beside(__name__, 'single.frag')}"
-        reads = maps(SCATTERED, "reflectance_map", "position_map", "normal_map")
-        uniforms = {**frame.light, "perspective": float(frame.is_perspective)}
-        return [*inner, Pass("single", {**reads, "once_table": self.table}, EXITANCE, source, uniforms)]
+        head = f"{single_text(self.media, name='once')}{head}{text_beside(__name__, 'single.glsl')}"
+        surface: dict[str, Read] = {**maps("reflectance_map", "position_map", "normal_map"), "once_table": self.table}
+        perspective = {"perspective": float(frame.is_perspective)}
+        source = head + text_beside(__name__, "single.frag")
+        reads = {**surface, SCATTERED: SCATTERED}
+        passes = [*inner, Pass("single", reads, EXITANCE, source, {**frame.light, **perspective})]
+        for lamp in frame.lamps:
+            source = head + text("shadow.glsl") + text_beside(__name__, "single_lamp.frag")
+            reads, uniforms = {**surface, "shadow_map": lamp.shadow}, {**lamp.uniforms, **perspective}
+            passes.append(Pass("single lamp", reads, EXITANCE, source, uniforms, kept=SUM))
+        return passes
 
     def through(self) -> LawText:
         return self.by.through()

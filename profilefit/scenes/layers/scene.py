@@ -173,7 +173,7 @@ def scene_of(of: LayersRequest) -> Scene:
         return Scene(own, of.light, of.ambient, of.camera, f0)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
     parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
-    return Scene(parts, of.light, of.ambient, of.camera, f0)
+    return of.under_light(Scene(parts, camera=of.camera, f0=f0))
 
 
 def posed(points: Floats, pose: str) -> Floats:

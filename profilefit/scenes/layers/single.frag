@@ -1,46 +1,16 @@
-// Light scattered once leaves as it does, not in all directions alike: its exact radiance in place of its share of a
-// white wall's, so that no energy comes or goes. The light far away only; light from everywhere has no direction.
+// Exitance with light of the first lamp that was scattered once.
 
 uniform sampler2D scattered_map, reflectance_map, position_map, normal_map;
-uniform sampler2D once_table; // exitance over irradiance; cosine of the light along rows, 0 to 1, thickness across
 uniform vec3 toward_light; // in view space
-uniform vec3 light; // irradiance of a surface that faces it [-]
 uniform float perspective;
 
 out vec4 exitance;
 
-const float PI = 3.141592653589793;
-
-// Between four values of the table, even in both.
-vec3 left_once(float cosine, float share) {
-    ivec2 last = textureSize(once_table, 0) - 1;
-    vec2 place = clamp(vec2(cosine, share) * vec2(last), vec2(0.0), vec2(last));
-    ivec2 corner = min(ivec2(place), max(last - 1, ivec2(0)));
-    vec2 rest = place - vec2(corner);
-    ivec2 next = min(corner + 1, last);
-    vec3 low = mix(texelFetch(once_table, corner, 0).rgb, texelFetch(once_table, ivec2(next.x, corner.y), 0).rgb, rest.x);
-    vec3 high = mix(texelFetch(once_table, ivec2(corner.x, next.y), 0).rgb, texelFetch(once_table, next, 0).rgb, rest.x);
-    return mix(low, high, rest.y);
-}
-
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     exitance = texelFetch(scattered_map, here, 0);
-    vec4 position = texelFetch(position_map, here, 0);
-    vec3 normal = texelFetch(normal_map, here, 0).xyz;
-    vec4 surface = texelFetch(reflectance_map, here, 0);
-    float cos_in = dot(normal, toward_light);
-    if (position.w < 0.5 || cos_in <= 0.0) return;
+    vec4 position = texelFetch(position_map, here, 0), surface = texelFetch(reflectance_map, here, 0);
+    if (position.w < 0.5) return;
     vec3 view = perspective > 0.5 ? normalize(-position.xyz) : vec3(0.0, 0.0, 1.0);
-    float cos_out = dot(normal, view);
-    if (cos_out <= 0.0) return;
-    // Along the surface light goes on against its direction from the lamp, and to the eye.
-    vec3 onward = cos_in * normal - toward_light, leaving = view - cos_out * normal;
-    float lengths = length(onward) * length(leaving);
-    float turned = lengths > 1e-6 ? clamp(dot(onward, leaving) / lengths, -1.0, 1.0) : 1.0;
-    vec3 alike = cos_in * left_once(cos_in, surface.r);
-    for (int c = 0; c < 3; ++c) {
-        float radiance = once_radiance(float(c), THICKNESS(surface), cos_in, cos_out, turned);
-        exitance[c] += surface.a * light[c] * (PI * radiance - alike[c]);
-    }
+    exitance.rgb += surface.a * added(texelFetch(normal_map, here, 0).xyz, view, toward_light, surface.rgb);
 }

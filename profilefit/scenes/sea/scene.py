@@ -147,7 +147,7 @@ class SeaCamera(request.ResolutionTable):
         return self
 
 
-class SeaLight(request.LightTable):
+class SeaLight(request.OneLampTable):
     """Table [light]: direction toward the sun."""
 
     direction: request.Direction = (-0.5, 0.0, 0.9)
@@ -174,7 +174,7 @@ class SeaRequest(request.ViewRequest):
     floor: FloorTable = FloorTable()
     technique: SeaTechnique = SeaTechnique()
     camera_table: SeaCamera = Field(SeaCamera(), alias="camera")  # type: ignore[assignment]
-    light_table: SeaLight = Field(SeaLight(), alias="light")
+    light_table: SeaLight = Field(SeaLight(), alias="light")  # type: ignore[assignment]
 
     @property
     def camera(self) -> Camera:

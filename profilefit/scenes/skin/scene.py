@@ -199,7 +199,7 @@ read = SceneRequest.of
 @contextmanager
 def opened(context: moderngl.Context, of: SceneRequest, has_reference: bool) -> Iterator[StageDrawing]:
     """Open the drawing of a request."""
-    scene = replace(_scene_of(of), light=of.light, ambient=of.ambient)
+    scene = of.under_light(_scene_of(of))
     if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
         scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
 

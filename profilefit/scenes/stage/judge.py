@@ -217,7 +217,7 @@ def whole_judge(stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | 
 
     scene  whose parts do not lie inside each other;  mfp, table  see `surface_judge`
     """
-    buffers, camera = stage.buffers(), scene.camera
+    buffers, camera = stage.true_buffers(), scene.camera
     side = camera.pixel(stage.size[1]) * (camera.distance if camera.is_perspective else 1.0)
     whole, wider = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
     error = wider_error(buffers, mfp, table, whole, wider)
@@ -232,11 +232,12 @@ def surface_judge(
     scene  drawn once more, with pixels of half the side, if the error of the reference is to be estimated
     mfp    of the three channels (3,) [mm];  table  of curves, or the setting of the exact half space
     """
-    buffers, error = stage.buffers(), UNKNOWN
-    if has_error:
+    error = UNKNOWN
+    if has_error:  # of the sum over pixels alone, without the noise of the screen's occlusion
         with Stage(stage.context, (2 * stage.size[0], 2 * stage.size[1])) as fine:
-            fine.draw(scene)
+            fine.draw(replace(scene, has_occlusion=False))
             error = own_error(fine.buffers(), mfp, table)
+    buffers = stage.true_buffers()
     return Judge(exitance_of(buffers, mfp, table), buffers.mask > INSIDE, error)
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
 from profilefit.errors import InputError
-from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Text, words
+from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Refused, Text, words
+from profilefit.scenes.stage.environment import Environment, read_map
 from profilefit.scenes.stage.mesh_file import MeshTable
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.world import INSIDE, Camera, Light, Rgb, Scene, unit
+from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
 MOST_SIDE = 4096  # of a picture [pixels]
@@ -39,6 +42,11 @@ Samples = Annotated[int, Field(ge=1, le=MOST_SAMPLES)]
 OfChoose = Annotated[Any, words("what `profilefit choose` reads")]
 Pixels = Annotated[int, Field(ge=1, le=MOST_SIDE)]
 Resolution = Annotated[tuple[Pixels, Pixels], LISTED, words(f"two whole numbers of pixels in 1 ... {MOST_SIDE}")]
+
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
+ENVIRONMENT = "a map of radiance over latitude and longitude, a .hdr or .exr of at most 8192 x 4096 pixels"
+OF_ENVIRONMENT = ("rotation", "scale")
 
 
 class TechniqueTable(Declared):
@@ -69,17 +77,92 @@ class CameraTable(ResolutionTable):
     target: Annotated[tuple[Place, Place, Place], LISTED] | None = None
 
 
-class LightTable(Declared):
+class LampTable(Declared):
+    """Table [[light.more]]: another lamp, direction toward it, and irradiance of a surface that faces it."""
+
+    direction: Direction
+    irradiance: Irradiances
+
+
+def _few(content: Any) -> Any:
+    """Return tables [[light.more]] before they are looked at; Refused where there are too many."""
+    if isinstance(content, list) and len(content) >= MOST_LAMPS:
+        raise Refused(f"at most {MOST_LAMPS - 1} lamps beside the first", len(content))
+    return content
+
+
+class OneLampTable(Declared):
     """Table [light]: direction toward the lamp, irradiance of a surface that faces it, and ambient irradiance."""
 
     direction: Direction = Light().direction
     irradiance: Irradiances = Light().irradiance
     ambient: Irradiances = Scene(()).ambient
 
+    @property
+    def sky(self) -> Environment | None:
+        """Environment that was read; None where the file names none."""
+        return None
+
+    @property
+    def lamps(self) -> tuple[Light, ...]:
+        """Lamps beside the first."""
+        return ()
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether no light comes from anywhere."""
+        return not any((*self.irradiance, *self.ambient))
+
     @model_validator(mode="after")
     def _some(self) -> Self:
-        if not any((*self.irradiance, *self.ambient)):
+        if self.is_dark:
             raise InputError("irradiance and ambient must not both be 0: nothing would be seen")
+        return self
+
+
+class LightTable(OneLampTable):
+    """Table [light]: the first lamp, others, and a sky: even, of an environment, or both.
+
+    more         lamps beside the first
+    environment  map of radiance, looked for beside the file
+    rotation     of the map about the vertical [degrees];  scale  of its radiance
+    """
+
+    more: Annotated[
+        tuple[LampTable, ...],
+        LISTED,
+        BeforeValidator(_few),
+        Field(json_schema_extra={"maxItems": MOST_LAMPS - 1}),
+    ] = ()
+    environment: Annotated[Line, words(ENVIRONMENT)] | None = None
+    rotation: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
+    scale: Annotated[float, Field(gt=0.0, le=1e6)] = 1.0
+    _sky: Environment | None = PrivateAttr(None)
+
+    @property
+    def sky(self) -> Environment | None:
+        """Environment that was read; None where the file names none."""
+        return self._sky
+
+    @property
+    def lamps(self) -> tuple[Light, ...]:
+        """Lamps beside the first."""
+        return tuple(Light(lamp.direction, lamp.irradiance) for lamp in self.more)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether no light comes from anywhere."""
+        is_lit = any(any(lamp.irradiance) for lamp in self.more) or self.environment is not None
+        return super().is_dark and not is_lit
+
+    @model_validator(mode="after")
+    def _mapped(self, info: ValidationInfo) -> Self:
+        if self.environment is not None:
+            radiance = read_map(Path(str(info.context)).parent / self.environment)
+            self._sky = Environment.of_map(radiance, self.rotation, self.scale)
+        for key in () if self.environment is not None else OF_ENVIRONMENT:
+            if key in self.model_fields_set:
+                raise Refused("left out where there is no environment", getattr(self, key), key)
         return self
 
 
@@ -133,6 +216,11 @@ class ViewRequest(Declared):
     def ambient(self) -> Rgb:
         """Irradiance from everywhere."""
         return self.light_table.ambient
+
+    def under_light(self, scene: AnyScene) -> AnyScene:
+        """Return a scene under the lamps and the sky of the file."""
+        table = self.light_table
+        return replace(scene, light=self.light, ambient=self.ambient, more=table.lamps, environment=table.sky)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -19,6 +19,23 @@ from numpy.typing import ArrayLike
 
 from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.errors import InputError
+from profilefit.scenes.stage.lighting import (
+    BACK,
+    IRRADIANCE,
+    MARGIN,
+    OCCLUSION,
+    SHADOWS,
+    ambient_pass,
+    lamp_pass,
+    lamp_uniforms,
+    occlusion_passes,
+    other_lamps,
+    screen_uniforms,
+    shadow_passes,
+    sphere,
+    text,
+)
+from profilefit.scenes.stage.occlusion import PATCHES, sky_irradiance
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.renderer import NEAREST, POINTS, GpuOwner, Pass, Read, Renderer, Smooth
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
@@ -32,22 +49,16 @@ from profilefit.scenes.stage.world import (
     Part,
     Scene,
     Singles,
-    looking,
-    orthographic,
-    unit,
 )
 from profilefit.shader.context import seconds
-from profilefit.shader.emit import text_beside
 
 DEFAULT = Sampling()
 By = Law | Technique
 MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
 PASSES = ("scatter", "frame")
 SIDES = "width", "height"
-SHADOW, SHADOW_SIDE = "shadow_map", 2048  # of one channel, and of that many texels a side
+SHADOW_SIDE = 2048  # texels of a side of a shadow map
 COLUMNS = 2048  # of points that are drawn
-NOWHERE = 1e6  # depth along the light where nothing is [mm]
-MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
 LEAST, MOST = np.nextafter(0.0, 1.0), np.finfo(float).max  # lengths > 0, finite
 
 
@@ -61,7 +72,10 @@ class Stage(GpuOwner):
         width, height = (checked_whole(name, side, 1, MOST_PIXELS) for name, side in zip(SIDES, size, strict=True))
         self.size = width, height
         self.renderer = Renderer(context, self.size)
-        self.renderer.declare(SHADOW, (self._shadow_side,) * 2, 1)
+        for name in SHADOWS:
+            self.renderer.declare(name, (self._shadow_side,) * 2, 1)
+        for name in (BACK, OCCLUSION):
+            self.renderer.declare(name, self.size, 1)
         self._released = False
         self._view: tuple[float, bool] | None = None  # side of a pixel [mm], and whether it is in perspective
         self._scene: Scene | None = None
@@ -74,24 +88,44 @@ class Stage(GpuOwner):
         camera = scene.camera
         self._seen(camera.pixel(self.size[1]), camera.is_perspective, scene)
 
-    def unwrapping(self, part: Part, inset: tuple[float, float]) -> Pass:
-        """Return the pass that lays a part of the scene last drawn out over its uv: positions in the world.
+    def unwrapping(self, part: Part, inset: tuple[float, float], has_sky: bool = True) -> list[Pass]:
+        """Return passes that lay a part of the scene last drawn out over its uv: positions in the world.
 
-        inset  share of the maps that u and v from 0 to 1 take [-];  InputError on a part of another scene
+        What the screen does not show is in the way of no light from the sky.
+
+        inset  share of the maps that u and v from 0 to 1 take [-];  has_sky  whether irradiance has the sky's light
+        InputError on a part of another scene.
         """
-        return _surface("atlas", part, self.renderer.map(SHADOW), {**self._light_on(part), "inset": inset}, clear=0.0)
+        values = {**self._light_on(part), "inset": inset}
+        passes = [_surface("atlas", part, self.renderer.map(SHADOWS[0]), values, clear=0.0), *self._lamps()]
+        scene = self._scene
+        if scene is not None and scene.has_sky and has_sky:
+            seen, open_share = (self.renderer.map(name) for name in ("position_map", OCCLUSION))
+            screen = screen_uniforms(scene.camera, self.size)
+            passes.append(ambient_pass(scene, screen, {"seen_map": seen, OCCLUSION: open_share}, np.eye(4)))
+        return passes
 
     def irradiance(self, part: Part, points: Mesh) -> Floats:
-        """Return the irradiance (n, 3) at the vertices of a mesh, which lie on a part of the scene last drawn [-]."""
+        """Return the irradiance (n, 3) at the vertices of a mesh, which lie on a part of the scene last drawn [-].
+
+        It is a reference's: the light of the sky is that of `sky`.
+        """
         count = len(points.position)
         columns = min(count, COLUMNS)
         size = columns, -(-count // columns)
         drawn = replace(points, triangles=np.arange(count, dtype=np.int32))
         values = {**self._light_on(part), "sides": tuple(map(float, size))}
         with Renderer(self.context, size) as renderer:
-            shadow, lit = self.renderer.map(SHADOW), replace(part, mesh=drawn)
-            light = renderer.image(_surface("points", lit, shadow, values, shape=POINTS, clear=0.0))
-        return light.reshape(-1, light.shape[-1])[:count, :3].astype(float)
+            shadow, lit = self.renderer.map(SHADOWS[0]), replace(part, mesh=drawn)
+            renderer.run(_surface("points", lit, shadow, values, shape=POINTS, clear=0.0), *self._lamps())
+            names = IRRADIANCE, "position_map", "normal_map"
+            light, where, normals = (renderer.read(name).reshape(-1, 4)[:count, :3].astype(float) for name in names)
+        return light + self.sky(where, normals)
+
+    def _lamps(self) -> list[Pass]:
+        """Return passes that add lamps beside the first to maps of places in the world."""
+        lamps = () if self._scene is None else other_lamps(self._scene, self._shadow_side)
+        return [lamp_pass(lamp, self.renderer.map(lamp.shadow), np.eye(4)) for lamp in lamps]
 
     def upload(self, buffers: Buffers) -> None:
         """Take a G-buffer of numpy arrays in place of a scene; no light shines then, and `render` has no highlights."""
@@ -105,6 +139,28 @@ class Stage(GpuOwner):
         """Return the G-buffer as numpy arrays."""
         view = self._ready()
         return Buffers.of_maps(map(self.renderer.read, SURFACE), *view)
+
+    def true_buffers(self) -> Buffers:
+        """Return the G-buffer with the irradiance of a reference: the sky's by `sky_irradiance`."""
+        scene, buffers = self._scene, self.buffers()
+        if scene is None or not scene.has_sky:
+            return buffers
+        self.renderer.run(*self._surface(scene, has_sky=False))
+        irradiance = self.renderer.read(IRRADIANCE)[..., :3]
+        self.renderer.write(IRRADIANCE, buffers.maps()[IRRADIANCE])
+        shown = np.any(buffers.normal != 0, axis=-1)
+        view = scene.camera.view()
+        points = (buffers.position[shown].astype(float) - view[:3, 3]) @ view[:3, :3]
+        normals = buffers.normal[shown].astype(float) @ view[:3, :3]
+        irradiance[shown] += self.sky(points, normals).astype(np.float32)
+        return replace(buffers, irradiance=irradiance)
+
+    def sky(self, points: Floats, normals: Floats, patches: int = PATCHES) -> Floats:
+        """Return `sky_irradiance` (n, 3) at points of the scene last drawn."""
+        self._ready()
+        if self._scene is None:
+            return np.zeros((len(points), 3))
+        return sky_irradiance(self.context, self._scene, points, normals, patches)
 
     def scatter(
         self,
@@ -168,29 +224,39 @@ class Stage(GpuOwner):
         self.renderer.release()
         self._released = True
 
-    def _surface(self, scene: Scene) -> list[Pass]:
-        """Return passes 1 and 2: into the shadow map, then into the maps of a G-buffer."""
-        (centre, radius), camera, lit = _sphere(scene), scene.camera, _lit(scene, self._shadow_side)
+    def _surface(self, scene: Scene, has_sky: bool = True) -> list[Pass]:
+        """Return passes 1 and 2: into shadow maps, and into the maps of a G-buffer."""
+        (centre, radius), camera, lit = sphere(scene), scene.camera, self._lit(scene)
         depth = -(camera.view() @ np.append(centre, 1.0))[2]
         near, far = max(depth - MARGIN * radius, 0.01 * radius), depth + MARGIN * radius
         projection = camera.projection(self.size[0] / self.size[1], near, far)
         values = {**lit, "view": camera.view(), "projection": projection}
-        fragment, vertex = _text("shadow.frag"), _text("shadow.vert")
-        light = {name: lit[name] for name in ("light_clip", "toward_light")}
-        return [
-            Pass("shadow", {}, SHADOW, fragment, light, vertex, part.mesh, kept=NEAREST, clear=None if i else NOWHERE)
-            for i, part in enumerate(scene.parts)
-        ] + [
-            _surface("surface", part, SHADOW, values, kept=NEAREST, clear=None if i else 0.0)
+        passes = shadow_passes(scene.parts, lit, SHADOWS[0])
+        passes += [
+            _surface("surface", part, SHADOWS[0], values, kept=NEAREST, clear=None if i else 0.0)
             for i, part in enumerate(scene.parts)
         ]
+        to_world = np.asarray(np.linalg.inv(camera.view()), float)
+        for lamp in other_lamps(scene, self._shadow_side):
+            passes += shadow_passes(scene.parts, lamp.uniforms, lamp.shadow)
+            passes.append(lamp_pass(lamp, lamp.shadow, to_world))
+        if not (scene.has_sky and has_sky):
+            return passes
+        screen = screen_uniforms(camera, self.size)
+        if scene.has_occlusion:
+            lens = {"view": camera.view(), "projection": projection}
+            passes += occlusion_passes(scene.parts, lens, screen, radius)
+        return [*passes, ambient_pass(scene, screen, {"seen_map": "position_map", OCCLUSION: OCCLUSION}, to_world)]
+
+    def _lit(self, scene: Scene) -> dict[str, Any]:
+        return lamp_uniforms(sphere(scene), scene.light, self._shadow_side)
 
     def _light_on(self, part: Part) -> dict[str, Any]:
         """Return uniforms of the light on a part of the scene last drawn, in the world. InputError on another part."""
         self._alive()
         if self._scene is None or not any(one is part for one in self._scene.parts):
             raise InputError("part must be one of the scene last drawn, got another one")
-        return {**_lit(self._scene, self._shadow_side), "view": np.eye(4)}
+        return {**self._lit(self._scene), "view": np.eye(4)}
 
     def _seen(self, pixel: float, is_perspective: bool, scene: Scene | None) -> None:
         self._view, self._scene, self._mean_reflectance = (pixel, is_perspective), scene, None
@@ -216,7 +282,8 @@ class Stage(GpuOwner):
         by, view = technique(law), self._ready()
         lengths = _three("mfp", mfp, "lengths > 0 [mm]", LEAST, MOST)
         alpha = None if fixed_alpha is None else _three("fixed_alpha", fixed_alpha, "albedos in [0, 1]", 0.0, 1.0)
-        frame = Frame(self.size, *view, sampling, lengths, alpha, self._mean, self._scene)
+        lamps = () if self._scene is None else other_lamps(self._scene, self._shadow_side)
+        frame = Frame(self.size, *view, sampling, lengths, alpha, self._mean, self._scene, lamps)
         by.before(self)
         self.renderer.run(*(replace(one, rows=rows if one.writes == EXITANCE else None) for one in by.passes(frame)))
         return by, frame
@@ -227,7 +294,7 @@ class Stage(GpuOwner):
         """Run passes 3 and 4, and 1 and 2 before them if the frame is a whole one."""
         if is_whole and self._scene is not None:
             self.renderer.run(*self._surface(self._scene))
-        self.renderer.run(combination(*self._scatter(law, mfp, sampling, fixed_alpha)))
+        self.renderer.run(*combination(*self._scatter(law, mfp, sampling, fixed_alpha)))
 
     def _mean(self) -> Floats:
         """Return the mean A (3,) where light scatters inside, 0 where that is nowhere; computed once a picture."""
@@ -257,30 +324,5 @@ def _surface(vertex: str, part: Part, shadow: Read, values: dict[str, Any], **mo
         "relief": Smooth(EVEN if part.relief is None else part.relief, tiles),
         "shadow_map": shadow,
     }
-    fragment, text = _text("surface.frag"), _text(f"{vertex}.vert")
-    return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, text, part.mesh, **more)
-
-
-def _sphere(scene: Scene) -> tuple[Floats, float]:
-    """Return middle and radius of a sphere around all parts [mm]."""
-    points = np.concatenate([part.mesh.position for part in scene.parts])
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return centre, float(np.linalg.norm(points - centre, axis=1).max())
-
-
-def _lit(scene: Scene, shadow_side: int) -> dict[str, Any]:
-    """Return uniforms of a scene's light and of its shadow map."""
-    centre, radius = _sphere(scene)
-    toward, half = unit(scene.light.direction), MARGIN * radius
-    clip = orthographic(half, half, 0.5 * radius, 4.0 * radius) @ looking(centre + 2.0 * radius * toward, centre)
-    return {
-        "light_clip": clip,
-        "toward_light": tuple(toward),
-        "shadow_pixel": 2.0 * half / shadow_side,
-        "light": scene.light.irradiance,
-        "ambient": scene.ambient,
-    }
-
-
-def _text(file: str) -> str:
-    return text_beside(__name__, f"glsl/{file}")
+    fragment, source = text("shadow.glsl", "surface.frag"), text(f"{vertex}.vert")
+    return Pass(vertex, reads, (*SURFACE, PLACE), fragment, {**values, **own}, source, part.mesh, **more)

@@ -15,14 +15,16 @@ from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.exact_law import NAME, ExactLaw
+from profilefit.scenes.stage.lighting import OtherLamp, text
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import Pass, Read
+from profilefit.scenes.stage.renderer import SUM, Pass, Read
 from profilefit.scenes.stage.world import Part, Rgb, Scene, Singles, unit
 from profilefit.shader.emit import law_text, prefix, text_beside
 
 Law = ProfileLaw | ExactLaw
 LAW = "law"  # the prefix of the law in every shader of the stage
 EXITANCE, RADIANCE = "exitance_map", "radiance_map"
+LAMP = "shadow.glsl", "lamp_combine.frag"
 # How a pixel of the one half space takes its law: by its own A, or by a fixed albedo.
 SHAPE = f"{LAW}_shape(fixed_alpha[c] < 0.0 ? {LAW}_alpha(surface[c]) : fixed_alpha[c])"
 COLOUR = "surface[c]"
@@ -37,6 +39,7 @@ class Frame:
     fixed_alpha  reduced albedo (3,) [-]; None where a pixel's own A gives it
     mean_reflectance  function that returns the mean A (3,) where light scatters [-]
     scene  that is seen; None where buffers were uploaded
+    lamps  beside the first
     """
 
     size: tuple[int, int]
@@ -47,6 +50,7 @@ class Frame:
     fixed_alpha: Floats | None
     mean_reflectance: Callable[[], Floats]
     scene: Scene | None = None
+    lamps: tuple[OtherLamp, ...] = ()
 
     @property
     def alpha_uniform(self) -> tuple[float, ...]:
@@ -61,7 +65,7 @@ class Frame:
 
     @property
     def light(self) -> dict[str, Any]:
-        """Uniforms of shaders that see the light: none shines where there is no scene."""
+        """Uniforms of shaders that see the first lamp: none shines where there is no scene."""
         if self.scene is None:
             return {"toward_light": (0.0, 0.0, 1.0), "light": (0.0, 0.0, 0.0)}
         toward = self.scene.camera.view()[:3, :3] @ unit(self.scene.light.direction)
@@ -108,7 +112,7 @@ class LawText:
 class Unwraps(Protocol):
     """Stage, as far as `Technique.before` needs it."""
 
-    def unwrapping(self, part: Part, inset: tuple[float, float]) -> Pass: ...
+    def unwrapping(self, part: Part, inset: tuple[float, float], has_sky: bool) -> Sequence[Pass]: ...
 
 
 class Technique(ABC):
@@ -205,19 +209,25 @@ class NamedTechnique(NamedTuple):
     alpha: Rgb | None = None
 
 
-def combination(by: Technique, frame: Frame) -> Pass:
-    """Return the pass from `EXITANCE` to `RADIANCE`; without a scene no light is mirrored or shines through."""
+def combination(by: Technique, frame: Frame) -> list[Pass]:
+    """Return passes from `EXITANCE` to `RADIANCE`; without a scene no light is mirrored or shines through."""
     law = by.through()
     uniforms = {
         "perspective": float(frame.is_perspective),
         "mfp": tuple(by.lengths(frame)),
         "fixed_alpha": frame.alpha_uniform,
         "f0": 0.0 if frame.scene is None else frame.scene.f0,
-        **frame.light,
     }
-    surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map", EXITANCE)
-    source = law.before(text_beside(__name__, "glsl/combine.frag"))
-    return Pass(f"combine {law.name}", {**surface, **law.tables}, RADIANCE, source, uniforms)
+    surface = {**maps("reflectance_map", "position_map", "normal_map"), **law.tables}
+    first = {**surface, **maps("irradiance_map", EXITANCE)}
+    source, other = (law.before(text("mirror.glsl", *one)) for one in (("combine.frag",), LAMP))
+    passes = [Pass(f"combine {law.name}", first, RADIANCE, source, {**uniforms, **frame.light})]
+    for lamp in frame.lamps:
+        reads = {**surface, "shadow_map": lamp.shadow}
+        passes.append(
+            Pass(f"lamp {law.name}", reads, RADIANCE, other, {**uniforms, **lamp.uniforms}, kept=SUM),
+        )
+    return passes
 
 
 def maps(*names: str) -> dict[str, Read]:

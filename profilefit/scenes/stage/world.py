@@ -1,4 +1,4 @@
-"""Scene: parts with a mesh and a texture, one light far away, a little light from everywhere, and a camera.
+"""Scene: parts with a mesh and a texture, lamps far away, light from all of the sky, and a camera.
 
 Its G-buffer is the surface that the camera sees, pixel by pixel, as numpy arrays.
 
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats, checked_finite, require, require_all
 from profilefit.errors import InputError
+from profilefit.scenes.stage.environment import Environment
 
 ROUGHNESS = 0.42  # of skin, GGX [-]
 EVEN = np.array([[[0.0, 0.0, 1.0, 1.0]]], np.float32)  # relief of a part that has none
@@ -28,6 +29,7 @@ ROUNDING = 1e-6  # a float32 that came from a texture's filter may end so far be
 SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
 PLACE = "place_map"  # u, v, and 1 where a surface is
 KINDS = ("perspective", "orthographic")
+MOST_LAMPS = 4
 # Of central differences, over the largest coordinate: there rounding, eps / step, is as large as the rest, step^2.
 DIFFERENCE = float(np.cbrt(np.finfo(float).eps))
 
@@ -122,16 +124,30 @@ class Light:
 
 @dataclass(frozen=True)
 class Scene:
-    """Parts under a lamp; ambient irradiance [-] is everywhere, without shadows; f0 is mirrored head-on [-]."""
+    """Parts under lamps and a sky.
+
+    light, more  the first lamp, and others
+    ambient  irradiance of a surface under an even sky [-];  environment  another sky, added to it
+    has_occlusion  whether parts are in the way of the sky's light;  f0  share of light that is mirrored head-on [-]
+    """
 
     parts: tuple[Part, ...]
     light: Light = field(default_factory=Light)
     ambient: Rgb = (0.16, 0.18, 0.21)
     camera: Camera = field(default_factory=Camera)
     f0: float = 0.028  # of skin, n = 1.4
+    more: tuple[Light, ...] = ()
+    environment: Environment | None = None
+    has_occlusion: bool = True
 
     def __post_init__(self) -> None:
         _require_light("ambient", self.ambient)
+        require(len(self.more) < MOST_LAMPS, "more", f"at most {MOST_LAMPS - 1} lamps beside the first", len(self.more))
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether any light comes from the sky."""
+        return self.environment is not None or any(self.ambient)
 
     def zoomed(self, height: float) -> Self:
         """Return the scene seen by a camera that shows `height` [mm] at its target."""

@@ -85,7 +85,7 @@ def test_irradiance_at_points_is_that_of_the_picture(context):
     lit = scene((-0.5, 0.3, 0.8), ball(), ball((-4.0, 3.0, 12.0), 4.0))
     with Stage(context, (64, 64)) as stage:
         stage.draw(lit)
-        buffers = stage.buffers()
+        buffers = stage.true_buffers()
         seen = buffers.mask > INSIDE
         position = buffers.position[seen] + np.array([0.0, 0.0, 100.0])  # from the eye, which looks along -z
         normal = buffers.normal[seen]

@@ -129,7 +129,8 @@ def test_times_and_compiles_once(stage, burley):
     stage.draw(scene((0.0, 1.0, 0.0)))
     assert len(stage.time(burley, 2.0, Sampling(4), repeats=3)) == 3
     assert all(0 < one < 1e4 for one in stage.time(burley, 2.0, Sampling(4), repeats=2, passes="frame"))
-    assert stage.renderer.compiled == ["shadow", "surface", "scatter burley", "combine burley"]
+    of_scene = ["shadow", "surface", "back", "occlusion", "ambient"]
+    assert stage.renderer.compiled == [*of_scene, "scatter burley", "combine burley"]
 
 
 @pytest.mark.slow

@@ -35,9 +35,10 @@ void main() {
     vec2 rows = vec2(textureSize(occlusion_map, 0));
     vec2 place = vec2(z * (rows.x - 1.0), length(lean) / widest * (rows.y - 1.0));
     float open = texture(occlusion_map, (place + 0.5) / rows).r;
+    vec3 sky = ambient + by_harmonics(n);
     vec3 albedo = is_skin ? skin_colour : colour;
     float edge = clamp(rim.x + rim.y * pow(1.0 - clamp(dot(n, to_eye), 0.0, 1.0), rim.z), 0.0, 1.0);
-    vec3 seen = albedo / PI * (irradiance * max(onto, 0.0) * lit + ambient * open) + edge * open * ambient / PI;
+    vec3 seen = albedo / PI * (irradiance * max(onto, 0.0) * lit + sky * open) + edge * open * sky / PI;
     if (!is_skin) {
         vec3 axis = normalize(n + force), middle = normalize(to_eye + to_light);
         float angle = acos(clamp(dot(axis, middle), -1.0, 1.0));

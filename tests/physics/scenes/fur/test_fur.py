@@ -18,6 +18,7 @@ from profilefit.scenes.fur.law import best_exponent, lobe_mean, occlusion, shado
 from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays, struck
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO
+from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.judge import srgb_codes, to_srgb
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.surface import averaged
@@ -407,6 +408,33 @@ def drawn(context, shading, hits):
     with Renderer(context, SHADED) as renderer:
         renderer.write(HITS, hits)
         return renderer.image(coat.shade(VIEW))[..., :3].astype(float)
+
+
+def test_lamps_and_a_sky_add_up(context):
+    """Two lamps, an even map, and ambient light: each alone, less the background that each has."""
+    rng = np.random.default_rng(8)
+    hits = np.concatenate([unit(rng.normal(size=(15, 20, 3))), rng.uniform(0.0, 1.0, (15, 20, 1))], axis=-1)
+    hits[3, :5, 3], hits[4, :5, 3] = SKIN, NOTHING
+    ball = random_ball(50, 10.0, RADIUS, LENGTH, FORCE, 3)
+    none, dark = (0.0, 0.0, 0.0), Light(irradiance=(0.0, 0.0, 0.0))
+    other, radiance = Light((0.8, 0.5, 0.2), (0.3, 0.9, 1.5)), np.array(AMBIENT) / np.pi
+    sky = Environment.of_map(np.full((64, 128, 3), radiance))
+    cases = (
+        (LIGHT, AMBIENT, (other,), sky),
+        (LIGHT, none, (), None),
+        (other, none, (), None),
+        (dark, AMBIENT, (), None),
+    )
+    pictures = []
+    with Renderer(context, SHADED) as renderer:
+        renderer.write(HITS, hits)
+        for light, ambient, more, map_ in cases:
+            coat = Coat(ball, DENSITY, COLOUR, BARE, light, ambient, ShadingTable(), more, map_)
+            pictures.append(renderer.image(*coat.shades(VIEW))[..., :3].astype(float))
+    whole, first, second, even = pictures
+    shown = hits[..., 3] != NOTHING
+    np.testing.assert_allclose(whole[shown], (first + second + 2.0 * even)[shown], rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(whole[~shown], np.broadcast_to(BACKGROUND, whole[~shown].shape), rtol=1e-6)
 
 
 def written_out(shading, hit, to_eye):

@@ -1,5 +1,7 @@
 """Both parts of a kernel and their balance: light is counted once; random scenes, and a balance found again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from profilefit.scenes.heart.passes import ATLAS, SCREEN, Balanced, gather_of, k
 from profilefit.scenes.heart.truth import surface_blur
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import world
+from profilefit.scenes.stage.surface import sees, world
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene
 from tests.unit.scenes.scenes import refused
 
@@ -123,13 +125,34 @@ def test_a_heart_of_six_charts_is_a_furnace(context):
     part = Part(heart(8.0, 24), WHITE)
     size, margin = trials.atlas_size(part.mesh, 0.3, 150)
     with Stage(context, (16, 16), 64) as stage, Atlas(context, size, min(margin, 4)) as atlas:
-        stage.draw(Scene((part,), ambient=(0.5,) * 3, camera=Camera(height=40.0), light=Light(irradiance=(0.0,) * 3)))
+        scene = Scene((part,), ambient=(0.5,) * 3, camera=Camera(height=40.0), light=Light(irradiance=(0.0,) * 3))
+        stage.draw(replace(scene, has_occlusion=False))  # else the heart is in its own way
         atlas.draw(stage, part)
         atlas.blur(NARROWER)
         found = atlas.read(BLURRED)
         inside = atlas.read("position_map")[..., 3] > 0.5
     assert np.count_nonzero(inside) > 3000
     np.testing.assert_allclose(found[inside][:, :3], 0.5, atol=1e-5)
+
+
+def test_an_atlas_has_the_sky_of_the_screen(context):
+    """As much of it as the screen has where that shows a texel, and all of it elsewhere."""
+    part = Part(heart(8.0, 24), WHITE)
+    size, margin = trials.atlas_size(part.mesh, 0.3, 150)
+    with Stage(context, (64, 64), 64) as stage, Atlas(context, size, min(margin, 4)) as atlas:
+        camera = Camera(height=24.0)
+        stage.draw(Scene((part,), ambient=(0.5,) * 3, camera=camera, light=Light(irradiance=(0.0,) * 3)))
+        atlas.draw(stage, part)
+        place, light = (atlas.read(name).astype(float) for name in ("position_map", "irradiance_map"))
+        buffers = stage.buffers()
+    inside = place[..., 3] > 0.5
+    shown = sees(buffers, camera, place[inside][:, :3])
+    share, screen = light[inside][:, 0] / 0.5, buffers.irradiance[buffers.mask > 0.5][:, 0] / 0.5
+    assert 0.2 < shown.mean() < 0.8
+    np.testing.assert_allclose(share[~shown].mean(), 1.0, atol=1e-3)
+    assert screen.min() < 0.95
+    assert abs(share[shown].min() - screen.min()) < 0.02
+    assert share[~shown].mean() > share[shown].mean() + 1e-3
 
 
 def test_an_atlas_of_the_side_asked_for(context):

@@ -18,7 +18,7 @@ from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.world import unit
+from profilefit.scenes.stage.world import Light, unit
 from tests.unit.scenes.scenes import ball, refused, scene
 
 SIZE, SAMPLES = (96, 96), Sampling(4)
@@ -182,6 +182,21 @@ def test_light_from_everywhere_has_no_direction(stage):
     for show, what in ((stage.draw, scene((0.0, 0.0, -1.0), uneven_ball())), (stage.upload, flat(SIZE, 1.0, 0.5))):
         show(what)
         np.testing.assert_array_equal(stage.scatter(single, MFP, SAMPLES), stage.scatter(by, MFP, SAMPLES))
+
+
+def test_lamps_add_what_is_scattered_once(stage):
+    """Each from its own side: of two it is the sum, and of two halves the whole."""
+    single = WithSingle(of_stack(laws(), LEAST, MOST, ()), media(), LEAST, MOST)
+    one, other = Light((0.6, 0.3, 0.7), (1.0, 0.8, 0.6)), Light((-0.8, 0.4, 0.3), (0.3, 0.5, 0.9))
+    half = Light(one.direction, (0.5, 0.4, 0.3))
+    found = []
+    for lamps in ((one, other), (one,), (other,), (half, half)):
+        stage.draw(replace(scene((0.0, 0.0, 1.0), uneven_ball()), light=lamps[0], more=lamps[1:], ambient=(0.0,) * 3))
+        found.append(stage.scatter(single, MFP, SAMPLES).copy())
+    both, first, second, halves = found
+    assert second.max() > 0.1
+    np.testing.assert_allclose(both, first + second, atol=2e-6)
+    np.testing.assert_allclose(halves, first, atol=2e-6)
 
 
 @pytest.mark.parametrize("n", [1.0, 1.4])

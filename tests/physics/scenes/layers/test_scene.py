@@ -40,7 +40,7 @@ REFUSED = [
         1,
         rf"\[camera\] {KEYS}resolution, reference_pixel, distance, direction, height, target, got 'zoom'",
     ),
-    ("light.colour", 1, rf"\[light\] {KEYS}direction, irradiance, ambient, got 'colour'"),
+    ("light.colour", 1, rf"\[light\] {KEYS}direction, irradiance, ambient, more, .*, got 'colour'"),
     ("layers.2.colour", 1, rf"\[layers 2\] {KEYS}name, .*, got 'colour'"),
     ("camera", 3, r"camera must be a table \[camera\], got 3"),
     ("unit", "cm", "unit must be one of mm, got 'cm'"),
