@@ -53,13 +53,13 @@ def judged(
     scale: float = 1.0,
     setting: Setting = DIFFUSE,
 ) -> Iterator[Judged]:
-    """Return a view at a size [pixels].
+    """Return a view at a size [pixels], in whose way of the sky's light nothing is: errors are of scattering alone.
 
     quick  leaves out the error of the reference itself;  scene  the close view, if none
     scale  mean free paths over those of the material, for a head of 1 / scale its size [-]
     setting  of the exact answer
     """
-    scene = scene or head_scene(camera=CLOSE)
+    scene = replace(scene or head_scene(camera=CLOSE), has_occlusion=False)
     red, green, blue = scene.material.mfp
     mfp = scale * red, scale * green, scale * blue
     with Stage(context, size) as stage:
