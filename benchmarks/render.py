@@ -64,9 +64,8 @@ def table2(context: moderngl.Context, options: argparse.Namespace) -> dict:
     """Measure the paper's Table 2."""
     laws, size = contenders(), options.size or SCREEN
     works = {key: laws[key] for key in render_table2.KEYS}
-    found = render_table2.timed(
-        context, replace(head_scene(), has_occlusion=False), works, size, QUICK_TURNS if options.quick else 3
-    )
+    scene = replace(head_scene(), has_occlusion=False)
+    found = render_table2.timed(context, scene, works, size, QUICK_TURNS if options.quick else 3)
     title = f"{size[0]} x {size[1]}, {YARDSTICK_TAPS} samples, over separable"
     render_table2.report(title, works, found)
     return {"size": size, "samples": YARDSTICK_TAPS, "shares": render_table2.as_json(found)}

@@ -225,13 +225,20 @@ def test_nothing_serves(chosen):
 
 
 @pytest.mark.slow
-def test_whether_a_heart_needs_an_atlas(chosen, opengl):
-    line, told = chosen(HEART)
-    assert told["verdict"] == "no atlas"
-    assert 0 < told["hidden"] < told["error"] < told["tolerance"] == 0.02
+@pytest.mark.parametrize("is_turned", [True, False])
+def test_whether_a_heart_needs_an_atlas(chosen, opengl, tmp_path, is_turned):
+    """The heart is seen from the side that the lamp does not reach; a ball in front of it needs no atlas."""
+    content = Path(HEART).read_text(encoding="utf-8")
+    ball = content.replace('kind = "heart"', 'kind = "ball"').replace("paint = true", "")
+    file = tmp_path / "ball.toml"
+    file.write_text(ball.replace("[0.866, 0.1, 0.5]", "[0.0, 0.0, 1.0]"), encoding="utf-8")
+    line, told = chosen(HEART if is_turned else file)
+    assert told["verdict"] == ("atlas" if is_turned else "no atlas")
+    assert 0 < told["hidden"] < told["error"]
+    assert (told["error"] > told["tolerance"] == 0.02) == is_turned
     error, hidden = (f"{100 * told[key]:.2g} %" for key in ("error", "hidden"))
     assert line.startswith(
-        f"no atlas: screen space alone has an error of {error} of the light, and hidden surface causes {hidden} "
+        f"{told['verdict']}: screen space alone has an error of {error} of the light, and hidden surface causes {hidden} "
     )
 
 
