@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import Annotated, Literal, Self
 
@@ -27,7 +28,7 @@ from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage import eye, head, request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge, surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
@@ -171,14 +172,15 @@ def scene_of(of: LayersRequest) -> Scene:
     if of.surface.parts:
         own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
         return Scene(own, of.light, of.ambient, of.camera, f0)
-    meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
-    parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
+    skin = [Part(mesh, values) for mesh in (head.head(), head.ear(-1), head.ear(1), head.neck())]
+    rest = (*skin, *eye.eyes())
+    parts = tuple(replace(part, mesh=deformed(part.mesh, lambda points: posed(points, of.pose))) for part in rest)
     return Scene(parts, of.light, of.ambient, of.camera, f0)
 
 
 def posed(points: Floats, pose: str) -> Floats:
     """Return points of the head at rest, moved: the neck stays, the head turns about it or nods, smoothly between."""
-    share = np.clip((points[:, 1] + 170.0) / 130.0, 0.0, 1.0)
+    share = np.clip((points[:, 1] + 210.0) / 95.0, 0.0, 1.0)
     angle = {"rest": 0.0, "turn": np.radians(25.0), "nod": np.radians(12.0)}[pose] * share**2 * (3.0 - 2.0 * share)
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = points.T
