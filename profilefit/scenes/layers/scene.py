@@ -40,7 +40,7 @@ OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
 POSES = ("rest", "turn", "nod")
 NEGLIGIBLE = 0.01  # share of white that directions may be wrong by before light scattered once is drawn by itself
 NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
-COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
+COLUMNS, BLOTCHES, SEED = 512, 40, 5  # of the thickness over the head, if it is no image
 
 
 class LayersTechnique(request.TechniqueTable):
@@ -173,7 +173,9 @@ def scene_of(of: LayersRequest) -> Scene:
         own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
         return Scene(own, of.light, of.ambient, of.camera, f0)
     skin = [Part(mesh, values) for mesh in (head.head(), head.ear(-1), head.ear(1), head.neck())]
-    rest = (*skin, *eye.eyes())
+    if of.stack.map is None and of.uneven > 0:
+        skin[0] = replace(skin[0], reflectance=values * (1.0 - head.lips(head.texels(COLUMNS))[0][..., None]))
+    rest = (*skin, *eye.eyes(), head.hair())
     parts = tuple(replace(part, mesh=deformed(part.mesh, lambda points: posed(points, of.pose))) for part in rest)
     return Scene(parts, of.light, of.ambient, of.camera, f0)
 

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.eye import FISSURE, lids, rise
-from profilefit.scenes.stage.head import brow, grid, head, lips
+from profilefit.scenes.stage.head import brow, crop, lips, texels
 
 FRECKLES, STUBBLE, BROW = 900, 12_000, 700
 # What is left of A in red, green and blue.
@@ -24,27 +24,19 @@ HAIR = np.array([0.22, 0.17, 0.15])  # under a hair
 BEARD = np.array([0.36, 0.32, 0.32])  # under shaved hair
 CROP = np.array([0.26, 0.21, 0.20])  # under cropped hair
 LIPS = np.array([0.88, 0.48, 0.50])
-BLOOD = np.array([0.99, 0.84, 0.85])  # on nose, cheeks and below the eyes
+BLOOD = np.array([0.99, 0.86, 0.87])  # on nose, cheeks and below the eyes
 SHADE = np.array([0.98, 0.93, 0.96])  # of shaved skin
 CAVITY = np.array([0.45, 0.25, 0.25])  # nostrils and the line between the lips
-# Cropped hair begins above these heights, at depths [mm].
-HAIRLINE = (
-    (-80.0, -40.0, -14.0, 0.0, 14.0, 34.0, 50.0, 60.0, 72.0),
-    (-52.0, -46.0, -30.0, -8.0, -2.0, 30.0, 60.0, 70.0, 74.0),
-)
 
 
 class Canvas:
-    """Texture over a grid of points on the head."""
+    """Texture over the head."""
 
-    def __init__(self, points: Floats, rows: int, columns: int, seed: int):
-        """Take points (r, c, 3), even over u and v [mm], and how many texels are drawn."""
-        at_v = (np.arange(rows) + 0.5) / rows * (points.shape[0] - 1)
-        at_u = (np.arange(columns) + 0.5) / columns * (points.shape[1] - 1)
-        grid = np.meshgrid(at_v, at_u, indexing="ij")
+    def __init__(self, columns: int, seed: int):
+        """Take the number of columns; there are half as many rows."""
+        rows = columns // 2
         self.rng = np.random.default_rng(seed)
-        singles = points.astype(np.float32)
-        self.place = np.stack([map_coordinates(singles[..., i], grid, order=1) for i in range(3)])
+        self.place = texels(columns)
         self.left = np.ones((rows, columns, 3), np.float32)
         # Along a row and up a column [mm per texel].
         self.along = np.maximum(_length(np.gradient(self.place, axis=2)), 1e-3)
@@ -109,7 +101,7 @@ def skin(reflectance: ArrayLike, columns: int = 2048) -> NDArray[np.float32]:
 @cache
 def face(columns: int, seed: int = 7) -> NDArray[np.float32]:
     """Return (columns / 2, columns, 3) A of the head over that of even skin [-]."""
-    canvas = Canvas(grid(head(), 1), columns // 2, columns, seed)
+    canvas = Canvas(columns, seed)
     x, y, z = canvas.place
     out, front = np.abs(x), rise(z, 20.0, 50.0)
 
@@ -123,13 +115,14 @@ def face(columns: int, seed: int = 7) -> NDArray[np.float32]:
     jaw = front * rise(-y, 30.0, 60.0) * rise(y, -125.0, -95.0) * (1.0 - spot(0, -64, 27, 11, 6.0))
     jaw *= 1.0 - 0.8 * spot(46, -40, 16, 24, 4.0)
     canvas.blend(SHADE, jaw)
-    beside, height = lips(x, y, np.maximum(z, 1.0))
-    canvas.blend(LIPS, front * rise(-beside, -0.5, 1.0))
+    red, height = lips(canvas.place)
+    canvas.blend(LIPS, red)
     canvas.blend(CAVITY, front * np.exp(-((height / 0.7) ** 2)) * rise(-out, -28.0, -24.0))
     canvas.blend(CAVITY, spot(6.6, -43.5, 3.6, 2.6, 4.0))
     canvas.dots(FRECKLES, 0.02 + spot(16, -12, 30, 18) + 0.3 * spot(0, 45, 50, 20), (0.4, 1.1), FRECKLE)
     canvas.dots(STUBBLE, jaw + 1e-9, (0.1, 0.16), BEARD)
-    even = (z > 40.0) & (y > -50.0) & (y < 40.0)
+    canvas.left = 1.0 + (canvas.left - 1.0) * rise(y, -118.0, -92.0)[..., None]  # the neck is even, as its mesh is
+    even = (z > 55.0) & (y > -90.0) & (y < 35.0)
     canvas.left /= np.median(canvas.left[even], axis=0)  # most of the face has the A that was given
     _brows(canvas)
     _lashes(canvas)
@@ -162,9 +155,7 @@ def _lashes(canvas: Canvas) -> None:
 
 def _crop(canvas: Canvas) -> None:
     """Crop hair on the skull, above the forehead and around the ears."""
-    _, y, z = canvas.place
-    line = np.interp(z, *HAIRLINE)
-    grown = rise(y - line + 2.5 * canvas.noise(2.0), -3.0, 5.0)
+    grown = crop(canvas.place, 2.5 * canvas.noise(2.0))
     canvas.blend(CROP, grown * np.clip(0.85 + 0.15 * canvas.noise(0.35), 0.0, 1.0))
 
 

@@ -5,25 +5,36 @@ Millimetres; x to the head's left (the picture's right), y up, z out of the face
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates
 
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.eye import CORNERS, EYE, EYEBALL, FISSURE, lids, rise
 from profilefit.scenes.stage.solid import carved, ellipsoid, ends, joined, rod
-from profilefit.scenes.stage.world import Mesh, parameters, sheet
+from profilefit.scenes.stage.world import Mesh, Part, parameters, sheet
 
 ROWS, COLUMNS = 400, 480  # of the head's mesh
 FARTHEST = 220.0  # of the head from its middle
+MIDLINE = 1.5  # within which both halves are rounded into one
 ROOT, FLARE, LEAN = (63.5, -3.0, 0.0), 36.0, 10.0  # front of the ear; its angles to the head and backward [degrees]
 MIDDLE, THICK = (14.0, 1.0), 3.0  # of the ear: behind its front, and up; of its plate
 OUTLINE = (
     *((35.0, 6.0), (33.5, 18.0), (27.0, 28.0), (17.0, 32.5), (8.0, 29.0), (2.5, 20.0), (0.0, 9.0)),
     *((-2.0, -4.0), (-0.5, -16.0), (3.0, -26.0), (10.0, -31.0), (17.5, -28.0), (24.0, -19.0), (31.0, -8.0)),
 )
+# Cropped hair begins above these heights, at depths [mm].
+HAIRLINE = (
+    (-80.0, -40.0, -14.0, 0.0, 14.0, 34.0, 50.0, 60.0, 72.0),
+    (-52.0, -46.0, -30.0, -8.0, -2.0, 30.0, 60.0, 70.0, 74.0),
+)
+BROW = CubicSpline([8.0, 14.0, 22.0, 32.0, 42.0, 54.0], [24.0, 26.3, 28.3, 30.0, 28.8, 22.0])  # height over x [mm]
+HAIR, DARK = 0.6, (0.06, 0.042, 0.03)  # thickness [mm] and A of hair
 STRAP, BRIM = 50.0, 66.0  # height of the visor's brim [mm]; how far it goes round to either side [degrees]
 MOUTH, LIP_END = 92.0, 29.0  # depth at which the lips are drawn, as seen from the middle, and x of their ends there
 LID = 13.4  # radius of the eyes' lids
@@ -73,37 +84,72 @@ def _spread(most: float, middle: float, width: float, more: float) -> tuple[Floa
     return share / share[-1], angle
 
 
-def grid(mesh: Mesh, detail: int = 1) -> Floats:
-    """Return the points of a head (rows, columns, 3), even over u and v [mm]."""
-    return mesh.position.reshape(ROWS * detail + 1, COLUMNS * detail + 1, 3)
+def hair(detail: int = 1) -> Part:
+    """Return brows and cropped hair: a head that is a little larger where they are, and else inside the skin."""
+    mesh = head(detail)
+    x, y, z = points = mesh.position.T
+    away, thick = brow(np.abs(x), y)
+    share = (z > 30.0) * (thick > 0.0) * np.exp(-((away / np.maximum(thick, 0.5)) ** 4))
+    strokes = np.sin(1.5 * np.abs(x) + 1.1 * away) * np.sin(0.7 * np.abs(x) - 1.3 * away + 1.0)
+    grown = np.maximum(share - 0.3 * (0.7 + strokes), crop(points, 2.0 * np.sin(0.9 * y + 2.0 * np.sin(0.4 * z))))
+    moved = points * (1.0 + (grown - 0.5) * HAIR / np.linalg.norm(points, axis=0))
+    colour = np.random.default_rng(5).uniform(0.4, 1.6, (512, 1024, 1)) * DARK
+    return Part(replace(mesh, position=moved.T), colour.astype(np.float32), roughness=0.7, is_translucent=False)
+
+
+def crop(points: Floats, noise: Floats | float = 0.0) -> Floats:
+    """Return the share of cropped hair in [0, 1] at points (3, ...), whose line wanders by a noise [mm]."""
+    _, y, z = points
+    return rise(y - np.interp(z, *HAIRLINE) + noise, -3.0, 5.0)
+
+
+@cache
+def texels(columns: int) -> NDArray[np.float32]:
+    """Return points (3, columns / 2, columns) at the middles of a texture's texels over the head [mm]."""
+    grid = head().position.reshape(ROWS + 1, COLUMNS + 1, 3).astype(np.float32)
+    rows = columns // 2
+    at_v, at_u = ((np.arange(n) + 0.5) / n * size for n, size in ((rows, ROWS), (columns, COLUMNS)))
+    at = np.meshgrid(at_v, at_u, indexing="ij")
+    return np.stack([map_coordinates(grid[..., axis], at, order=1) for axis in range(3)])
 
 
 def brow(out: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the height above the eyebrow's middle, so far out from the nose, and half its thickness, 0 beyond [mm]."""
-    middle = np.interp(out, [8.0, 12.0, 20.0, 32.0, 42.0, 54.0], [24.0, 25.5, 27.5, 30.0, 29.0, 22.0])
+    middle = BROW(np.clip(out, 8.0, 54.0))
     thick = np.interp(out, [8.9, 9.0, 11.0, 20.0, 36.0, 50.0, 53.0, 53.1], [0.0, 2.5, 3.8, 4.2, 3.4, 1.6, 0.8, 0.0])
     return y - middle, thick
 
 
-def lips(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Return about the distance outside the red of the lips, and the height above the line between them [mm]."""
-    across, height = np.abs(x) * MOUTH / z, y * MOUTH / z
+def lips(points: Floats) -> tuple[Floats, Floats]:
+    """Return the share of the lips' red in [0, 1] at points (3, ...), and the height above the lips' line [mm]."""
+    x, y, z = points
+    deep = np.maximum(z, 1.0)
+    across, height = np.abs(x) * MOUTH / deep, y * MOUTH / deep
     share = np.clip(across / LIP_END, 0.0, 1.0)
     thick = np.sqrt(np.maximum(1.0 - share**2.2, 0.0))
-    middle = -64.0 - 0.8 * np.exp(-((across / 5.0) ** 2)) - 7.0 * share**2
+    middle = _between_lips(across)
     top = middle + 8.2 * thick**1.3 - 1.2 * np.exp(-((across / 3.5) ** 2))
     outside = np.maximum(np.maximum(height - top, middle - 10.2 * thick - height), across - LIP_END)
-    return outside, height - middle
+    return rise(z, 20.0, 50.0) * rise(-outside, -0.5, 1.0), height - middle
+
+
+def _between_lips(across: Floats) -> Floats:
+    return -64.0 - 0.8 * np.exp(-((across / 5.0) ** 2)) - 7.0 * np.clip(across / LIP_END, 0.0, 1.0) ** 2
 
 
 def _head(points: Floats) -> Floats:
-    x, y, z = points
-    points = np.stack([np.abs(x), y, z])
+    points = mirrored(points)
+    _, y, z = points
     solid = _skull(points)
-    front = (z > 25.0) & (y < 70.0) & (y > -130.0)
+    front = (z > -5.0) & (y < 70.0) & (y > -130.0)
     if front.any():
         solid[front] = _face(points[:, front], solid[front])
     return solid
+
+
+def mirrored(points: Floats) -> Floats:
+    """Return points (3, n) with x > 0 on both sides, smooth in the middle [mm]."""
+    return np.stack([np.sqrt(points[0] ** 2 + MIDLINE**2), points[1], points[2]])
 
 
 def _skull(p: Floats) -> Floats:
@@ -156,11 +202,11 @@ def _mouth(p: Floats, s: Floats) -> Floats:
     across, height = x * MOUTH / z, y * MOUTH / z
     out = np.clip(across / LIP_END, 0.0, 1.0)
     depth = 89.8 - 11.0 * out**2
-    middle = -64.0 - 0.8 * np.exp(-((across / 5.0) ** 2)) - 7.0 * out**2  # line between them
+    middle = _between_lips(across)
     thick = np.sqrt(np.maximum(1.0 - out**2.2, 0.0))
     upper = np.hypot(height - middle - 4.0 * thick, 0.8 * (z - depth)) - 0.4 - 4.3 * thick
     lower = np.hypot(height - middle + 5.0 * thick, 0.8 * (z - depth + 0.8)) - 0.4 - 5.2 * thick
-    s = joined(s, np.minimum(upper, lower) + np.maximum(across - LIP_END, 0.0), 2.0)
+    s = joined(s, np.minimum(upper, lower) + np.maximum(across - LIP_END, 0.0), 4.0)
     line = np.maximum(np.abs(height - middle) - 0.4, depth - 1.5 - z)
     return carved(s, line + np.maximum(across - LIP_END + 1.0, 0.0), 1.2)
 
@@ -245,7 +291,7 @@ def neck(detail: int = 1) -> Mesh:
     angle, y = 2.0 * np.pi * u, -230.0 + 112.0 * v
     way = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
     origin = np.stack([np.zeros_like(y), y, np.full_like(y, -26.0)], axis=-1)
-    radius = ends(lambda p: _neck(np.stack([np.abs(p[0]), p[1], p[2]])), way, FARTHEST, origin)
+    radius = ends(lambda p: _neck(mirrored(p)), way, FARTHEST, origin)
     radius -= 2.0 * rise(y, -124.0, -118.0)  # its upper end is inside the head
     return sheet(origin + way * radius[..., None], u, v, closed=True)
 
@@ -269,7 +315,7 @@ def strap(detail: int = 1) -> Mesh:
     way = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
     up = STRAP + 10.0 + 12.0 * _squared(np.sin(around), 0.4)
     origin = np.stack([np.zeros_like(up), up, np.full_like(up, -10.0)], axis=-1)
-    radius = ends(lambda p: _skull(np.stack([np.abs(p[0]), p[1], p[2]])), way, FARTHEST, origin)
+    radius = ends(lambda p: _skull(mirrored(p)), way, FARTHEST, origin)
     radius += 1.0 - 1.6 * _squared(np.cos(around), 0.4)
     points = origin + way * radius[..., None]
     points[..., 1] += 0.1 * (points[..., 2] - 80.0)
