@@ -174,7 +174,8 @@ def scene_of(of: LayersRequest) -> Scene:
         return Scene(own, of.light, of.ambient, of.camera, f0)
     skin = [Part(mesh, values) for mesh in (head.head(), head.ear(-1), head.ear(1), head.neck())]
     if of.stack.map is None and of.uneven > 0:
-        skin[0] = replace(skin[0], reflectance=values * (1.0 - head.lips(head.texels(COLUMNS))[0][..., None]))
+        red, _ = head.lips(head.texels(COLUMNS))
+        skin[0] = replace(skin[0], reflectance=(values * (1.0 - red[..., None])).astype(np.float32))
     rest = (*skin, *eye.eyes(), head.hair())
     parts = tuple(replace(part, mesh=deformed(part.mesh, lambda points: posed(points, of.pose))) for part in rest)
     return Scene(parts, of.light, of.ambient, of.camera, f0)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.eye import FISSURE, lids, rise
 from profilefit.scenes.stage.head import brow, crop, lips, texels
 
@@ -21,12 +21,16 @@ FRECKLES, STUBBLE, BROW = 900, 12_000, 700
 # What is left of A in red, green and blue.
 FRECKLE = np.array([0.72, 0.56, 0.46])  # at the heart of one
 HAIR = np.array([0.22, 0.17, 0.15])  # under a hair
+LARGE = np.array([0.04, 0.09, 0.10], np.float32)  # deviation of large blotches, which are reddish
+SMALL = np.array([0.05, 0.06, 0.06], np.float32)  # of small ones, which are grey
 BEARD = np.array([0.36, 0.32, 0.32])  # under shaved hair
 CROP = np.array([0.26, 0.21, 0.20])  # under cropped hair
 LIPS = np.array([0.88, 0.48, 0.50])
 BLOOD = np.array([0.99, 0.86, 0.87])  # on nose, cheeks and below the eyes
 SHADE = np.array([0.98, 0.93, 0.96])  # of shaved skin
 CAVITY = np.array([0.45, 0.25, 0.25])  # nostrils and the line between the lips
+
+Numbers = NDArray[Any]
 
 
 class Canvas:
@@ -42,12 +46,12 @@ class Canvas:
         self.along = np.maximum(_length(np.gradient(self.place, axis=2)), 1e-3)
         self.up = np.maximum(_length(np.gradient(self.place, axis=1)), 1e-3)
 
-    def blend(self, colour: Iterable[float], share: Floats) -> None:
+    def blend(self, colour: Iterable[float], share: Numbers) -> None:
         """Multiply A by a colour where the share is 1, by 1 where it is 0."""
         for channel, one in enumerate(colour):
             self.left[..., channel] *= 1.0 + np.float32(one - 1.0) * share
 
-    def noise(self, width: float) -> Floats:
+    def noise(self, width: float) -> Numbers:
         """Return (rows, columns) soft noise of deviation 1; its width is of the face [mm]."""
         rows, columns = self.along.shape
         middle = rows // 2, columns // 2
@@ -59,18 +63,18 @@ class Canvas:
         field = field if few == 1 else map_coordinates(field, at, order=1, mode="grid-wrap")
         return np.asarray(field / field.std())
 
-    def dots(self, number: int, chance: Floats, radii: tuple[float, float], colour: Iterable[float]) -> None:
+    def dots(self, number: int, chance: Numbers, radii: tuple[float, float], colour: Iterable[float]) -> None:
         """Draw soft discs, more where the chance (rows, columns) is high; radii [mm] from ... to."""
         chosen, radius = self.chosen(number, chance), self.rng.uniform(*radii, number)
         self.hairs(chosen, 2.0 * radius, radius, np.zeros(number), colour)
 
-    def chosen(self, number: int, chance: Floats) -> NDArray[np.int64]:
+    def chosen(self, number: int, chance: Numbers) -> NDArray[np.int64]:
         """Return texels, as many a square millimetre as the chance (rows, columns) says."""
         weight = np.cumsum((chance * self.along * self.up).ravel())
         return np.searchsorted(weight, self.rng.random(number) * weight[-1])
 
     def hairs(
-        self, chosen: NDArray[np.int64], length: Floats, width: Floats, slope: Floats, colour: Iterable[float]
+        self, chosen: NDArray[np.int64], length: Numbers, width: Numbers, slope: Numbers, colour: Iterable[float]
     ) -> None:
         """Draw soft ellipses at texels, by length and half width [mm] and angle to the row [rad]."""
         rows, columns = self.along.shape
@@ -105,11 +109,11 @@ def face(columns: int, seed: int = 7) -> NDArray[np.float32]:
     x, y, z = canvas.place
     out, front = np.abs(x), rise(z, 20.0, 50.0)
 
-    def spot(at_x: float, at_y: float, wide: float, tall: float, power: float = 2.0) -> Floats:
+    def spot(at_x: float, at_y: float, wide: float, tall: float, power: float = 2.0) -> Numbers:
         return front * np.exp(-(np.hypot((out - at_x) / wide, (y - at_y) / tall) ** power))
 
-    blotches = canvas.noise(9.0)[..., None] * np.float32([0.04, 0.09, 0.10])  # large and reddish
-    blotches += canvas.noise(0.5)[..., None] * np.float32([0.05, 0.06, 0.06])  # small and grey
+    blotches = canvas.noise(9.0)[..., None] * LARGE
+    blotches += canvas.noise(0.5)[..., None] * SMALL
     canvas.left += blotches
     canvas.blend(BLOOD, np.clip(spot(0, -30, 16, 13) + spot(38, -22, 18, 14) + 0.7 * spot(30, -6, 15, 6), 0.0, 1.0))
     jaw = front * rise(-y, 30.0, 60.0) * rise(y, -125.0, -95.0) * (1.0 - spot(0, -64, 27, 11, 6.0))
@@ -159,5 +163,5 @@ def _crop(canvas: Canvas) -> None:
     canvas.blend(CROP, grown * np.clip(0.85 + 0.15 * canvas.noise(0.35), 0.0, 1.0))
 
 
-def _length(vectors: Floats) -> Floats:
+def _length(vectors: Numbers) -> Numbers:
     return np.sqrt(np.sum(vectors**2, axis=0))

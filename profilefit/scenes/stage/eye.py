@@ -6,6 +6,7 @@ Millimetres on the head: x to its left, y up, z out of the face.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,16 +65,16 @@ def iris(columns: int = 256, seed: int = 3) -> NDArray[np.float32]:
     return np.clip(colour, 0.004, 0.98).astype(np.float32)
 
 
-def lids(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Floats]:
+def lids(x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Return, as seen from the middle of the head, x of a point before the eye, and y of the lids' edges there."""
-    across = np.abs(x) * FISSURE / z
+    across = np.abs(x) * FISSURE / np.maximum(z, 1.0)
     share = np.clip((across - CORNERS[0]) / (CORNERS[1] - CORNERS[0]), 0.0, 1.0)  # from the inner corner to the outer
     arch = np.sqrt(np.maximum(share * (1.0 - share), 0.0)) * 2.0
     tilt = 2.6 + 2.6 * share
     return across, tilt + 5.7 * arch**1.15 * (1.12 - 0.24 * share), tilt - 4.2 * arch**1.2 * (0.8 + 0.4 * share)
 
 
-def rise(value: Floats, low: float, high: float) -> Floats:
+def rise(value: NDArray[Any], low: float, high: float) -> NDArray[Any]:
     """Return a smooth rise from 0 at low to 1 at high."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)

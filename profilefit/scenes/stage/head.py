@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def hair(detail: int = 1) -> Part:
     return Part(replace(mesh, position=moved.T), colour.astype(np.float32), roughness=0.7, is_translucent=False)
 
 
-def crop(points: Floats, noise: Floats | float = 0.0) -> Floats:
+def crop(points: NDArray[Any], noise: NDArray[Any] | float = 0.0) -> Floats:
     """Return the share of cropped hair in [0, 1] at points (3, ...), whose line wanders by a noise [mm]."""
     _, y, z = points
     return rise(y - np.interp(z, *HAIRLINE) + noise, -3.0, 5.0)
@@ -113,14 +114,14 @@ def texels(columns: int) -> NDArray[np.float32]:
     return np.stack([map_coordinates(grid[..., axis], at, order=1) for axis in range(3)])
 
 
-def brow(out: Floats, y: Floats) -> tuple[Floats, Floats]:
+def brow(out: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the height above the eyebrow's middle, so far out from the nose, and half its thickness, 0 beyond [mm]."""
     middle = BROW(np.clip(out, 8.0, 54.0))
     thick = np.interp(out, [8.9, 9.0, 11.0, 20.0, 36.0, 50.0, 53.0, 53.1], [0.0, 2.5, 3.8, 4.2, 3.4, 1.6, 0.8, 0.0])
     return y - middle, thick
 
 
-def lips(points: Floats) -> tuple[Floats, Floats]:
+def lips(points: NDArray[Any]) -> tuple[Floats, Floats]:
     """Return the share of the lips' red in [0, 1] at points (3, ...), and the height above the lips' line [mm]."""
     x, y, z = points
     deep = np.maximum(z, 1.0)
@@ -199,7 +200,7 @@ def _mouth(p: Floats, s: Floats) -> Floats:
     s += 1.3 * _mark(p, ((17, -33), (28, -45), (35, -62)), 4.2)  # fold beside the mouth
     s = carved(s, rod(p, (0, -81, 97), (14, -82, 92), (7, 5)), 9)  # above the chin
     # Lips are drawn as seen from the middle of the head, so that each ray leaves them once.
-    across, height = x * MOUTH / z, y * MOUTH / z
+    across, height = x * MOUTH / np.maximum(z, 1.0), y * MOUTH / np.maximum(z, 1.0)
     out = np.clip(across / LIP_END, 0.0, 1.0)
     depth = 89.8 - 11.0 * out**2
     middle = _between_lips(across)
@@ -214,7 +215,7 @@ def _mouth(p: Floats, s: Floats) -> Floats:
 def _eye(p: Floats, s: Floats) -> Floats:
     x, y, z = p
     across, top, bottom = lids(x, y, z)
-    height = y * FISSURE / z
+    height = y * FISSURE / np.maximum(z, 1.0)
     near = rise(across, 15.0, 28.0) * rise(-across, -62.0, -40.0)
     s = joined(s, ellipsoid(p, EYE, (LID, LID, LID)), 5)
     s -= near * 1.6 * np.exp(-(((height - top - 10.0) / 4.5) ** 2))  # above the lid
@@ -239,7 +240,7 @@ def _mark(p: Floats, line: tuple[tuple[float, float], ...], width: float) -> Flo
 def ear(side: int, detail: int = 1) -> Mesh:
     """Return a plate of 3 mm with a rolled rim, a bowl and a lobe, flared out; side -1 at the picture's left."""
     u, v = parameters(128 * detail, 192 * detail)
-    turn, around = np.pi * v, 2.0 * np.pi * u
+    turn, around = np.pi * v, 2.0 * np.pi * (u % 1.0)
     edge = _outline(around)
     share = np.sin(turn) ** 0.9
     back, up = MIDDLE[0] + edge * share * np.cos(around), MIDDLE[1] + edge * share * np.sin(around)
@@ -279,6 +280,7 @@ def _relief(back: Floats, up: Floats, rim: Floats, around: Floats) -> Floats:
     anti = np.interp(angle, [0, 60, 110, 130, 230, 270, 300, 360], [1, 0.9, 0.4, 0, 0, 0.5, 1, 1])
     total = rolled * (3.4 * np.exp(-(((rim - 2.2) / 1.9) ** 2)) - 1.6 * np.exp(-(((rim - 6.3) / 2.2) ** 2)))
     total += anti * 3.2 * np.exp(-(((rim - 11.0) / 2.6) ** 2))
+    total *= rise(np.hypot(back - MIDDLE[0], up - MIDDLE[1]), 0.0, 4.0)  # in the middle all angles are one
     total += 4.6 * hill((0.5, -5.0), 3.6, 5.0)  # tragus
     total += 3.6 * hill((13.0, -15.5), 4.5, 3.0)  # antitragus
     total += 2.6 * hill((6.0, 6.0), 6.0, 2.4)  # foot of the helix
@@ -299,7 +301,7 @@ def neck(detail: int = 1) -> Mesh:
 def band(detail: int = 1, thickness: float = 1.6) -> Mesh:
     """Return the brim of a visor, which stands off the brow; light shines through it."""
     u, v = parameters(192 * detail, 48 * detail)
-    angle, around = np.radians(BRIM) * (2.0 * v - 1.0), 2.0 * np.pi * u
+    angle, around = np.radians(BRIM) * (2.0 * v - 1.0), 2.0 * np.pi * (u % 1.0)
     width = 40.0 * np.cos(0.5 * np.pi * (2.0 * v - 1.0)) ** 0.6
     out = width * (0.5 - 0.5 * _squared(np.cos(around), 0.8))
     x, z = (75.0 + out) * np.sin(angle), (92.0 + out) * np.cos(angle) - 4.0
@@ -311,7 +313,7 @@ def band(detail: int = 1, thickness: float = 1.6) -> Mesh:
 def strap(detail: int = 1) -> Mesh:
     """Return the visor's strap around the skull."""
     u, v = parameters(32 * detail, 192 * detail)
-    angle, around = 2.0 * np.pi * u, 2.0 * np.pi * v
+    angle, around = 2.0 * np.pi * (u % 1.0), -2.0 * np.pi * (v % 1.0)
     way = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
     up = STRAP + 10.0 + 12.0 * _squared(np.sin(around), 0.4)
     origin = np.stack([np.zeros_like(up), up, np.full_like(up, -10.0)], axis=-1)
