@@ -52,13 +52,22 @@ class Canvas:
             self.left[..., channel] *= 1.0 + np.float32(one - 1.0) * share
 
     def noise(self, width: float) -> Numbers:
-        """Return (rows, columns) soft noise of deviation 1; its width is of the face [mm]."""
+        """Return (rows, columns) soft noise of deviation about 1; width [mm]."""
+        before, beside = (self._noise(width / self.up[at], width / self.along[at]) for at in self._texels)
+        share = rise(self.along, *(self.along[at] for at in self._texels))
+        return np.asarray(before + (beside - before) * share)
+
+    @property
+    def _texels(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Texels in the middle of the face and beside it, where columns are farther apart."""
         rows, columns = self.along.shape
-        middle = rows // 2, columns // 2
-        sigma = np.array([width / self.up[middle], width / self.along[middle]])
-        few = max(int(sigma.min() / 3.0), 1)  # wide noise needs few texels
+        return (rows // 2, columns // 2), (rows // 2, columns // 4)
+
+    def _noise(self, tall: float, wide: float) -> Numbers:
+        rows, columns = self.along.shape
+        few = max(int(min(tall, wide) / 3.0), 1)  # wide noise needs few texels
         field = self.rng.standard_normal((rows // few, columns // few), np.float32)
-        field = gaussian_filter(field, sigma / few, mode=("nearest", "wrap"))
+        field = gaussian_filter(field, (tall / few, wide / few), mode=("nearest", "wrap"))
         at = np.meshgrid(*((np.arange(n) + 0.5) / few - 0.5 for n in (rows, columns)), indexing="ij")
         field = field if few == 1 else map_coordinates(field, at, order=1, mode="grid-wrap")
         return np.asarray(field / field.std())
@@ -125,7 +134,8 @@ def face(columns: int, seed: int = 7) -> NDArray[np.float32]:
     canvas.blend(CAVITY, spot(6.6, -43.5, 3.6, 2.6, 4.0))
     canvas.dots(FRECKLES, 0.02 + spot(16, -12, 30, 18) + 0.3 * spot(0, 45, 50, 20), (0.4, 1.1), FRECKLE)
     canvas.dots(STUBBLE, jaw + 1e-9, (0.1, 0.16), BEARD)
-    canvas.left = 1.0 + (canvas.left - 1.0) * rise(y, -118.0, -92.0)[..., None]  # the neck is even, as its mesh is
+    skull = rise(y + 0.5 * np.clip(z - 20.0, 0.0, 60.0), -92.0, -70.0)  # the neck is even, as its mesh is
+    canvas.left = 1.0 + (canvas.left - 1.0) * skull[..., None]
     even = (z > 55.0) & (y > -90.0) & (y < 35.0)
     canvas.left /= np.median(canvas.left[even], axis=0)  # most of the face has the A that was given
     _brows(canvas)

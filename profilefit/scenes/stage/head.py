@@ -252,7 +252,7 @@ def ear(side: int, detail: int = 1) -> Mesh:
     points = np.stack([c * out + s * back, up, s * out - c * back], axis=-1) + np.array(ROOT)
     points[..., 0] *= side
     mesh = sheet(points, u, v, closed=True)
-    return mesh if side > 0 else Mesh(mesh.position, -mesh.normal, mesh.uv, mesh.triangles[:, ::-1])
+    return mesh if side < 0 else Mesh(mesh.position, -mesh.normal, mesh.uv, mesh.triangles[:, ::-1])
 
 
 def _outline(around: Floats) -> Floats:
@@ -276,7 +276,7 @@ def _relief(back: Floats, up: Floats, rim: Floats, around: Floats) -> Floats:
         return np.asarray(np.exp(-(((back - at[0]) / wide) ** 2) - ((up - at[1]) / tall) ** 2))
 
     angle = np.degrees(around)
-    rolled = rise(angle, -1.0, 0.0) * np.interp(angle, [0, 165, 200, 235, 300, 330, 360], [1, 1, 0, 0, 0.1, 0.9, 1])
+    rolled = rise(angle, -1.0, 0.0) * np.interp(angle, [0, 140, 205, 235, 300, 330, 360], [1, 1, 0, 0, 0.1, 0.9, 1])
     anti = np.interp(angle, [0, 60, 110, 130, 230, 270, 300, 360], [1, 0.9, 0.4, 0, 0, 0.5, 1, 1])
     total = rolled * (3.4 * np.exp(-(((rim - 2.2) / 1.9) ** 2)) - 1.6 * np.exp(-(((rim - 6.3) / 2.2) ** 2)))
     total += anti * 3.2 * np.exp(-(((rim - 11.0) / 2.6) ** 2))
