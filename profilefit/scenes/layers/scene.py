@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import Annotated, Literal, Self
 
@@ -27,7 +28,7 @@ from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage import eye, head, request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge, surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
@@ -39,7 +40,7 @@ OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
 POSES = ("rest", "turn", "nod")
 NEGLIGIBLE = 0.01  # share of white that directions may be wrong by before light scattered once is drawn by itself
 NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
-COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
+COLUMNS, BLOTCHES, SEED = 512, 40, 5  # of the thickness over the head, if it is no image
 
 
 class LayersTechnique(request.TechniqueTable):
@@ -170,15 +171,19 @@ def scene_of(of: LayersRequest) -> Scene:
     values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
     if of.surface.parts:
         own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
-        return Scene(own, of.light, of.ambient, of.camera, f0)
-    meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
-    parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
+        return of.under_light(Scene(own, camera=of.camera, f0=f0))
+    skin = [Part(mesh, values) for mesh in (head.head(), head.ear(-1), head.ear(1), head.neck())]
+    if of.stack.map is None and of.uneven > 0:
+        red, _ = head.lips(head.texels(COLUMNS))
+        skin[0] = replace(skin[0], reflectance=(values * (1.0 - red[..., None])).astype(np.float32))
+    rest = (*skin, *eye.eyes(), head.hair())
+    parts = tuple(replace(part, mesh=deformed(part.mesh, lambda points: posed(points, of.pose))) for part in rest)
     return of.under_light(Scene(parts, camera=of.camera, f0=f0))
 
 
 def posed(points: Floats, pose: str) -> Floats:
     """Return points of the head at rest, moved: the neck stays, the head turns about it or nods, smoothly between."""
-    share = np.clip((points[:, 1] + 170.0) / 130.0, 0.0, 1.0)
+    share = np.clip((points[:, 1] + 210.0) / 95.0, 0.0, 1.0)
     angle = {"rest": 0.0, "turn": np.radians(25.0), "nod": np.radians(12.0)}[pose] * share**2 * (3.0 - 2.0 * share)
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = points.T

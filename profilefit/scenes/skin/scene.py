@@ -34,9 +34,10 @@ from profilefit.recipes.declared import (
     words,
 )
 from profilefit.scenes.skin.law import Separable
-from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, translucent
+from profilefit.scenes.skin.material import Painted, Translucent, plain, translucent
+from profilefit.scenes.skin.paint import skin
 from profilefit.scenes.skin.passes import SeparableFilter
-from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage import eye, head, request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import surface_judge, whole_judge
@@ -52,6 +53,7 @@ class Head(Scene):
     material: Translucent = field(default_factory=translucent)
 
 
+CLOTH = (0.03, 0.05, 0.11)  # A of the visor's strap
 FACE = Camera(eye=(-95.0, 20.0, 690.0), target=(0.0, -6.0, 0.0), height=290.0)
 
 
@@ -79,6 +81,8 @@ def head_scene(
         Part(head.ear(-1, detail), even),
         Part(head.ear(1, detail), even),
         Part(head.neck(detail), even),
+        *eye.eyes(detail),
+        Part(head.strap(detail), plain(CLOTH), roughness=0.8, is_translucent=False),
         Part(head.band(detail), pale, roughness=0.6),
     )
     return Head(parts, camera=camera, material=what)

@@ -181,7 +181,7 @@ class Viewpoint(NamedTuple):
     height: float
 
 
-HEAD = Viewpoint((4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0)
+HEAD = Viewpoint((-14.0, -23.0, 60.0), 650.0, (-160.0, 0.0, 640.0), 150.0)
 
 
 class ViewRequest(Declared):

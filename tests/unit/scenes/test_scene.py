@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.scenes.skin import material
+from profilefit.scenes.skin import paint
 from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage import head
@@ -85,11 +85,12 @@ def test_meshes_of_the_head_are_sound():
 
 def test_texture_is_skin_with_fine_detail():
     reflectance = translucent("skin1").reflectance
-    face = material.skin(reflectance, columns=512)
+    face = paint.skin(reflectance, columns=512)
     assert face.shape == (256, 512, 3)
     assert 0 < face.min() < face.max() < 1
-    np.testing.assert_allclose(np.median(face, axis=(0, 1)), reflectance, rtol=0.05)
-    np.testing.assert_array_equal(face, material.skin(reflectance, columns=512))
+    middle = face[60:170, 170:342]  # from the chin to the brow
+    np.testing.assert_allclose(np.median(middle, axis=(0, 1)), reflectance, rtol=0.05)
+    np.testing.assert_array_equal(face, paint.skin(reflectance, columns=512))
     cheek = face[115:125, 200:300]
     assert np.ptp(cheek[..., 1]) > 0.3 * reflectance[1]
 

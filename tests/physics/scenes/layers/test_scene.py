@@ -18,7 +18,7 @@ from profilefit.scenes.stage.stage import Stage
 from tests.unit.scenes.scenes import changed, mistaken, outward, refused
 
 EXAMPLE = read_toml(shipped("examples") / "layers-head.toml")
-FOOT, WHOLE = -170.0, -40.0  # y below which nothing moves, and above which the head does as one [mm]
+FOOT, WHOLE = -210.0, -115.0  # y below which nothing moves, and above which the head does as one [mm]
 IMAGE = {"image": "thickness.png", "range": [0.05, 0.4]}
 content = partial(changed, EXAMPLE)
 
