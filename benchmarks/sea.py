@@ -212,8 +212,9 @@ def waters() -> Rows:
     of, rows = tradeoff.example("sea"), []
     with opened() as context:
         for factor in FACTORS:
-            red, green, blue = (factor * one for one in of.water.b)
-            with reference_render(context, of.changed(water={"b": (red, green, blue)}), OF_WATER) as drawn:
+            red, green, blue = (factor * one for one in of.water.coefficients.b)
+            water = {"a": of.water.coefficients.a, "b": (red, green, blue)}
+            with reference_render(context, of.changed(water=water), OF_WATER) as drawn:
                 errors = (drawn.judge.rmse(drawn.picture(kind, of.sampling.samples)) for kind in KINDS)
                 rows.append((factor, float(max(drawn.request.world.omega)), *errors))
     return rows

@@ -27,6 +27,16 @@ from profilefit.shader.context import open_context
 
 # The files that ship as examples, by their names.
 EXAMPLES = {path.name: str(path) for path in sorted((Path(__file__).parents[1] / "examples").iterdir())}
+# A clearer and shallower sea than the example's, away from the sun's glare.
+CLEAR_SEA = {
+    "scene": "sea",
+    "water": {"a": [0.25, 0.08, 0.06], "b": [0.08, 0.08, 0.08], "source": "assumed"},
+    "sea": {"slope": 0.12, "tile": 5.0, "seed": 4},
+    "floor": {"depth": 4.0},
+    "technique": {"slices": 6},
+    "camera": {"eye": [6.0, 2.5, -2.2], "target": [0.0, 2.5, -2.4], "angle": 1.1},
+    "light": {"direction": [-0.5, 0.0, 0.9], "ambient": [0.25, 0.32, 0.42]},
+}
 # A law's tests must not move with the records: this map is within 3e-6 of the exact A, its digits are frozen here.
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 

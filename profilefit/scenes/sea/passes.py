@@ -23,8 +23,10 @@ SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the vie
 GAUSSIANS = 4  # of the floor's light
 FADING = 512  # texels of the table of what the water leaves
 DARK = 1e-3  # of wide light, from where on nothing is seen
+LEAST_SPREAD = 1e-3  # of the sun's rays [rad], below which the phase function is as it is
 FARTHEST = 60.0  # by the attenuation, where that is not reached before
 GLOW, DEPTHS = 128, 32  # cosines and depths of the sky's and the floor's light
+TURNS = 1024  # angles of the phase function
 CONE = 512  # angles of that light to the vertical
 
 
@@ -62,14 +64,15 @@ class SeaPasses:
             rows, text = (below, below + texels), text_beside(__name__, "glsl/stack.frag")
             stack = Pass("stack", {"light_map": one.map}, SHAFTS, text, {"below": below}, rows=rows)
             self.light["caustics in depths"] += [*one.passes(splat), stack]
-        self._lobes = _four(np.array(world.lobes)[None])
+        self._turns = _four(np.log(blurred_phase(world, TURNS))[None, :, None])
         self._tables: dict[str, tuple[Singles, Singles, Singles]] = {}
 
-    def view(self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int) -> Pass:
+    def view(self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int, views: int = 1) -> Pass:
         """Return the pass of the radiance that a camera sees, after those of `light`: z is up.
 
         size  columns and rows;  kind  one of `haze.KINDS`
         pieces, steps  of a ray through the water, and of the search for a hit
+        views          of a pixel along a side, each of which looks at another place of a piece
         """
         self.renderer.declare(VIEW, size)
         world, (right, up, forward) = self.world, axes(camera, size)
@@ -79,7 +82,7 @@ class SeaPasses:
             "sea_waves": world.sea.texels,
             "floor_waves": world.floor.texels,
             "fade_map": fade,
-            "lobe_map": self._lobes,
+            "turn_map": self._turns,
             "glow_map": glowing,
             "blur_map": blur,
             "floor_map": self._floor.map,
@@ -113,6 +116,7 @@ class SeaPasses:
             "turn": TURN,
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
+            "views": checked_whole("views", views, 1, 64),
         }
         shared, own = map(read_text, ("common", "near_zero")), (text_beside(__name__, f"glsl/{one}") for one in SOURCES)
         return Pass("view", reads, VIEW, "".join((*shared, *own)), given)
@@ -172,6 +176,25 @@ def reach_of(world: World) -> float:
         _, _, wide = ways(omega, far, np.inf, world.lobes, BROADENED)
         found.append(far[np.argmax(wide > -np.log(DARK))] / c if wide[-1] > -np.log(DARK) else FARTHEST / c)
     return float(max(found))
+
+
+def blurred_phase(world: World, count: int) -> Floats:
+    """Return the phase function [1/sr] that sunlight behind the waves has, at angles pi x^4, x even from 0 to 1.
+
+    Its rays spread as Gaussian angles do, by which moment l of a phase function, g^l, is exp(-l (l + 1) spread^2 / 4)
+    as large.
+    """
+    cosine = np.cos(np.pi * np.linspace(0.0, 1.0, count) ** 4)
+    if world.spread < LEAST_SPREAD:
+        return np.asarray(world.phase.pdf(cosine))
+    found, before, polynomial = np.zeros(count), np.zeros(count), np.ones(count)
+    for order in range(int(8.0 / world.spread)):
+        moment = sum(weight * g**order for weight, g in world.lobes)
+        share = moment * np.exp(-0.25 * order * (order + 1) * world.spread**2)
+        found += (2 * order + 1) / (4.0 * np.pi) * share * polynomial
+        after = ((2 * order + 1) * cosine * polynomial - order * before) / (order + 1)
+        before, polynomial = polynomial, after
+    return found
 
 
 def glow(world: World, kind: str, depths: Floats, sky: Floats, floor: Floats) -> NDArray[np.float32]:

@@ -7,9 +7,12 @@ of its closed forms. Lengths in metres, z up.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -109,18 +112,21 @@ def traced(
     Sight of the sun itself is left out. A ray that goes down meets no trough of the waves.
     """
     each = checked_whole("paths", paths, 2) // 2
-    found = np.zeros((2, len(corner), 3))
     at_once = max(TOGETHER // each, 1)
-    for half in range(2):
-        for first in range(0, len(corner), at_once):
-            part = np.repeat(corner[first : first + at_once], each, axis=0)
-            rng = np.random.default_rng([seed, half, first])
-            spot = rng.random((2, len(part), 1))
-            way = part + spot[0] * across + spot[1] * up
-            way /= np.linalg.norm(way, axis=1)[:, None]
-            start = np.broadcast_to(origin, way.shape).copy()
-            found[half, first : first + at_once] = followed(world, light, start, way, rng).reshape(-1, each, 3).mean(1)
-    return found
+
+    def means(half: int, first: int) -> Floats:
+        part = np.repeat(corner[first : first + at_once], each, axis=0)
+        rng = np.random.default_rng([seed, half, first])
+        spot = rng.random((2, len(part), 1))
+        way = part + spot[0] * across + spot[1] * up
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        start = np.broadcast_to(origin, way.shape).copy()
+        return followed(world, light, start, way, rng).reshape(-1, each, 3).mean(1)
+
+    starts = range(0, len(corner), at_once)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        parts = list(threads.map(lambda part: means(*part), product(range(2), starts)))
+    return np.concatenate(parts).reshape(2, len(corner), 3)
 
 
 def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Floats:

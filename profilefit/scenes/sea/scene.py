@@ -19,7 +19,7 @@ from profilefit.scenes.sea.caustics import Splat, focus, splat_for
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.passes import SeaPasses, axes
 from profilefit.scenes.sea.paths import Sunlight, traced
-from profilefit.scenes.sea.water import World, checked_lobes
+from profilefit.scenes.sea.water import JERLOV, Jerlov, World, checked_lobes
 from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.stage import request
 from profilefit.scenes.stage.drawing import Drawer, RayDrawing
@@ -37,14 +37,15 @@ MOST_ROWS = 16384  # of a column of maps
 WIDEST = 2.5  # [rad]
 LARGEST = 1000.0  # length [m]
 MOST_WATER = 100.0  # a coefficient [1/m]
-PATHS, MOST_PATHS = 2_000_000, 1024  # of a reference, and of one of its pixels
+PATHS, MOST_PATHS = 6_000_000, 1024  # of a reference, and of one of its pixels
 WHITE = 0.99  # share of the reference that a picture does not clip
+
+COLOURS = f"three numbers in 0 ... {MOST_WATER:g} [1/m]"
+WATERS = {"a": COLOURS, "b": COLOURS, "source": "a text that says where a and b are from"}  # of one's own water
 
 
 Coefficient = Annotated[float, Field(ge=0.0, le=MOST_WATER)]
-Coefficients = Annotated[
-    tuple[Coefficient, Coefficient, Coefficient], LISTED, words(f"three numbers in 0 ... {MOST_WATER:g} [1/m]")
-]
+Coefficients = Annotated[tuple[Coefficient, Coefficient, Coefficient], LISTED, words(COLOURS)]
 Slope = Annotated[float, Field(ge=0.0, le=2.0)]
 Length = Annotated[float, Field(gt=0.0, le=LARGEST)]
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
@@ -55,18 +56,24 @@ WINDS = "two speeds in -100 ... 100 [m/s], not both 0"
 
 
 class WaterTable(Declared):
-    """Table [water]: absorption `a` and scattering `b` of red, green and blue, refractive index, phase function.
+    """Table [water]: a type by Jerlov, or absorption `a` and scattering `b` of red, green and blue, and their source.
 
-    phase  a fitted one by its name, or pairs [weight, g] of Henyey and Greenstein's terms
+    phase  a fitted one by its name, or pairs [weight, g] of Henyey and Greenstein's terms;  n  refractive index
     """
 
-    a: Coefficients
-    b: Coefficients
+    type: Annotated[str, OneOf(*JERLOV)] = "IB"
+    a: Coefficients | None = None
+    b: Coefficients | None = None
     phase: Annotated[
         str | Annotated[list[Any], LISTED], words("the name of a phase function, or pairs [weight, g]")
     ] = PHASE
     n: Annotated[float, Field(gt=0.0, le=2.0)] = INDEX
-    source: Annotated[Text, words("a text that says where a and b are from")]
+    source: Annotated[Text, words(WATERS["source"])] | None = None
+
+    @property
+    def coefficients(self) -> Jerlov:
+        """Absorption and scattering of red, green and blue [1/m]."""
+        return JERLOV[self.type] if self.a is None or self.b is None else Jerlov(self.a, self.b)
 
     @cached_property
     def lobes(self) -> tuple[tuple[float, float], ...]:
@@ -78,6 +85,12 @@ class WaterTable(Declared):
 
     @model_validator(mode="after")
     def _known(self) -> Self:
+        given = [key for key in WATERS if getattr(self, key) is not None]
+        for key in WATERS if given else ():
+            if key not in given:
+                raise Refused(WATERS[key], None, key)
+        if given and "type" in self.model_fields_set:
+            raise Refused("left out where a and b are given", self.type, "type")
         _ = self.lobes
         return self
 
@@ -85,10 +98,10 @@ class WaterTable(Declared):
 class SeaTable(Declared):
     """Table [sea]: root mean square slope [-], side of the tile [m], wind [m/s]; time  for which waves move [s]."""
 
-    slope: Slope = 0.12
-    tile: Length = 5.0
+    slope: Slope = 0.17
+    tile: Length = 3.0
     wind: Annotated[tuple[Speed, Speed], LISTED, words(WINDS)] = (WIND, 0.0)
-    seed: Seed = 4
+    seed: Seed = 7
     time: request.Seconds = 0.0
 
     @model_validator(mode="after")
@@ -101,7 +114,7 @@ class SeaTable(Declared):
 class FloorTable(Declared):
     """Table [floor]: mean depth [m], root mean square slope [-], reflectance of red, green and blue [-]."""
 
-    depth: Length = 4.0
+    depth: Length = 8.0
     slope: Slope = 0.08
     reflectance: Shares = (0.42, 0.38, 0.30)
     seed: Seed = 2
@@ -115,10 +128,10 @@ class SeaTechnique(request.TechniqueTable):
 
     kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
     splat: Annotated[str, OneOf(AUTO, *SPLATS)] = AUTO
-    samples: request.Samples = 12
+    samples: request.Samples = 24
     vertices: Side = 128
     texels: Side = 256
-    slices: Annotated[int, Field(ge=2, le=32)] = 6
+    slices: Annotated[int, Field(ge=2, le=32)] = 16
     steps: Annotated[int, Field(ge=1, le=64)] = 16
     supersampling: Annotated[int, Field(ge=1, le=8)] = 2
 
@@ -132,12 +145,12 @@ class SeaTechnique(request.TechniqueTable):
 class SeaCamera(request.ResolutionTable):
     """Table [camera]: eye and target [m];  angle  the picture's height [rad]."""
 
-    reference_pixel: Annotated[int, Field(ge=1, le=16)] = 4
-    eye: Point = (6.0, 2.5, -2.2)
-    target: Point = (0.0, 2.5, -2.4)
+    reference_pixel: Annotated[int, Field(ge=1, le=16)] = 5
+    eye: Point = (6.0, 2.5, -6.4)
+    target: Point = (2.0, 2.5, -5.7)
     angle: Annotated[
         float, Field(gt=0.0, le=WIDEST), words(f"the picture's height as an angle in 0 ... {WIDEST:g} radians")
-    ] = 1.1
+    ] = 1.3
 
     @model_validator(mode="after")
     def _aslant(self) -> Self:
@@ -150,9 +163,9 @@ class SeaCamera(request.ResolutionTable):
 class SeaLight(request.OneLampTable):
     """Table [light]: direction toward the sun."""
 
-    direction: request.Direction = (-0.5, 0.0, 0.9)
+    direction: request.Direction = (-0.6, 0.0, 0.8)
     irradiance: request.Irradiances = (3.0, 2.9, 2.7)
-    ambient: request.Irradiances = (0.25, 0.32, 0.42)
+    ambient: request.Irradiances = (0.04, 0.06, 0.09)
 
     @model_validator(mode="after")
     def _along(self) -> Self:
@@ -169,7 +182,7 @@ class SeaRequest(request.ViewRequest):
     moving: ClassVar[str] = "sea"
     scene: Annotated[str, OneOf("sea")] = "sea"
     unit: Text = "m"
-    water: WaterTable
+    water: WaterTable = Field(default_factory=WaterTable)
     sea: SeaTable = SeaTable()
     floor: FloorTable = FloorTable()
     technique: SeaTechnique = SeaTechnique()
@@ -195,7 +208,8 @@ class SeaRequest(request.ViewRequest):
         x, _, z = self.light.direction
         tilt = float(np.arctan2(-x, z))
         sun, sky = self.light.irradiance, self.ambient
-        return World(water.a, water.b, water.lobes, water.n, waves, bed, floor.reflectance, tilt, sun, sky)
+        a, b = water.coefficients
+        return World(a, b, water.lobes, water.n, waves, bed, floor.reflectance, tilt, sun, sky)
 
     @property
     def splat(self) -> Splat:
@@ -250,7 +264,8 @@ class SeaRender(NamedTuple):
 
     def _view(self, kind: str, samples: int) -> Pass:
         of, fine = self.request, self.request.technique.supersampling
-        return self.passes.view(of.camera, (of.size[0] * fine, of.size[1] * fine), kind, samples, of.technique.steps)
+        size = of.size[0] * fine, of.size[1] * fine
+        return self.passes.view(of.camera, size, kind, samples, of.technique.steps, fine)
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +12,30 @@ from numpy.typing import ArrayLike
 from mcml_sim.media.arrays import Floats, checked_numbers, require
 from mcml_sim.media.medium import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, refracted, require_below
 from profilefit.scenes.stage.world import Rgb
 
+FINE = 256  # points of a side of the tile, where the sun's rays are looked at
 ROUNDING = 1e-6  # by which weights may miss a sum of 1
+
+
+class Jerlov(NamedTuple):
+    """Absorption a and scattering b of a water of red, green and blue [1/m]."""
+
+    a: Rgb
+    b: Rgb
+
+
+# Waters of Jerlov's types, as measured: C. A. Williamson and R. C. Hollins, Measured IOPs of Jerlov water types, Appl.
+# Opt. 61, 9951 (2022), table 7, at 610, 550 and 460 nm. Read from its copy in the package `jerlov` 0.22.0.
+JERLOV = {
+    "IB": Jerlov((0.273, 0.0655, 0.0390), (0.117, 0.122, 0.133)),
+    "II": Jerlov((0.277, 0.0724, 0.0588), (0.168, 0.177, 0.193)),
+    "III": Jerlov((0.287, 0.0878, 0.104), (0.277, 0.287, 0.307)),
+    "1C": Jerlov((0.294, 0.0988, 0.137), (0.413, 0.427, 0.452)),
+    "3C": Jerlov((0.314, 0.128, 0.186), (0.624, 0.644, 0.681)),
+    "5C": Jerlov((0.333, 0.159, 0.283), (1.16, 1.19, 1.26)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +111,16 @@ class World:
         """Share of the sky's irradiance that a calm sea lets in [-]."""
         cosine = (np.arange(4096) + 0.5) / 4096
         return float(2.0 * np.mean((1.0 - fresnel(1.0, self.n, cosine)[0]) * cosine))
+
+    @cached_property
+    def spread(self) -> float:
+        """Root mean square angle of the sun's rays behind the waves to the calm sea's [rad]."""
+        x = np.arange(FINE) * self.sea.tile / FINE
+        _, *slope = self.sea.lattice(x, x)
+        along, across, flux = refracted(self.tilt, (slope[0], slope[1]), self.n)
+        ways = np.stack([along, across, -np.ones(flux.shape)]) / np.sqrt(1.0 + along**2 + across**2)
+        square = np.sum((ways - self.beam[:, None, None]) ** 2, axis=0)
+        return float(np.sqrt(np.sum(flux * square) / np.sum(flux)))
 
     @property
     def shaft(self) -> float:

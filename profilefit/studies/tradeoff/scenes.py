@@ -85,7 +85,7 @@ def measure_fur(sizes: FurSizes = FUR, track: Track = silent) -> TradeoffPart:
     return TradeoffPart("fur", "Fur in layers", tuple(panels), notes)
 
 
-SMALL = {"sea": (128, 96), "fur": (160, 120)}  # pixels of a picture that is drawn again and again
+SMALL = {"sea": (160, 90), "fur": (160, 120)}  # pixels of a picture that is drawn again and again
 
 
 def example(name: str) -> Any:

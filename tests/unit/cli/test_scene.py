@@ -21,12 +21,12 @@ from profilefit.shader import opened
 from tests.fixtures import EXAMPLES, slow
 
 # What a file of each scene must have: all else may be left out.
-NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",), "fur": ()}
+NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": (), "fur": ()}
 OWN = {
     "skin": ("label", "material", "setting"),
     "layers": ("pose", "single"),
     "heart": ("surface", "stack", "illumination"),
-    "sea": ("sea", "floor"),
+    "sea": ("sea", "floor", "water"),
     "fur": ("fur", "shading_table"),
 }
 SMALL = """\
@@ -173,6 +173,11 @@ phase = [[0.9, 0.95], [0.1, 0.3]]
 SEA_MISTAKES = [
     ("[0.3, 0.1, 0.08]", "[-0.3, 0.1, 0.08]", "[water] a must be three numbers in 0 ... 100 [1/m], got [-0.3,"),
     ('source = "assumed"\n', "", "[water] source must be a text that says where a and b are from, got nothing"),
+    ('source = "assumed"\n', 'source = "assumed"\ntype = "II"\n',
+     "[water] type must be left out where a and b are given, got 'II'"),
+    ("b = [0.1, 0.1, 0.1]\n", "", "[water] b must be three numbers in 0 ... 100 [1/m], got nothing"),
+    ('a = [0.3, 0.1, 0.08]\nb = [0.1, 0.1, 0.1]\nsource = "assumed"', 'type = "IV"',
+     "[water] type must be one of IB, II, III, 1C, 3C, 5C, got 'IV'"),
     ("[0.1, 0.3]]", "[0.2, 0.3]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
     ("[0.1, 0.3]]", "[0.1, 1.0]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
     ("[[0.9, 0.95], [0.1, 0.3]]", '"fog"',

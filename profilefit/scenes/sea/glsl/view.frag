@@ -4,7 +4,7 @@ out vec4 radiance;
 uniform sampler2D sea_waves;
 uniform sampler2D floor_waves;
 uniform sampler2D fade_map;  // optical lengths over lengths to `reach`: rows of what is sharp, of shafts, of wide light
-uniform sampler2D lobe_map;  // weight and g of Henyey and Greenstein's terms
+uniform sampler2D turn_map;  // ln of the phase function, blurred by the spread of the sun's rays, over (angle / pi)^(1/4)
 uniform sampler2D glow_map;  // -ln of what of sky's and floor's light turns into a view, over its cosine and the depth
 uniform float glow_depth;  // to which that goes [m]
 uniform sampler2D blur_map;  // Gaussians of the floor's light: rows of their weights, and of their levels of detail
@@ -36,6 +36,7 @@ uniform vec3 again;  // irradiance of the floor by its own light, which the surf
 uniform float turn;  // 1 - cosine of turns, a share of 1 / e of which are of unscattered light
 uniform float rate;  // of pieces with equal shares of the light [1/m]
 uniform int pieces;
+uniform int views;  // of a pixel along a side, which look at different places of a piece
 const float PI = 3.141592653589793;
 const float SPREAD = 0.06;  // angle by which light spreads on its way to the eye, whose picture of the floor it blurs [rad]
 
@@ -66,14 +67,10 @@ vec3 fading(int row, float way) {
     return row_of(fade_map, row, way / reach);
 }
 
-float phase_of(float cosine) {
-    float sum = 0.0;
-    for (int i = 0; i < textureSize(lobe_map, 0).x; ++i) {
-        vec2 one = texelFetch(lobe_map, ivec2(i, 0), 0).xy;
-        float square = (1.0 - one.y) * (1.0 - one.y) + 2.0 * one.y * (1.0 - cosine);
-        sum += one.x * (1.0 - one.y * one.y) / (4.0 * PI * square * sqrt(square));
-    }
-    return sum;
+// Phase function between two unit vectors.
+float phase_of(vec3 from, vec3 to) {
+    float angle = 2.0 * asin(min(0.5 * distance(from, to), 1.0));
+    return exp(row_of(turn_map, 0, sqrt(sqrt(angle / PI))).x);
 }
 
 // One map of the column, bilinear; the tile repeats. The map has drifted by whole texels, which `drift` are not.
@@ -115,12 +112,14 @@ vec3 between(vec3 begin, vec3 end, float length) {
 // What the water of a straight way scatters to the eye, which has come `gone` before it begins.
 vec3 haze(vec3 from, vec3 along, float gone, float way) {
     vec3 sum = vec3(0.0);
-    float turned = phase_of(-dot(along, beam)), slant = -1.0 / beam.z;
+    float turned = phase_of(along, -beam), slant = -1.0 / beam.z;
     vec3 sunny = b * sunlight * slant * turned;
     float fresh = exp(-(1.0 + dot(along, beam)) / turn);  // share of this turn's light that was not scattered before
     // A piece that crosses shafts sees their mean: sinc to its second order, of light whose waves are four half-widths.
     float crossed = length(along - beam * along.z / beam.z) / shaft;
     float k = rate, whole = 1.0 - exp(-k * way), t = 0.0;
+    ivec2 view = ivec2(gl_FragCoord.xy) % views;
+    float each = 1.0 / float(views * views), place = (float(view.x + views * view.y) + 0.5) * each;
     vec3 narrow = fading(1, gone) + fading(1, -from.z * slant), wide = fading(2, gone) + fading(2, -from.z * slant);
     vec3 sharp = fading(2, gone) + fading(0, -from.z * slant);
     vec3 glow = fading(2, gone) + glowing(along.z, -from.z);
@@ -131,7 +130,8 @@ vec3 haze(vec3 from, vec3 along, float gone, float way) {
         vec3 narrow_end = fading(1, gone + next) + fading(1, depth * slant);
         vec3 wide_end = back + fading(2, depth * slant), glow_end = back + glowing(along.z, depth);
         vec3 sharp_end = back + fading(0, depth * slant);
-        float light = shaft_at(from + 0.5 * (t + next) * along) - 1.0, share = exp(-0.1028 * step * step * crossed * crossed);
+        float light = shaft_at(from + mix(t, next, place) * along) - 1.0;
+        float share = exp(-0.1028 * step * step * each * each * crossed * crossed);
         vec3 mean = mix(between(wide, wide_end, step), between(sharp, sharp_end, step), fresh);
         sum += sunny * (share * light * between(narrow, narrow_end, step) + mean);
         sum += b * between(glow, glow_end, step);

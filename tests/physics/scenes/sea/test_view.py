@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.special import eval_legendre
 
 from mcml_sim.files.whole_file import read_toml
 from profilefit.scenes.sea import passes as views
@@ -16,11 +17,11 @@ from profilefit.scenes.sea.passes import SeaPasses, axes, glow, mirrored
 from profilefit.scenes.sea.paths import Sunlight, followed
 from profilefit.scenes.sea.scene import WHITE, halves_of, lobes_of, read, reference_render
 from profilefit.scenes.sea.water import World
-from profilefit.scenes.sea.waves import Waves, random_floor, random_sea
+from profilefit.scenes.sea.waves import Waves, random_floor, random_sea, refracted
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.scenes.stage.world import Camera, unit
-from tests.fixtures import EXAMPLES, slow
+from tests.fixtures import CLEAR_SEA, EXAMPLES, slow
 
 TILE, N, DEPTH = 5.0, 1.34, 4.0
 EDGE = np.sqrt(1.0 - 1.0 / N**2)  # cosine of Snell's window
@@ -272,6 +273,46 @@ def test_axes(direction):
     np.testing.assert_allclose([right[2], right @ forward, up @ forward, right @ up], 0.0, atol=1e-12)
 
 
+def test_the_phase_function_behind_waves():
+    """Moments are those of the terms, times those of Gaussian angles; rays drawn around it see its mean."""
+    world = World((0.1,) * 3, (0.1,) * 3, PETZOLD, N, random_sea(0.17, TILE, 7), LEVEL, NONE, 0.6, NONE, NONE)
+    angle = np.pi * np.linspace(0.0, 1.0, 4096) ** 4
+    found = views.blurred_phase(world, 4096)
+    for order in (0, 1, 2, 8, 30):
+        moment = 2.0 * np.pi * np.trapezoid(found * eval_legendre(order, np.cos(angle)) * np.sin(angle), angle)
+        own = sum(weight * g**order for weight, g in PETZOLD)
+        np.testing.assert_allclose(moment, own * np.exp(-0.25 * order * (order + 1) * world.spread**2), atol=1e-5)
+    rays = np.random.default_rng(0).normal(0.0, world.spread / np.sqrt(2.0), (2, 400_000))
+    for one in (0.0, 0.02, 0.1, 0.5):
+        mean = np.mean(world.phase.pdf(np.cos(np.hypot(rays[0] - one, rays[1]))))
+        np.testing.assert_allclose(np.interp(one, angle, found), mean, rtol=0.02)
+    assert found[0] < 0.1 * world.phase.pdf(1.0)
+    calm = replace(world, sea=CALM)
+    np.testing.assert_allclose(views.blurred_phase(calm, 64), world.phase.pdf(np.cos(angle[::65])), rtol=1e-12)
+    assert calm.spread < 1e-12
+    ways = refracted(world.tilt, world.sea.slope(*np.random.default_rng(1).uniform(0.0, TILE, (2, 50_000))), N)
+    rms = np.sqrt(np.average((ways[0] - world.calm[0]) ** 2 + ways[1] ** 2, weights=ways[2]))
+    assert 0.7 * rms < world.spread < rms
+
+
+def test_views_of_a_pixel_share_its_pieces(context, few_directions):
+    """Four views that look at different places of a piece see the shafts as four times as many pieces do."""
+    world = World((0.1,) * 3, (0.2,) * 3, PETZOLD, N, random_sea(0.17, TILE, 7), LEVEL, NONE, 0.6, (3.0,) * 3, NONE)
+    camera = toward((1.0, 2.0, -3.0), (-1.0, 0.1, 0.3), 1.2)
+    with Renderer(context, (1, 1)) as renderer:
+        passes = SeaPasses(renderer, world, Splat.CELLS, 64, 64, 8)
+        for own in passes.light.values():
+            renderer.run(*own)
+
+        def picture(pieces, number):
+            seen = renderer.image(passes.view(camera, (64, 48), BROADENED, pieces, 16, number))[..., 0].astype(float)
+            return seen.reshape(24, 2, 32, 2).mean(axis=(1, 3))
+
+        true, plain, shared = picture(512, 1), picture(8, 1), picture(8, 2)
+    plain, shared = (np.sqrt(np.mean((one - true) ** 2)) / true.mean() for one in (plain, shared))
+    assert shared < 0.75 * plain
+
+
 def test_errors_leave_the_truths_own_noise_out():
     """Of a picture that is off by 0.3 of the mean, judged by halves whose noise is larger; a mean of them is biased."""
     rng = np.random.default_rng(3)
@@ -296,19 +337,24 @@ def test_errors_leave_the_truths_own_noise_out():
 
 
 @pytest.mark.slow
-def test_the_example(context):
+@pytest.mark.parametrize(
+    ("name", "paths", "pieces", "scaled", "single"),
+    [("clear", 300_000, 24, 3.5, 4.5), ("example", 900_000, 64, 2.5, 7.0)],
+)
+def test_seas_beside_their_truth(context, name, paths, pieces, scaled, single):
     """Broadened light is nearest to the truth; more pieces change little, and left is not right."""
-    example = read("sea.toml", read_toml(Path(EXAMPLES["sea.toml"]))).changed(camera_table={"resolution": (32, 24)})
-    with reference_render(context, example, paths=300_000) as drawn:
+    content = CLEAR_SEA if name == "clear" else read_toml(Path(EXAMPLES["sea.toml"]))
+    example = read("sea.toml", content).changed(camera_table={"resolution": (32, 24)})
+    with reference_render(context, example, paths=paths) as drawn:
         found = drawn.judge
-        errors = {kind: found.rmse(drawn.picture(kind, 24)) for kind in KINDS}
-        picture, more = (drawn.picture(BROADENED, samples) for samples in (24, 96))
-        other = halves_of(example, drawn.request.world, 300_000, seed=1)
+        errors = {kind: found.rmse(drawn.picture(kind, pieces)) for kind in KINDS}
+        picture, more = (drawn.picture(BROADENED, samples) for samples in (pieces, 4 * pieces))
+        other = halves_of(example, drawn.request.world, paths, seed=1)
         swapped, upside_down = found.rmse(picture[:, ::-1]), found.rmse(picture[::-1])
         means = picture.mean(axis=(0, 1)) / found.reference.mean(axis=(0, 1))
         assert errors[BROADENED] < 0.17
-        assert errors[SCALED] > 3.5 * errors[BROADENED]
-        assert errors[SINGLE] > max(errors[SCALED], 4.5 * errors[BROADENED])
+        assert errors[SCALED] > scaled * errors[BROADENED]
+        assert errors[SINGLE] > max(errors[SCALED], single * errors[BROADENED])
         assert abs(found.rmse(more) - errors[BROADENED]) < 0.01
         assert min(swapped, upside_down) > 1.8 * errors[BROADENED]
         np.testing.assert_allclose(means, 1.0, atol=0.08)
