@@ -68,7 +68,7 @@ class SurfaceTable(MeshTable):
     """
 
     kind: Annotated[str, OneOf(*meshes.KINDS)] = meshes.KINDS[0]
-    size: Annotated[float, Field(gt=0.0, le=LARGEST)] = 15.0
+    size: Annotated[float, Field(gt=0.0, le=LARGEST)] = 30.0
     steepness: Tolerance = 0.15
     paint: bool = True
     roughness: Tolerance = 0.2
@@ -108,7 +108,7 @@ class HeartTechnique(TechniqueTable):
     kind: Annotated[str, OneOf(*KINDS)] = SPLIT
     samples: Samples = 64
     gaussians: Annotated[int, Field(ge=1, le=MOST)] = 6
-    texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = 0.4
+    texel: Annotated[float, Field(gt=0.0, le=LARGEST)] = 0.6
     tolerance: Tolerance = 0.02
 
 
