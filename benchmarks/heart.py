@@ -22,13 +22,14 @@ from scipy.ndimage import gaussian_filter
 
 import profilefit
 from benchmarks import heart_trials as trials
-from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
+from benchmarks.heart_figure import cost_figure, map_figure
 from benchmarks.heart_fit import GRID, Errors, SplitLight, errors, fitted
 from benchmarks.table import show
 from mcml_sim.files.whole_file import read_toml
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import stack
 from profilefit.recipes.stack.gaussians import shared_gaussians
+from profilefit.report.scene_report import scene_figures
 from profilefit.scenes.heart import chart, scene
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
@@ -246,7 +247,9 @@ def main(arguments: list[str] | None = None) -> None:
         if given.pictures is not None:
             cost_figure(of_size, device, given.pictures / "render-heart-cost.png")
             map_figure(by_view, TEXELS, VIEWS, given.pictures / "render-heart-map.png")
-            heart_picture(request((200, 190)), given.pictures / "render-heart.png")
+            with opened() as context:
+                pictures = scene_figures(scene.draw(context, request((960, 540))), renderer(context))
+            (given.pictures / "render-heart.png").write_bytes(pictures["-comparison"])
         return
     if given.count < 1:
         parser.error(f"--count must be a number of scenes > 0, got {given.count}")

@@ -1,4 +1,4 @@
-"""Figures of the heart: error over time at each size, error over texel and view, the heart by each way."""
+"""Figures of the heart: error over time at each size, error over texel and view."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib import image
 
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, VERMILION, canvas, plain_log, styled
-from profilefit.scenes.heart import chart, scene
-from profilefit.scenes.stage.judge import EXPOSURE, ChartPoint, to_srgb
-from profilefit.shader import opened
+from profilefit.scenes.stage.judge import ChartPoint
 
 COLOURS = {"split": BLUE, "texture": VERMILION, "screen": GREEN, "none": GREY}
-PICTURED = ("split", "texture", "screen", "none")
 
 
 @styled
@@ -68,18 +64,3 @@ def map_figure(errors: Mapping[str, np.ndarray], texels: Sequence[float], views:
     panels[0].set_ylabel("texel [mm]")
     figure.colorbar(shown, ax=panels.tolist(), label="root mean square error / mean [-]")
     save(figure, path, 128)
-
-
-def heart_picture(request: scene.HeartRequest, path: Path) -> None:
-    """Draw the truth, and the heart by each way, side by side."""
-    light = scene.light_of(request, request.technique.gaussians)
-    with opened() as context, scene.reference_render(context, request, light) as own:
-        judge, pictures = own.judge, []
-        for kind in PICTURED:
-            by, mfp = own.technique(kind), light.mfp
-            exitance = own.stage.scatter(by, mfp, chart.SURE)
-            radiance = own.stage.render(by, mfp, chart.SURE)
-            if not pictures:
-                pictures.append(radiance + (judge.reference - exitance) / np.pi)
-            pictures.append(radiance)
-    image.imsave(path, np.concatenate([to_srgb(one[::-1], EXPOSURE) for one in pictures], axis=1))
