@@ -64,7 +64,7 @@ def test_a_file_of_a_scene_is_one_of_choose():
     alpha = 0.74 / 0.772
     assert said.mfp[0] == (pytest.approx(1 / 0.772),) * 2
     assert said.reflectance[0] == (pytest.approx(exact.reflectance(alpha, Setting("diffuse", n=1.4))),) * 2
-    assert said.pixel == (130.0 / 540.0,) * 2
+    assert said.pixel == (150.0 / 540.0,) * 2
     assert (said.resolution, said.tolerance, said.budget.ms) == ((960, 540), 0.02, None)
 
 

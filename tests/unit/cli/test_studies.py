@@ -191,7 +191,7 @@ def test_a_mistake_is_one_line(refused):
     Path("scene.toml").write_text("[view]\npixel = -1\n", encoding="utf-8")
     older = 'keys are of an older format: write scene = "skin" and [choose] pixel for [view] pixel'
     assert refused("choose scene.toml", older) == f"profilefit: scene.toml: {older}\n"
-    shallow = changed(SEA, "depth = 4.0", "depth = 0.01")
+    shallow = changed(SEA, "depth = 8.0", "depth = 0.01")
     assert refused(f"choose {shallow}", "").startswith("profilefit: scene.toml: "), "a sea that there is not"
 
 
@@ -248,7 +248,7 @@ def test_what_a_sea_needs(chosen):
     assert 0.1 == told["tolerance"] < told["haze"]["scaled"] < told["haze"]["single"] < 1.0
     scaled, single = (f"{kind} {100 * told['haze'][kind]:.2g} %" for kind in ("scaled", "single"))
     assert lines.startswith("terms: broadened; off the broadened haze at worst: ")
-    for text in (scaled, single, "(requested: 10 %)", f"(F {told['focus']:.2g})", "views 16 (S 11)"):
+    for text in (scaled, single, "(requested: 10 %)", f"(F {told['focus']:.2g})", "views 16 (S 16)"):
         assert text in lines
 
 
