@@ -17,7 +17,7 @@ IRRADIANCE, OCCLUSION, BACK = "irradiance_map", "occlusion_map", "back_map"
 SHADOWS = ("shadow_map", *(f"shadow_map_{number}" for number in range(2, MOST_LAMPS + 1)))  # of one channel
 NOWHERE = 1e6  # depth along the light where nothing is [mm]
 MARGIN = 1.02  # of the shadow map and of near and far planes around the scene
-SLICES, STEPS = 4, 10  # of the search for what occludes: through the line of sight, and to each side
+SLICES, STEPS = 2, 24  # of the search for what occludes: through the line of sight, and to each side
 
 
 class OtherLamp(NamedTuple):

@@ -16,8 +16,9 @@ out float share;
 const float PI = 3.141592653589793;
 const float SECTORS = 32.0;
 const float NEAREST = 1.0; // first step [pixels]
-const float STEEPEST = 4.0; // of a plate, depth over width
+const float STEEPEST = 12.0; // of a plate, depth over width
 const float FACETS = 0.03; // sine above the tangent plane, below which what is in the way is the mesh's own facets
+const float GOLDEN = 0.618034; // by which the steps of one side and slice are shifted against those of the next
 const float ENDLESS = 1e4; // thickness of what rays do not come out of [mm]
 
 // Interleaved gradient noise in [0, 1): all of its values in each square of a few pixels.
@@ -70,7 +71,7 @@ void main() {
         float before = arc(turned - 0.5 * PI, turned), total = before + arc(turned + 0.5 * PI, turned);
         uint hidden = 0u;
         for (int s = -1; s <= 1; s += 2) {
-            float radius = NEAREST * pow(growth, shift);
+            float radius = NEAREST * pow(growth, fract(shift + GOLDEN * float(2 * i + (s + 1) / 2)));
             for (int k = 0; k < steps; ++k, radius *= growth) {
                 vec2 away = float(s) * step_of, place = vec2(here) + 0.5 + radius * away;
                 if (!(all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size)))) break;
