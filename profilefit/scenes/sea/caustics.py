@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 
 from mcml_sim.media.arrays import Floats, checked_whole, require
-from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below
+from profilefit.scenes.sea.waves import Waves, calm_ray, checked_sun, require_below, surface_map
 from profilefit.scenes.stage.renderer import LINES, POINTS, SUM, TRIANGLES, Pass, Read, Renderer
 from profilefit.shader.emit import text_beside
 
@@ -123,7 +123,7 @@ class Caustics:
             "steps": STEPS,
         }
         # Vertices stand in the middle of cells, as fragments do.
-        reads: dict[str, Read] = {"sea_waves": waves.texels, "floor_waves": bed.texels}
+        reads: dict[str, Read] = {"sea_map": surface_map(waves, self.vertices), "floor_waves": bed.texels}
         self._find = Pass("hits", reads, self._hits, text, given)
         renderer.declare(self._hits, (self.vertices, self.vertices))
         renderer.run(self._find)

@@ -14,12 +14,14 @@ from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways
 from profilefit.scenes.sea.haze import table as fade_table
 from profilefit.scenes.sea.law import water_gaussians
 from profilefit.scenes.sea.water import World
+from profilefit.scenes.sea.waves import surface_map
 from profilefit.scenes.stage.renderer import Pass, Read, Renderer
 from profilefit.scenes.stage.world import Camera, Singles, rgb, unit
 from profilefit.shader.emit import read_text, text_beside
 
 VIEW, SHAFTS = "view_map", "shaft_map"
 SOURCES = ("segment.glsl", "waves.glsl", "hits.glsl", "view.frag")  # of the view, in glsl
+SEA_TEXELS = 512  # along a side of the tile, of the waves from below
 GAUSSIANS = 4  # of the floor's light
 FADING = 512  # texels of the table of what the water leaves
 DARK = 1e-3  # of wide light, from where on nothing is seen
@@ -64,6 +66,7 @@ class SeaPasses:
             rows, text = (below, below + texels), text_beside(__name__, "glsl/stack.frag")
             stack = Pass("stack", {"light_map": one.map}, SHAFTS, text, {"below": below}, rows=rows)
             self.light["caustics in depths"] += [*one.passes(splat), stack]
+        self._sea = surface_map(world.sea, SEA_TEXELS)
         self._turns = _four(np.log(blurred_phase(world, TURNS))[None, :, None])
         self._tables: dict[str, tuple[Singles, Singles, Singles]] = {}
 
@@ -79,7 +82,7 @@ class SeaPasses:
         fade, blur, glowing = self._of_kind(kind)
         sun, sky, sky_on_floor, interreflection, _ = self._irradiance(kind)
         reads: dict[str, Read] = {
-            "sea_waves": world.sea.texels,
+            "sea_map": self._sea,
             "floor_waves": world.floor.texels,
             "fade_map": fade,
             "turn_map": self._turns,

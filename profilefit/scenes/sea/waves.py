@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ WIND = 5.0  # [m/s] of a light breeze, whose longest waves, wind^2 / g = 2.5 m, 
 OF_SEA, SEA_WAVES = 6, 24  # most waves along a side of the tile, and those that are kept
 OF_FLOOR, FLOOR_WAVES = 4, 6
 FINE = 512  # points of a side of the lattice on which the steepest and the most curved place are looked for
+MAPS = 4  # of surfaces, which are kept
 WHOLE = 1e-6  # a wave vector may be so far from the tile's lattice, in its steps
 STILL = np.zeros(0)
 Height = Callable[..., ArrayLike]  # of x and y [m], to z [m]
@@ -98,15 +99,13 @@ class Waves:
     @cached_property
     def steepest(self) -> float:
         """Largest |grad z| of a fine lattice [-]."""
-        x = np.arange(FINE) * self.tile / FINE
-        _, zx, zy = self.lattice(x, x)
+        zx, zy = self.sampled(FINE, ("x", "y"))
         return float(np.sqrt(np.max(zx**2 + zy**2)))
 
     @cached_property
     def crest(self) -> float:
         """Largest principal curvature of a crest, -z'', of a fine lattice [1/m]; slopes count as small."""
-        x = np.arange(FINE) * self.tile / FINE
-        zxx, zxy, zyy = self._grid(x, x, ("xx", "xy", "yy"))
+        zxx, zxy, zyy = self.sampled(FINE, ("xx", "xy", "yy"))
         return float(np.max(-0.5 * (zxx + zyy) + np.hypot(0.5 * (zxx - zyy), zxy)))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
@@ -118,6 +117,27 @@ class Waves:
         """Return dz/dx and dz/dy [-]."""
         sines = -self.amplitudes * np.sin(self._angle(x, y))
         return sines @ self.vectors[:, 0], sines @ self.vectors[:, 1]
+
+    def sampled(self, count: int, kinds: tuple[str, ...] = ("", "x", "y"), shift: float = 0.0) -> Floats:
+        """Return derivatives of z at the points of a lattice of the tile (kinds, count, count), by inverse FFT.
+
+        Its cost does not depend on the number of waves; waves that are too short for the lattice are exact, too.
+
+        Args:
+            count: points along a side; rows over y.
+            kinds: letters by which z is derived: z itself, dz/dx and dz/dy by default [m, -].
+            shift: of the points from the tile's corner, in their distance.
+        """
+        whole = np.round(self.vectors * self.tile / (2.0 * np.pi)).astype(int)
+        factor = self.amplitudes * np.exp(1j * (self.phases + self.vectors.sum(axis=1) * shift * self.tile / count))
+        spectrum = np.zeros((len(kinds), count, count), complex)
+        for part, kind in zip(spectrum, kinds, strict=True):
+            derived = (1j * self.vectors[:, 0]) ** kind.count("x") * (1j * self.vectors[:, 1]) ** kind.count("y")
+            np.add.at(part, tuple((whole % count).T[::-1]), factor * derived)
+        found = np.fft.ifft2(spectrum).real * count**2
+        for part, kind in zip(found, kinds, strict=True):
+            part += self.mean if not kind else 0.0
+        return np.asarray(found)
 
     def lattice(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """Return z, dz/dx and dz/dy at all pairs of x (columns,) and y (rows,): three of (rows, columns)."""
@@ -158,6 +178,12 @@ class Waves:
             rows = across * (1j * kx) ** kind.count("x") * (1j * ky) ** kind.count("y")
             found.append(rows.real @ along.real - rows.imag @ along.imag)
         return found
+
+
+@lru_cache(MAPS)
+def surface_map(waves: Waves, count: int) -> NDArray[np.float32]:
+    """Return (count, count, 4) z [m], dz/dx and dz/dy [-] in the middles of the tile's cells, as a texture has them."""
+    return np.append(np.moveaxis(waves.sampled(count, shift=0.5), 0, -1), np.zeros((count, count, 1)), -1).astype("f4")
 
 
 def random_sea(rms_slope: float, tile: float, seed: int = 0, wind: tuple[float, float] = (WIND, 0.0)) -> Waves:

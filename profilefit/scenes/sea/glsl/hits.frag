@@ -2,7 +2,7 @@
 // ray, along x and y [m]; its flux per horizontal area; and the length of its way in the water [m].
 in vec2 where;
 out vec4 hit;
-uniform sampler2D sea_waves;
+uniform sampler2D sea_map;  // z, dz/dx and dz/dy of the vertices
 uniform sampler2D floor_waves;
 uniform float tile;
 uniform vec3 sun;
@@ -18,7 +18,7 @@ vec3 floor_at(vec2 place) {
 
 void main() {
     vec2 place = 0.5 * (where + 1.0) * tile;
-    vec3 water = waves_at(sea_waves, tile, place);
+    vec3 water = texelFetch(sea_map, ivec2(gl_FragCoord.xy), 0).xyz;
     vec4 ray = refracted(sun, water.yz, n);
     float k = (bed.x - water.x) / ray.z;
     if (bed.y < bed.z) k = first_hit(vec3(place, water.x), ray.xyz, bed.y, bed.z, steps);

@@ -1,7 +1,7 @@
 // Radiance that a pixel sees under the waves: floor, surface from below, and what the water between scatters.
 in vec2 where;
 out vec4 radiance;
-uniform sampler2D sea_waves;
+uniform sampler2D sea_map;  // z, dz/dx and dz/dy over the tile
 uniform sampler2D floor_waves;
 uniform sampler2D fade_map;  // optical lengths over lengths to `reach`: rows of what is sharp, of shafts, of wide light
 uniform sampler2D turn_map;  // ln of the phase function, blurred by the spread of the sun's rays, over (angle / pi)^(1/4)
@@ -42,8 +42,18 @@ const float SPREAD = 0.06;  // angle by which light spreads on its way to the ey
 
 bool is_upside_down = false;  // the waves from below are a floor upside down
 
+// The waves, bilinear between the texels' middles; the tile repeats.
+vec3 sea_at(vec2 place) {
+    int side = textureSize(sea_map, 0).x;
+    vec2 texel = place / tile * float(side) - 0.5, corner = floor(texel), share = texel - corner;
+    ivec2 low = ivec2(mod(corner, float(side))), high = (low + 1) % side;
+    vec3 bottom = mix(texelFetch(sea_map, low, 0).xyz, texelFetch(sea_map, ivec2(high.x, low.y), 0).xyz, share.x);
+    vec3 top = mix(texelFetch(sea_map, ivec2(low.x, high.y), 0).xyz, texelFetch(sea_map, high, 0).xyz, share.x);
+    return mix(bottom, top, share.y);
+}
+
 vec3 floor_at(vec2 place) {
-    if (is_upside_down) return -waves_at(sea_waves, tile, place);
+    if (is_upside_down) return -sea_at(place);
     vec3 ground = waves_at(floor_waves, tile, place);
     return vec3(bed.x + ground.x, ground.yz);
 }
@@ -183,7 +193,7 @@ void main() {
         if (far < 0.0) far = 2.0 * reach;
         sum = haze(eye, along, 0.0, min(far, reach));
         if (far < reach) {
-            vec3 waves = waves_at(sea_waves, tile, (eye + far * along).xy);
+            vec3 waves = sea_at((eye + far * along).xy);
             vec3 normal = normalize(vec3(-waves.yz, 1.0));
             float inside = clamp(dot(along, normal), 0.0, 1.0), outside = sqrt(max(1.0 - n * n * (1.0 - inside * inside), 0.0));
             float across = (n * inside - outside) / (n * inside + outside), flat_one = (inside - n * outside) / (inside + n * outside);

@@ -8,7 +8,16 @@ import pytest
 
 from mcml_sim.media.medium import fresnel
 from profilefit.scenes.sea import waves
-from profilefit.scenes.sea.waves import Waves, dense_hit, first_hit, newton_hit, random_floor, random_sea, refracted
+from profilefit.scenes.sea.waves import (
+    Waves,
+    dense_hit,
+    first_hit,
+    newton_hit,
+    random_floor,
+    random_sea,
+    refracted,
+    surface_map,
+)
 from profilefit.scenes.stage.renderer import float_texture
 from profilefit.scenes.stage.world import unit
 from profilefit.shader.context import program
@@ -35,6 +44,37 @@ def test_heights_and_slopes_of_a_sea():
     at = np.meshgrid(x, y)
     for found, expected in zip(SEA.lattice(x, y), (SEA.height(*at), *SEA.slope(*at)), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("time", [0.0, 1.7])
+def test_an_inverse_fft_of_the_waves_is_their_sum(time):
+    """Height, slopes and curvature of every wave, at 1e-12; on a lattice that is too coarse for some waves, too."""
+    sea = SEA.after(time, (5.0, 0.0), 4.0)
+    for count, shift in ((64, 0.0), (64, 0.5), (5, 0.25)):
+        x = (np.arange(count) + shift) * sea.tile / count
+        at = x[None, :], x[:, None]
+        found = sea.sampled(count, ("", "x", "y", "xy"), shift)
+        angle = sea._angle(*at)
+        curved = -(sea.amplitudes * np.prod(sea.vectors, axis=1) * np.cos(angle)).sum(axis=-1)
+        for one, expected in zip(found, (sea.height(*at), *sea.slope(*at), curved), strict=True):
+            np.testing.assert_allclose(one, expected, atol=1e-12 * np.abs(expected).max() * sea.amplitudes.size)
+    table = surface_map(sea, 16)
+    middles = (np.arange(16) + 0.5) * sea.tile / 16
+    np.testing.assert_allclose(
+        table[3, 7, :3], [sea.height(middles[7], middles[3]), *sea.slope(middles[7], middles[3])], rtol=1e-6
+    )
+
+
+def test_the_sea_moves_by_its_waves_own_speeds():
+    """Derivative of the heights with time, by the difference of two lattices."""
+    step, depth, wind = 1e-4, 4.0, (5.0, 0.0)
+    ahead, back = (SEA.after(one, wind, depth).sampled(32, ("",))[0] for one in (1.0 + step, 1.0 - step))
+    k = np.linalg.norm(SEA.vectors, axis=1)
+    rate = np.sqrt(9.81 * k * np.tanh(k * depth)) * np.where(SEA.vectors[:, 0] < 0.0, -1.0, 1.0)
+    now = SEA.after(1.0, wind, depth)
+    x = np.arange(32) * SEA.tile / 32
+    expected = (SEA.amplitudes * rate * np.sin(now._angle(x[None, :], x[:, None]))).sum(axis=-1)
+    np.testing.assert_allclose((ahead - back) / (2.0 * step), expected, atol=1e-5 * np.abs(expected).max())
 
 
 def test_random_sea_has_its_slope_and_runs_with_the_wind():
