@@ -41,7 +41,10 @@ FEW, FINE_RULE, FINE_MERGED = 2**16, ((0.35, 8), (0.8, 6), (5.0, 2)), 0.1
 LONGEST = 1.5  # side of an element, in the typical one: longer ones are cut
 # Points that gather together, at least, and where elements are merged; most elements of a row; pairs of a call.
 TOGETHER, MANY, LISTED, AT_ONCE = 16, 64, 256, 2**22
-SMOOTH = 0.02  # range of the light near some points, over its mean, below which a narrow Gaussian is local
+# Range of the light near some points, over its mean, below which a narrow Gaussian is local; but not near an outline,
+# where a Gaussian of a width [spacing] has some of its light beside the surface.
+SMOOTH, COMPLETE, SLACK = 0.02, 1.5, 2e-3
+BLOCK, APART = 2**17, 64.0  # points whose elements are listed at once; width of a group, at most [sigma]
 RINGS, FLOOR = 360, 1e-5  # of a profile that Gaussians are fitted to; least share that counts, of the largest
 
 
@@ -55,7 +58,7 @@ class Elements(NamedTuple):
         spacing: their typical side [length].
         sides: (2, n, 3), two sides of each [length]; None where they are not known.
         spread: (n,) variance of each along the surface [length^2]; 0 where it is a point.
-        shift: (n, 3) from the middle to the middle of the light, where elements were merged [length].
+        moment: (n, c, 3) first moment of area times irradiance about the middle, where elements were merged.
     """
 
     points: Floats
@@ -64,7 +67,7 @@ class Elements(NamedTuple):
     spacing: float
     sides: Floats | None = None
     spread: Floats | float = 0.0
-    shift: Floats | None = None
+    moment: Floats | None = None
     are_triangles: bool = False
 
     @classmethod
@@ -92,7 +95,7 @@ class Elements(NamedTuple):
         return cls(moved, each, irradiance[of], spacing, cut, each / 12.0)
 
     def within(self, side: float) -> Elements:
-        """Return the surface with elements in each cube of a side as one: area, light and its first moments stay."""
+        """Return the surface with elements in each cube of a side as one: area, light and the first moments stay."""
         if side <= self.spacing:
             return self
         cells = np.floor((self.points - self.points.min(axis=0)) / side).astype(np.int64)
@@ -105,10 +108,8 @@ class Elements(NamedTuple):
         )
         away = self.points - middle[of]
         spread = np.bincount(of, self.areas * (self.spread + np.sum(away**2, axis=1) / 2.0)) / area
-        bright = power.sum(axis=1)
-        whole = np.maximum(np.bincount(of, bright), np.finfo(float).tiny)
-        shift = np.stack([np.bincount(of, bright * axis) for axis in away.T], axis=1) / whole[:, None]
-        return Elements(middle, area, light, side, None, spread, shift)
+        moments = [[np.bincount(of, colour * axis) for axis in away.T] for colour in power.T]
+        return Elements(middle, area, light, side, None, spread, np.moveaxis(np.array(moments), -1, 0))
 
 
 def gaussian_sums(
@@ -129,10 +130,15 @@ def gaussian_sums(
     middle = 0.5 * (elements.irradiance.min(axis=0) + elements.irradiance.max(axis=0))
     near, places = elements._replace(points=elements.points - centre), at - centre
     groups = _groups(places)
+    # Where a Gaussian of this width has all of its light on the surface, narrower ones have, too.
+    complete = np.zeros((len(at), 1 + middle.size))
+    if elements.sides is not None:
+        _add_sums(complete, near, middle, places, groups, COMPLETE * elements.spacing, merged, None)
+    is_whole = np.abs(complete[:, 0] - 1.0) < SLACK
     for sigma in sigmas:
         found = np.concatenate([np.ones((len(at), 1)), own - middle], axis=1)
         if sigma > local * elements.spacing:
-            _add_sums(found, near, middle, places, groups, float(sigma), merged)
+            _add_sums(found, near, middle, places, groups, float(sigma), merged, is_whole)
         found[:, 1:] += middle * found[:, :1]
         yield found
 
@@ -164,9 +170,19 @@ def _groups(points: Floats) -> NDArray[np.intp]:
 
 
 def _add_sums(
-    sums: Floats, elements: Elements, middle: Floats, at: Floats, groups: NDArray[np.intp], sigma: float, merged: float
+    sums: Floats,
+    elements: Elements,
+    middle: Floats,
+    at: Floats,
+    groups: NDArray[np.intp],
+    sigma: float,
+    merged: float,
+    is_whole: NDArray[np.bool_] | None,
 ) -> None:
-    """Write the sums of one Gaussian (m, 1 + c), of 1 and of irradiance - middle, where they are not local."""
+    """Write the sums of one Gaussian (m, 1 + c), of 1 and of irradiance - middle, where they are not local.
+
+    is_whole  (m,) points at which it is local if the light around them is even; None where it is nowhere
+    """
     rule, most_merged = (FINE_RULE, FINE_MERGED) if len(elements.points) < FEW else (RULE, merged)
     count = next((points for most, points in rule if sigma < most * elements.spacing), 1)
     count = 1 if elements.sides is None else count
@@ -174,50 +190,68 @@ def _add_sums(
     # As many groups as one as are no wider than the Gaussian.
     extent = float(np.median(np.linalg.norm(np.ptp(at[groups], axis=1), axis=1)))
     joined = int(np.clip(2.0 * np.log2(max(2.0 * sigma / max(extent, 1e-30), 1.0)), 0, 7))
-    joined = max(joined, 0 if parts.shift is None else MANY // TOGETHER // 2)
+    joined = max(joined, 0 if parts.moment is None else int(np.log2(MANY // TOGETHER)))
     wide = groups.reshape(-1, groups.shape[1] * 2 ** min(joined, int(np.log2(len(groups)))))
-    places = at[wide]
-    low, high = places.min(axis=1), places.max(axis=1)
-    radius = 0.5 * np.linalg.norm(high - low, axis=1) + REACH * sigma + (parts.spacing if count > 1 else 0.0)
-    near = cKDTree(parts.points).query_ball_point(0.5 * (low + high), radius, workers=-1)
-    if count > 2:
-        wide, near = _uneven(elements.irradiance, wide, near)
-        places = at[wide]
-    if not len(wide):
-        return
-    rows, listed = _rows(near, len(parts.points))
+    # A group of points on both sides of a gap would lose the digits of small differences: each is one by itself.
+    split = np.linalg.norm(np.ptp(at[wide], axis=1), axis=1) > APART * sigma
+    if split.any():
+        single = np.repeat(np.unique(wide[split])[:, None], wide.shape[1], axis=1)
+        wide = np.concatenate([wide[~split], single])
     # Elements that are taken at their middle lack the variance that they have along the surface.
     variance = np.broadcast_to(sigma**2 + (parts.spread if count == 1 else 0.0), parts.areas.shape)
-    share = (parts.areas / (2.0 * np.pi * variance))[:, None]
+    scale = 1.0 / (2.0 * np.pi * variance)
+    share = (parts.areas * scale)[:, None]
     # Differences from the middle, so that even light stays even whatever rounding does to the sums.
     power = np.concatenate([0.5 / variance[:, None], share, share * (parts.irradiance - middle)], axis=1)
-    more = () if parts.shift is None else (parts.shift, share * parts.irradiance)
-    values = parts.points, power, *(more if count == 1 or parts.sides is None else parts.sides)
+    more: list[Floats] = []
+    if count > 1 and parts.sides is not None:
+        more = [*parts.sides]
+    elif parts.moment is not None:
+        more = [(parts.moment * (scale / variance)[:, None, None]).reshape(len(share), -1)]
+    values = parts.points, power, *more
     surface = tuple(jnp.asarray(np.pad(value, ((0, 1), (0, 0))), jnp.float32) for value in values)
-    found = np.empty((len(rows), wide.shape[1], sums.shape[1]), np.float32)
-    step = max(AT_ONCE // (listed.shape[1] * wide.shape[1]), 1)
+    tree = cKDTree(parts.points)
+    for first in range(0, len(wide), max(BLOCK // wide.shape[1], 1)):
+        block = wide[first : first + max(BLOCK // wide.shape[1], 1)]
+        low, high = at[block].min(axis=1), at[block].max(axis=1)
+        radius = 0.5 * np.linalg.norm(high - low, axis=1) + REACH * sigma + (parts.spacing if count > 1 else 0.0)
+        near = tree.query_ball_point(0.5 * (low + high), radius, workers=-1)
+        if count > 2 and is_whole is not None:
+            block, near = _uneven(elements.irradiance, is_whole, block, near)
+        if len(block):
+            sums[block.ravel()] = _block_sums(surface, at[block], near, count, parts).reshape(-1, sums.shape[1])
+
+
+def _block_sums(
+    surface: tuple[Array, ...], places: Floats, near: NDArray[np.object_], count: int, elements: Elements
+) -> Floats:
+    """Return the sums (groups, points, 1 + c) of lists of elements at the points of each group (groups, points, 3)."""
+    rows, listed = _rows(near, len(elements.points))
+    found = np.empty((len(rows), places.shape[1], 1 + elements.irradiance.shape[1]), np.float32)
+    step = max(AT_ONCE // (listed.shape[1] * places.shape[1]), 1)
 
     def some(first: int) -> None:
         of = slice(first, first + step)
         given, here = listed[of], places[rows[of]].astype(np.float32)
         spare = ((0, step - len(given)), (0, 0))
-        full = np.pad(given, spare, constant_values=len(parts.points))
+        full = np.pad(given, spare, constant_values=len(elements.points))
         lit = _pairs(surface, np.pad(here, (*spare, (0, 0))), full, count, elements.are_triangles)
         found[of] = np.asarray(lit)[: len(given)]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(some, range(0, len(rows), step)))
-    starts = np.searchsorted(rows, np.arange(len(wide)))
-    sums[wide.ravel()] = np.add.reduceat(found, starts, axis=0).reshape(-1, sums.shape[1])
+    return np.asarray(np.add.reduceat(found, np.searchsorted(rows, np.arange(len(places))), axis=0))
 
 
-def _uneven(light: Floats, groups: NDArray[np.intp], near: NDArray[np.object_]) -> tuple[NDArray[np.intp], Any]:
-    """Return groups, and their lists of elements, whose light is not the same all over."""
+def _uneven(
+    light: Floats, is_whole: NDArray[np.bool_], groups: NDArray[np.intp], near: NDArray[np.object_]
+) -> tuple[NDArray[np.intp], Any]:
+    """Return groups, and their lists of elements, whose light is not the same all over, or which see an outline."""
     lengths = np.array([len(one) for one in near])
     listed = light[np.concatenate([np.asarray(one, np.int64) for one in near])]
     starts = np.cumsum(lengths) - lengths
     spread = np.maximum.reduceat(listed, starts) - np.minimum.reduceat(listed, starts)
-    some = np.any(spread > SMOOTH * light.mean(axis=0), axis=1)
+    some = np.any(spread > SMOOTH * light.mean(axis=0), axis=1) | ~np.all(is_whole[groups], axis=1)
     return groups[some], near[some]
 
 
@@ -241,8 +275,8 @@ def _pairs(
 
     Args:
         surface: middle (n, 3) of elements, 1 / 2 variance, power of 1 and of light less its middle (n, 1 + 1 + c), the
-            last of no power. Then, where elements were merged, their shift (n, 3) and the power of light (n, c); or
-            their two sides (n, 3) where each has count x count Gauss points.
+            last of no power. Then, where elements were merged, first moments of their light (n, 3 c); or their two
+            sides (n, 3) where each has count x count Gauss points.
         at: points (rows, points, 3).
         listed: elements (rows, length).
         count: of Gauss points along a side.
@@ -263,7 +297,8 @@ def _pairs(
         from_here = jnp.sum(here**2, axis=1)[:, None]
 
         def light(place: Array) -> Array:
-            return jnp.exp(rate * (2.0 * here @ place.T - from_here - jnp.sum(place**2, axis=1)))
+            square = 2.0 * here @ place.T - from_here - jnp.sum(place**2, axis=1)
+            return jnp.exp(rate * jnp.minimum(square, 0.0))
 
         if count > 1:
             side, other = more
@@ -271,8 +306,10 @@ def _pairs(
         whole = light(middle)
         if not more:
             return whole @ power
-        shift, whole_power = more
-        tilt = 2.0 * rate * (here @ shift.T - jnp.sum(middle * shift, axis=1))
-        return whole @ power + jnp.pad((whole * tilt) @ whole_power, ((0, 0), (1, 0)))
+        moment = more[0].reshape(len(rate), -1, 3)
+        first = whole @ more[0]
+        tilted = jnp.sum(first.reshape(len(here), -1, 3) * here[:, None], axis=-1)
+        tilted -= whole @ jnp.sum(moment * middle[:, None], axis=-1)
+        return whole @ power + jnp.pad(tilted, ((0, 0), (1, 0)))
 
     return jax.lax.map(row, (at, listed))

@@ -145,6 +145,47 @@ def test_is_the_double_loop():
     assert np.max(np.abs(other.share / share - 1.0)) > 2e-3
 
 
+@pytest.mark.slow
+def test_an_outline_under_even_light():
+    """Where a plane ends, Gaussians hang over its edge also if the light is the same all around."""
+    dark = np.where(np.arange(16) < 8, 1.0, 0.2)[None, :, None] * np.ones((10, 1, 3))
+    surface, pixels = flat(10, 16, 0.7)._replace(irradiance=dark), np.array([[0, 0], [5, 0], [0, 4], [5, 4]])
+    mfp = np.array([2.0, 1.0, 0.5])
+    light, share = double_loop(surface, VIEW, mfp, DIFFUSE, pixels)
+    found = gathered(surface, VIEW, mfp, DIFFUSE, pixels)
+    np.testing.assert_allclose(found.light, light, atol=1e-3 * light.mean())
+    np.testing.assert_allclose(found.share, share, atol=2e-3)
+
+
+def test_edges_of_colours_across_merged_elements():
+    """Light of one colour begins where another ends: each keeps the first moment of its own."""
+    surface, view = seen(planes.step_edge((256, 256), 0.1, [0.5, 0.5, 0.5]))
+    lit = surface.irradiance.copy()
+    lit[..., 1] = 1.0 - lit[..., 0]
+    pixels = np.stack([np.full(17, 128), np.arange(112, 129 + 16, 2)[:17]], axis=1)
+    x = surface.position[128, pixels[:, 1], 0]
+    found = gathered(surface._replace(irradiance=lit), view, np.ones(3), DIFFUSE, pixels).light / 0.5
+    truth = step_response(x, exact_table(DIFFUSE).curves([0.5]).alpha[0], setting=DIFFUSE)
+    assert np.max(np.abs(found[:, 0] - truth)) < 3e-4
+    assert np.max(np.abs(found[:, 1] - (1.0 - truth))) < 3e-4
+
+
+def test_islands_far_apart():
+    """Points of two islands may gather together; neither takes light of the other, nor loses digits."""
+    surface = flat(6, 24, 0.7)
+    position = surface.position + np.where(np.arange(24) < 11, 0.0, 1500.0)[None, :, None] * np.array([1.0, 0.0, 0.0])
+    lit = np.random.default_rng(4).random((6, 24, 3))
+    both = surface._replace(position=position, irradiance=lit)
+    pixels = np.argwhere(surface.mask)
+    found = gathered(both, VIEW, MFP, DIFFUSE, pixels)
+    mask = np.broadcast_to(np.arange(24) < 11, (6, 24))
+    for island in (mask, ~mask):
+        here = island[tuple(pixels.T)]
+        own = gathered(both._replace(mask=island), VIEW, MFP, DIFFUSE, pixels[here])
+        np.testing.assert_allclose(found.light[here], own.light, rtol=1e-4)
+        np.testing.assert_allclose(found.share[here], own.share, rtol=1e-4)
+
+
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 1.0])
 def test_even_light_on_even_skin_is_conserved(reflectance):
     found = gathered(flat(12, 24, reflectance, 0.75), VIEW, MFP)
