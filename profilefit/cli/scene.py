@@ -80,11 +80,13 @@ def scene(
         require_writable(path)
     body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
     bodies: list[dict[str, Any]] = []
+    exposure: float | None = None
     sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
         device = renderer(context)
         for moment, name in zip(moments, stems, strict=True):
-            drawn = (home.picture if no_reference else home.draw)(context, moment)
+            drawn = (home.picture if no_reference else home.draw)(context, moment, exposure)
+            exposure = drawn.exposure  # of all frames, or pictures in a row would flicker
             bodies.append(report.content(drawn, device))
             figures = report.scene_figures(drawn, device.partition(",")[0])
             files: dict[Path, bytes | str] = {Path(f"{name}{end}.png"): png for end, png in figures.items()}
@@ -93,6 +95,8 @@ def scene(
                 body |= {} if sky is None else {"environment": {"harmonics_error": sky.error._asdict()}}
                 files[numbers] = json_text(body)
             write_together(files)
+            if frames is not None and not as_json:
+                screen().print(f"{name}.png:", markup=False, soft_wrap=True)
             for line in () if as_json else report.scene_lines(drawn, device):
                 screen().print(line, markup=False, soft_wrap=True)
     if sky is not None and not as_json:

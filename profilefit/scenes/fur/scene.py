@@ -197,7 +197,7 @@ class FurRender(NamedTuple):
 
 @contextmanager
 def reference_render(context: moderngl.Context, of: FurRequest, has_reference: bool = True) -> Iterator[FurRender]:
-    """Open the passes and the reference image of a request; without one, all is black that is judged."""
+    """Open the passes and the reference image of a request; without one, its judge is not to be used."""
     fur, each = of.fur, of.technique.supersampling
     ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.lean, fur.seed)
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
@@ -227,7 +227,9 @@ def _standard_error(fine: Floats, each: int, mask: NDArray[np.bool_]) -> TruthEr
 
 
 def _exposure(radiance: Floats) -> float:
-    return exposure_of(radiance.max(axis=-1), WHITE)
+    brightest = radiance.max(axis=-1)
+    shown = brightest[brightest > 0.0]  # the background is black
+    return exposure_of(shown if shown.size else brightest, WHITE)
 
 
 @contextmanager

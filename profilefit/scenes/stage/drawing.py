@@ -63,15 +63,16 @@ class Drawer:
     rivals: tuple[Mapping[str, Any], ...]
     light: str = "scattered light"
 
-    def picture(self, context: moderngl.Context, of: ViewRequest) -> SceneImage:
-        """Draw the picture without a reference."""
+    def picture(self, context: moderngl.Context, of: ViewRequest, exposure: float | None = None) -> SceneImage:
+        """Draw the picture without a reference; exposure  that of the frame before, if there is one."""
         with self.opened(context, of, False) as drawing:
             shot = drawing.shot(of, FRAMES)
-            image = to_srgb(shot.radiance[::-1], drawing.exposure(shot.radiance))
-        return SceneImage(image, shot.label, of.technique.samples, shot.frame, shot.passes)
+            factor = drawing.exposure(shot.radiance) if exposure is None else exposure
+        image = to_srgb(shot.radiance[::-1], factor)
+        return SceneImage(image, shot.label, of.technique.samples, shot.frame, shot.passes, factor)
 
-    def draw(self, context: moderngl.Context, of: ViewRequest) -> RenderResult:
-        """Draw the picture, its reference and two rivals, with errors and costs."""
+    def draw(self, context: moderngl.Context, of: ViewRequest, exposure: float | None = None) -> RenderResult:
+        """Draw the picture, its reference and two rivals, with errors and costs; exposure  see `picture`."""
         of.require_reference()
         small, samples = of.of_reference, of.technique.samples
         kind = getattr(of.technique, "kind", None)
@@ -79,6 +80,7 @@ class Drawer:
         with self.opened(context, small, True) as drawing:
             judge = drawing.judge
             assert judge is not None
+            judge = judge if exposure is None else replace(judge, exposure=exposure)
             chart = drawing.points(small, small.numbers)
             shot = drawing.shot(small, TURNS if small.size == of.size else 0)
             result = judge.result(shot, chart, samples, self.light)

@@ -66,6 +66,7 @@ class SceneImage:
     picture  (h, w, 3) as a screen shows it
     label, samples  of the technique
     frame, passes  milliseconds of a whole frame, each time that it was drawn (turns,); of its parts by their names
+    exposure  factor of the radiance
     """
 
     picture: Bytes
@@ -73,6 +74,7 @@ class SceneImage:
     samples: int
     frame: tuple[float, ...]
     passes: Mapping[str, tuple[float, ...]]
+    exposure: float
 
 
 @dataclass(frozen=True)
@@ -184,6 +186,7 @@ class Judge:
             samples=samples,
             frame=shot.frame,
             passes=shot.passes,
+            exposure=self.exposure,
             truth=to_srgb(true[::-1], self.exposure),
             error=self.relative_error(judged)[::-1],
             point=next(point for point in chart if point.samples == samples),

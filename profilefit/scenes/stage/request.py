@@ -18,7 +18,7 @@ from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
-MOST_SIDE = 4096  # of a picture [pixels]
+MOST_SIDE, MOST_RAYS = 4096, 16384  # of a picture [pixels], and rays along a side, as many as OpenGL's maps have texels
 MOST_PIXELS = 2**21  # of a reference: two minutes on two cores for a head that fills half of them
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
 LARGEST_VIEW = 1000.0  # [mm]
@@ -241,6 +241,14 @@ class ViewRequest(Declared):
             raise InputError(f"{self.file}: --frames must be left out where nothing moves; sea and fur move")
         values: dict[str, Any] = {self.moving: {"time": getattr(self, self.moving).time + seconds}}
         return self.changed(None, **values)
+
+    @model_validator(mode="after")
+    def _rays_fit(self) -> Self:
+        each, sides = getattr(self.technique, "supersampling", 1), self.size
+        if each * max(sides) > MOST_RAYS:
+            accepted = f"so few that supersampling times columns and rows is {MOST_RAYS} at most"
+            raise Refused(accepted, list(sides), "camera", "resolution")
+        return self
 
     def require_reference(self) -> None:
         """Raise InputError where the reference would have too many pixels."""
