@@ -157,6 +157,7 @@ def test_an_outline_under_even_light():
     np.testing.assert_allclose(found.share, share, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_edges_of_colours_across_merged_elements():
     """Light of one colour begins where another ends: each keeps the first moment of its own."""
     surface, view = seen(planes.step_edge((256, 256), 0.1, [0.5, 0.5, 0.5]))
@@ -170,6 +171,7 @@ def test_edges_of_colours_across_merged_elements():
     assert np.max(np.abs(found[:, 1] - (1.0 - truth))) < 3e-4
 
 
+@pytest.mark.slow
 def test_islands_far_apart():
     """Points of two islands may gather together; neither takes light of the other, nor loses digits."""
     surface = flat(6, 24, 0.7)

@@ -81,6 +81,7 @@ def test_triangles_of_a_sphere_blur_its_light():
         assert np.max(np.abs(sums[:, 1] - sphere_blur(RADIUS, at[:, 2] / RADIUS, [1.1 * sigma**2], [0.98]))) > 4e-3
 
 
+@pytest.mark.slow
 def test_irradiance_at_points_is_that_of_the_picture(context):
     lit = scene((-0.5, 0.3, 0.8), ball(), ball((-4.0, 3.0, 12.0), 4.0))
     with Stage(context, (64, 64)) as stage:
