@@ -33,9 +33,9 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.truth import stack_table
-from profilefit.scenes.stage import head
 from profilefit.scenes.stage.judge import EXPOSURE, to_srgb
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject import head
 from profilefit.scenes.stage.technique import NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer

@@ -50,7 +50,7 @@ FEW, FAINT = 1000.0, 0.2  # steps, and share of the brightest plane: less is not
 STEPS, BEYOND = 65535.0, 1.2  # of sixteen bits, which floats become; over the largest of them, if that is not white
 LARGEST = 1e30  # of a float
 DAMAGED = (ValueError, OSError, LookupError, TypeError, RuntimeError, struct.error, zlib.error)  # of libraries' readers
-PACKAGES = {"cv2": "opencv-python-headless", "OpenEXR": "OpenEXR", "rawpy": "rawpy", "tifffile": "tifffile"}
+PACKAGES = {"cv2": "opencv-python-headless"}  # of modules that have another name
 FULL = 0.9  # of the range between black and white, from where a pixel counts as clipped
 REACH = 2  # pixels of a plane about a clipped one that are left out, too
 SHARED = 5  # pixels across, over which light is shared for the weights
@@ -105,6 +105,12 @@ def read(path: Path) -> Exposure:
         raise InputError(f"{path}: expected a photograph of 1 byte to {MOST_BYTES >> 20} MiB, got {size} bytes")
     with _silent():
         return _raw(path) if kind in RAW else _plain(path, kind)
+
+
+def linear(codes: NDArray[np.uint8]) -> Plane:
+    """Return the light of a screen's 8-bit values, white 1 (IEC 61966-2-1)."""
+    coded = codes.astype(np.float32) / np.float32(255.0)
+    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def radiance(path: Path, most_bytes: int, largest: tuple[int, int]) -> Plane:
@@ -212,9 +218,7 @@ def _plain(path: Path, kind: str) -> Exposure:
     if values.ndim != 3 or values.shape[2] not in (1, 3):
         raise InputError(f"{path}: expected one or three values a pixel, got an array of shape {values.shape}")
     if kind in JPEG and values.dtype == np.uint8:
-        coded = values.astype(np.float32) / 255.0
-        counts = np.float32(255.0) * np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
-        counts = counts.astype(np.float32)
+        counts = np.float32(255.0) * linear(values)
     elif kind in TIFF and values.dtype == np.uint16:
         counts = values.astype(np.float32)
     elif values.dtype in (np.float32, np.float16):
@@ -294,8 +298,8 @@ def library(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        package = PACKAGES[name]
-        raise InputError(f"this picture needs the package {package}: pip install {package}") from None
+        package = PACKAGES.get(name, name)
+        raise InputError(f"this file needs the package {package}: pip install {package}") from None
 
 
 @contextmanager

@@ -287,7 +287,7 @@ def _reference(
     """
     buffers = stage.true_buffers()
     places, own = (value[inside].astype(float) for value in (buffers.position, buffers.irradiance))
-    elements = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
+    elements = whole_elements(stage, scene, side, 2.0 * side)
     sums = [
         buffers.reflectance[inside] * summed(one, light.exact.variances, light.exact.weights, places, own)
         for one in elements

@@ -28,10 +28,11 @@ from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage import eye, head, request
+from profilefit.scenes.stage import request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge, surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject import eye, head
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import ROUGHNESS, Part, Rgb, Scene, deformed, rgb
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from profilefit.scenes.stage.eye import FISSURE, lids, rise
-from profilefit.scenes.stage.head import brow, crop, lips, texels
+from profilefit.scenes.stage.subject.eye import FISSURE, lids, rise
+from profilefit.scenes.stage.subject.head import brow, crop, lips, texels
 
 FRECKLES, STUBBLE, BROW = 900, 12_000, 700
 # What is left of A in red, green and blue.

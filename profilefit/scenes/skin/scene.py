@@ -37,11 +37,12 @@ from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.skin.material import Painted, Translucent, plain, translucent
 from profilefit.scenes.skin.paint import skin
 from profilefit.scenes.skin.passes import SeparableFilter
-from profilefit.scenes.stage import eye, head, request
+from profilefit.scenes.stage import request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import surface_judge, whole_judge
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject import eye, head
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique, technique
 from profilefit.scenes.stage.world import ROUGHNESS, Camera, Part, Scene
 

@@ -222,7 +222,7 @@ def whole_judge(stage: Stage, scene: Scene, mfp: ArrayLike, table: CurveTable | 
     """
     buffers, camera = stage.true_buffers(), scene.camera
     side = camera.pixel(stage.size[1]) * (camera.distance if camera.is_perspective else 1.0)
-    whole, wider = (whole_elements(stage, scene, length) for length in (side, 2.0 * side))
+    whole, wider = whole_elements(stage, scene, side, 2.0 * side)
     error = wider_error(buffers, mfp, table, whole, wider)
     return Judge(exitance_of(buffers, mfp, table, whole), buffers.mask > INSIDE, error)
 

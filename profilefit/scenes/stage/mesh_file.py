@@ -13,10 +13,8 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated, Any, Self
 from urllib.parse import unquote
 
@@ -27,6 +25,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 from mcml_sim.files.whole_file import parse_json, read_whole
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
+from profilefit.measured.photo.exposure import library, linear
 from profilefit.recipes.declared import Declared, Line, OneOf, Refused, words
 from profilefit.scenes.stage.world import EVEN, Mesh, Part, Singles, unit
 
@@ -38,9 +37,7 @@ LISTS = "accessors", "bufferViews", "buffers", "images", "materials", "meshes", 
 MOST_SIDE, MOST_PIXELS = 8192, 1 << 25  # of a texture, and of all textures of a file
 LEAST_SIZE, MOST_SIZE = 0.1, 2000.0  # of a mesh [mm]
 MOST_UV = 1e3
-LINEAR = np.where(  # of the 256 values of a screen, IEC 61966-2-1
-    np.arange(256) <= 10, np.arange(256) / (255.0 * 12.92), ((np.arange(256) / 255.0 + 0.055) / 1.055) ** 2.4
-).astype(np.float32)
+LINEAR = linear(np.arange(256, dtype=np.uint8))
 MESH = f"a file {', '.join(SUFFIXES)}"
 
 
@@ -119,7 +116,7 @@ def read_mesh(path: Path, factor: float, name: str = "") -> tuple[FilePart, ...]
     kind = path.suffix.lower()
     if kind not in SUFFIXES:
         raise InputError(f"mesh must be {MESH}, got {name}")
-    trimesh = _library()
+    trimesh = library("trimesh")
     folder = _Folder(path, name)
     content = folder.content(path.name)
     if kind in (".glb", ".gltf"):
@@ -383,10 +380,3 @@ def _sound(name: str) -> Iterator[None]:
         logger.propagate = before[1]
     if any("image" in message for message in heard.messages):
         raise InputError(f"textures must be PNG or JPEG files that can be read, got others in {name}")
-
-
-def _library() -> ModuleType:
-    try:
-        return import_module("trimesh")
-    except ImportError:
-        raise InputError("a mesh needs the package trimesh: pip install trimesh") from None

@@ -10,6 +10,7 @@ of the searchlight setting may be passed as well, to see the difference.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -105,11 +106,18 @@ class Stage(GpuOwner):
             passes.append(ambient_pass(scene, screen, {"seen_map": seen, OCCLUSION: open_share}, np.eye(4)))
         return passes
 
-    def irradiance(self, part: Part, points: Mesh) -> Floats:
-        """Return the irradiance (n, 3) at the vertices of a mesh, which lie on a part of the scene last drawn [-].
+    def irradiance(self, pieces: Sequence[tuple[Part, Mesh]]) -> list[Floats]:
+        """Return the irradiance (n, 3) at the vertices of meshes, each on a part of the scene last drawn [-].
 
-        It is a reference's: the light of the sky is that of `sky`.
+        It is a reference's: the light of the sky is that of `sky`, of all meshes at once.
         """
+        lamps, places, normals = zip(*(self._lit_points(part, points) for part, points in pieces), strict=True)
+        sky = self.sky(np.concatenate(places), np.concatenate(normals))
+        ends = np.cumsum([len(light) for light in lamps])[:-1]
+        return [light + own for light, own in zip(lamps, np.split(sky, ends), strict=True)]
+
+    def _lit_points(self, part: Part, points: Mesh) -> tuple[Floats, Floats, Floats]:
+        """Return irradiance by lamps, places and normals (n, 3) at the vertices of a mesh on a part."""
         count = len(points.position)
         columns = min(count, COLUMNS)
         size = columns, -(-count // columns)
@@ -120,7 +128,7 @@ class Stage(GpuOwner):
             renderer.run(_surface("points", lit, shadow, values, shape=POINTS, clear=0.0), *self._lamps())
             names = IRRADIANCE, "position_map", "normal_map"
             light, where, normals = (renderer.read(name).reshape(-1, 4)[:count, :3].astype(float) for name in names)
-        return light + self.sky(where, normals)
+        return light, where, normals
 
     def _lamps(self) -> list[Pass]:
         """Return passes that add lamps beside the first to maps of places in the world."""

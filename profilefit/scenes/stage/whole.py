@@ -13,29 +13,38 @@ import numpy as np
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface_sum import Elements
-from profilefit.scenes.stage.world import Mesh, Scene, unit
+from profilefit.scenes.stage.world import Mesh, Part, Scene, unit
 
 MOST = 1 << 21  # triangles
 WIDER = 1.25  # ratio of lengths that are tried until there are no more
 
 
-def whole_elements(stage: Stage, scene: Scene, length: float) -> Elements:
-    """Return the surface, in view space, of the scene that a stage has drawn.
+def whole_elements(stage: Stage, scene: Scene, *lengths: float) -> list[Elements]:
+    """Return the surface, in view space, of the scene that a stage has drawn, once for each length.
 
     Args:
         stage: that has drawn the scene.
         scene: whose parts are meant; they must not lie inside each other.
-        length: of sides [mm], at most, unless there were more than `MOST` triangles.
+        lengths: of sides [mm], at most, unless there were more than `MOST` triangles.
     """
-    parts = [part for part in scene.parts if part.is_translucent]
+    parts, view = [part for part in scene.parts if part.is_translucent], scene.camera.view()
+    longest = [_bounded(parts, length) for length in lengths]
+    cut = [[_cut(part.mesh, length) for part in parts] for length in longest]
+    meshes = [(part, mesh) for pieces in cut for part, (mesh, _) in zip(parts, pieces, strict=True)]
+    light = iter(stage.irradiance(meshes))
+    found = []
+    for pieces in cut:
+        points = np.concatenate([mesh.position for mesh, _ in pieces]) @ view[:3, :3].T + view[:3, 3]
+        sides = np.concatenate([sides for _, sides in pieces], axis=1) @ view[:3, :3].T
+        found.append(Elements.of_triangles(points, sides, np.concatenate([next(light) for _ in pieces])))
+    return found
+
+
+def _bounded(parts: Sequence[Part], length: float) -> float:
+    """Return a length, or a larger one, of which there are at most `MOST` triangles."""
     while sum(int(np.sum(_cuts(part.mesh, length) ** 2)) for part in parts) > MOST:
         length *= WIDER
-    pieces = [(part, _cut(part.mesh, length)) for part in parts]
-    view = scene.camera.view()
-    points = np.concatenate([mesh.position for _, (mesh, _) in pieces]) @ view[:3, :3].T + view[:3, 3]
-    sides = np.concatenate([sides for _, (_, sides) in pieces], axis=1) @ view[:3, :3].T
-    light = np.concatenate([stage.irradiance(part, mesh) for part, (mesh, _) in pieces])
-    return Elements.of_triangles(points, sides, light)
+    return length
 
 
 def _corners(values: Floats, mesh: Mesh) -> Sequence[Floats]:

@@ -91,10 +91,10 @@ def test_irradiance_at_points_is_that_of_the_picture(context):
         position = buffers.position[seen] + np.array([0.0, 0.0, 100.0])  # from the eye, which looks along -z
         normal = buffers.normal[seen]
         points = Mesh(position, normal, np.zeros((len(position), 2)), np.zeros((0, 3), np.int32))
-        found = stage.irradiance(lit.parts[0], points)
+        [found] = stage.irradiance([(lit.parts[0], points)])
         np.testing.assert_allclose(found, buffers.irradiance[seen], atol=2e-3)
         assert np.ptp(found) > 0.5
-        own = whole_elements(stage, lit, 1.0)
+        [own] = whole_elements(stage, lit, 1.0)
     area = 4.0 * np.pi * (RADIUS**2 + 4.0**2)
     assert own.areas.sum() == pytest.approx(area, rel=0.005)
     assert np.average(own.points[:, 2], weights=own.areas) == pytest.approx(-100.0 + 12.0 * 16.0 / 116.0, abs=0.3)
@@ -111,7 +111,7 @@ def test_a_relief_turns_the_normal(context):
     def drawn(part):
         with Stage(context, (8, 8)) as stage:
             stage.draw(Scene((part,), light, (0.0, 0.0, 0.0), camera))
-            return stage.buffers(), stage.irradiance(part, part.mesh)
+            return stage.buffers(), stage.irradiance([(part, part.mesh)])[0]
 
     bent, at_corners = drawn(Part(square(40.0, tangent), a, 0.5, relief=relief))
     np.testing.assert_allclose(bent.irradiance, 0.96, atol=1e-6)

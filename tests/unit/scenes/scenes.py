@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.skin import material
-from profilefit.scenes.stage import head
+from profilefit.scenes.stage.subject import head
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
 from tests.fixtures import refused
 

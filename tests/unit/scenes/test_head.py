@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.skin import paint
-from profilefit.scenes.stage import eye, head, solid
-from profilefit.scenes.stage.head import COLUMNS, ROWS
+from profilefit.scenes.stage.subject import eye, head, solid
+from profilefit.scenes.stage.subject.head import COLUMNS, ROWS
 from profilefit.scenes.stage.world import parameters, unit
 from tests.unit.scenes.scenes import outward
 

@@ -9,7 +9,7 @@ from mcml_sim import Setting, exact
 from profilefit.scenes.skin import paint
 from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage import head
+from profilefit.scenes.stage.subject import head
 from profilefit.scenes.stage.world import Camera, deformed, normals, parameters, sheet, unit
 from tests.unit.scenes.scenes import outward, refused
 

@@ -12,9 +12,9 @@ from mcml_sim.files.whole_file import read_toml
 from profilefit.recipes.folder import fits_folder, shipped
 from profilefit.recipes.stack import fit
 from profilefit.scenes.layers import scene
-from profilefit.scenes.stage import head
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject import head
 from tests.unit.scenes.scenes import changed, mistaken, outward, refused
 
 EXAMPLE = read_toml(shipped("examples") / "layers-head.toml")

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 
 from mcml_sim.media.arrays import Floats
-from profilefit.scenes.stage.eye import CORNERS, EYE, EYEBALL, FISSURE, lids, rise
-from profilefit.scenes.stage.solid import carved, ellipsoid, ends, joined, rod
+from profilefit.scenes.stage.subject.eye import CORNERS, EYE, EYEBALL, FISSURE, lids, rise
+from profilefit.scenes.stage.subject.solid import carved, ellipsoid, ends, joined, rod
 from profilefit.scenes.stage.world import Mesh, Part, parameters, sheet
 
 ROWS, COLUMNS = 400, 480  # of the head's mesh
