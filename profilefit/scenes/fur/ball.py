@@ -6,7 +6,8 @@ normal and the force (Fang et al., section 2), so that the shell at t L is a bal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
-from profilefit.scenes.stage.world import Camera
+from profilefit.scenes.stage.world import Camera, Singles, unit
 
 SKIN, NOTHING = -1.0, -2.0  # in place of a height
+CLUMP_TEXELS = 512
+BLOCK = 4096  # strands that are cast at once
+
+Indices = NDArray[np.intp]
 
 
 class FurView(NamedTuple):
@@ -59,6 +64,7 @@ class Ball:
     """Equal cones, feet (k, 3) in unit directions from the middle of a ball of radius `ball`.
 
     radius, length  of a strand;  force  by which the tips lean, by the length [-]
+    centres         of clumps (m, 3), unit directions;  gather  share of the way to its centre that a tip is moved
     """
 
     feet: Floats
@@ -66,61 +72,90 @@ class Ball:
     radius: float
     length: float
     force: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    centres: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    gather: float = 0.0
 
     @property
+    def gathered(self) -> float:
+        """Displacement of a tip by its clump, over the length and the difference of centre and foot [-]."""
+        return self.gather * (self.ball + self.length) / self.length if len(self.centres) else 0.0
+
+    @cached_property
+    def clumps(self) -> Singles:
+        """Map (texels, texels, 4) of the centre of the clump that a direction belongs to."""
+        return nearest_feet(self.centres, CLUMP_TEXELS)[0] if len(self.centres) else np.zeros((1, 1, 4), np.float32)
+
+    @cached_property
     def axes(self) -> Floats:
         """Vectors (k, 3) from foot to tip, by the length."""
-        return self.feet + np.array(self.force)
+        upright = self.feet + np.array(self.force)
+        if not len(self.centres):
+            return upright
+        row, column = _texel(self.feet, CLUMP_TEXELS)
+        return upright + self.gathered * (self.clumps[row, column, :3] - self.feet)
 
     def cast(self, view: FurView, size: tuple[int, int]) -> Floats:
         """Return first hits (rows, columns, 4): foot and height over the length; of skin normal and `SKIN`; `NOTHING`.
 
-        Each strand against every ray of the rectangle that it is seen in: |q + m s| = r0 (1 - t), in float64.
+        Each strand against every ray of the strip that it is seen in: |q + m s| = r0 (1 - t), in float64.
         """
-        start, way = view.rays(size)
-        found = np.full((*start.shape[:2], 4), NOTHING)
-        far = np.full(start.shape[:2], np.inf)
+        start, way = (np.broadcast_to(one, (size[1], size[0], 3)).reshape(-1, 3) for one in view.rays(size))
+        found = np.full((len(way), 4), NOTHING)
+        far = np.full(len(way), np.inf)
         # The skin, where a ray meets the ball itself.
         along = np.sum(start * way, axis=-1)
-        half = self.ball**2 - np.sum((start - along[..., None] * way) ** 2, axis=-1)
+        half = self.ball**2 - np.sum((start - along[:, None] * way) ** 2, axis=-1)
         seen = half > 0
-        far[seen] = (-along - np.sqrt(np.maximum(half, 0.0)))[seen]
-        place = (start + np.where(seen, far, 0.0)[..., None] * way) / self.ball
-        found[seen] = np.concatenate([place, np.full((*seen.shape, 1), SKIN)], axis=-1)[seen]
-        for foot, box in zip(self.feet, self._boxes(view, size), strict=True):
-            rows, columns = slice(*box[1]), slice(*box[0])
-            if rows.start >= rows.stop or columns.start >= columns.stop:
-                continue
-            distance, t = self._met(foot, start[rows, columns], way[rows, columns])
-            near = distance < far[rows, columns]
-            far[rows, columns][near] = distance[near]
-            found[rows, columns][near] = np.concatenate([np.tile(foot, (near.sum(), 1)), t[near, None]], axis=1)
-        return found
+        far[seen] = -along[seen] - np.sqrt(half[seen])
+        found[seen, :3] = (start[seen] + far[seen, None] * way[seen]) / self.ball
+        found[seen, 3] = SKIN
+        for begin in range(0, len(self.feet), BLOCK):
+            strand, ray = self._pairs(view, size, slice(begin, begin + BLOCK))
+            distance, t = self._met(strand, start[ray], way[ray])
+            np.minimum.at(far, ray, distance)
+            first = np.isfinite(distance) & (distance == far[ray])
+            found[ray[first], :3], found[ray[first], 3] = self.feet[strand[first]], t[first]
+        return found.reshape(size[1], size[0], 4)
 
-    def _boxes(self, view: FurView, size: tuple[int, int]) -> NDArray[np.intp]:
-        """Return columns and rows (k, 2, 2), from and to, where strands are seen: of cubes about roots, and of tips."""
-        roots, tips = self.ball * self.feet, self.ball * self.feet + self.length * self.axes
+    def _pairs(self, view: FurView, size: tuple[int, int], part: slice) -> tuple[Indices, Indices]:
+        """Return strands (n,) of a part, and rays (n,) that each may meet: of strips, row by row."""
+        feet, axes = self.feet[part], self.axes[part]
         corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) * self.radius
-        points = np.concatenate([roots[:, None] + corners, tips[:, None]], axis=1)
-        seen = view.places(points.reshape(-1, 3)).reshape(len(roots), -1, 2)
-        ends = np.stack([seen.min(axis=1), seen.max(axis=1)], axis=-1)
-        pixels = 0.5 * (ends + 1.0) * np.array(size)[:, None] - 0.5
-        whole = np.stack([np.floor(pixels[..., 0]), np.ceil(pixels[..., 1]) + 1.0], axis=-1)
-        return np.clip(whole, 0, np.array(size)[:, None]).astype(np.intp)
+        around = self._pixels(view, size, (self.ball * feet[:, None] + corners).reshape(-1, 3)).reshape(-1, 8, 2)
+        root = 0.5 * (around.min(axis=1) + around.max(axis=1))
+        half = 0.5 * np.max(np.ptp(around, axis=1), axis=1)  # of a square in which the root is
+        move = self._pixels(view, size, self.ball * feet + self.length * axes) - root
+        low = np.ceil(np.minimum(root[:, 1], root[:, 1] + move[:, 1]) - half).clip(0, size[1])
+        high = np.floor(np.maximum(root[:, 1], root[:, 1] + move[:, 1]) + half).clip(-1, size[1] - 1)
+        which, row = _ranges(low, high)
+        # Shares of the way to the tip at which the strip is in the row, and the columns between.
+        off, rise, wide = row - root[which, 1], move[which, 1], half[which]
+        flat = np.abs(rise) < 1e-9
+        slope = np.where(flat, 1.0, rise)
+        ends = np.stack([np.where(flat, 0.0, (off - wide) / slope), np.where(flat, 1.0, (off + wide) / slope)])
+        ends = np.sort(ends, axis=0).clip(0.0, 1.0)
+        across = np.sort(root[which, 0] + ends * move[which, 0], axis=0)
+        wide = wide * (1.0 - ends[0])
+        first = np.ceil(across[0] - wide).clip(0, size[0])
+        last = np.floor(across[1] + wide).clip(-1, size[0] - 1)
+        strip, column = _ranges(first, last)
+        return which[strip] + part.start, row[strip] * size[0] + column
 
-    def _met(self, foot: Floats, start: Floats, way: Floats) -> tuple[Floats, Floats]:
-        """Return distances (...) along rays to a strand, inf where it is not met, and heights there over the length."""
-        axis = self.length * (foot + np.array(self.force))
-        tall = axis @ foot
+    def _pixels(self, view: FurView, size: tuple[int, int], points: Floats) -> Floats:
+        return 0.5 * (view.places(points) + 1.0) * np.array(size) - 0.5
+
+    def _met(self, strand: Indices, start: Floats, way: Floats) -> tuple[Floats, Floats]:
+        """Return distances (n,) along rays to strands, inf where one is not met, and heights there over the length."""
+        foot, axis = self.feet[strand], self.length * self.axes[strand]
+        tall = _dot(axis, foot)
         away = start - self.ball * foot
         # From where a ray is next to the middle of the strand, so that no digits are lost over the way to it.
-        near = np.sum((0.5 * axis - away) * way, axis=-1)
-        away = away + near[..., None] * way
-        t, rate = away @ foot / tall, way @ foot / tall
-        q, m = away - t[..., None] * axis, way - rate[..., None] * axis
+        near = _dot(0.5 * axis - away, way)
+        away = away + near[:, None] * way
+        t, rate = _dot(away, foot) / tall, _dot(way, foot) / tall
+        q, m = away - t[:, None] * axis, way - rate[:, None] * axis
         r, k = self.radius * (1.0 - t), -self.radius * rate
-        a, b = np.sum(m * m, axis=-1) - k * k, np.sum(q * m, axis=-1) - r * k
-        c = np.sum(q * q, axis=-1) - r * r
+        a, b, c = _dot(m, m) - k * k, _dot(q, m) - r * k, _dot(q, q) - r * r
         under = b * b - a * c
         with np.errstate(divide="ignore", invalid="ignore"):
             half = -(b + np.where(b < 0, -1.0, 1.0) * np.sqrt(np.maximum(under, 0.0)))
@@ -133,14 +168,21 @@ class Ball:
 
 
 def random_ball(
-    count: int, ball: float, radius: float, length: float, force: tuple[float, float, float], seed: int
+    count: int,
+    ball: float,
+    radius: float,
+    length: float,
+    force: tuple[float, float, float],
+    seed: int,
+    clumps: int = 0,
+    gather: float = 0.0,
 ) -> Ball:
-    """Return a ball with so many feet, independent of each other, evenly over it."""
-    feet = np.random.default_rng([seed, 2]).normal(size=(count, 3))
-    return Ball(feet / np.linalg.norm(feet, axis=1, keepdims=True), ball, radius, length, force)
+    """Return a ball with so many feet, independent of each other, evenly over it, and so many centres of clumps."""
+    feet, centres = (unit(np.random.default_rng([seed, of]).normal(size=(n, 3))) for of, n in ((2, count), (3, clumps)))
+    return Ball(feet, ball, radius, length, force, centres, gather)
 
 
-def nearest_feet(feet: Floats, texels: int) -> list[NDArray[np.float32]]:
+def nearest_feet(feet: Floats, texels: int) -> list[Singles]:
     """Return maps (texels, texels, 4) of the nearest foot, and of the next, for each texel of an octahedron's net.
 
     Where x + y + z is 1 of magnitudes, the lower half folded outward; glsl/ball.glsl reads it.
@@ -148,11 +190,33 @@ def nearest_feet(feet: Floats, texels: int) -> list[NDArray[np.float32]]:
     x = (2.0 * np.arange(texels) + 1.0) / texels - 1.0
     u, v = np.meshgrid(x, x)
     z = 1.0 - np.abs(u) - np.abs(v)
-    under = z < 0
-    folded = [(1.0 - np.abs(other)) * np.where(one < 0, -1.0, 1.0) for one, other in ((u, v), (v, u))]
-    directions = np.stack([np.where(under, folded[0], u), np.where(under, folded[1], v), z], axis=-1)
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    _, found = cKDTree(feet).query(directions, 2 if len(feet) > 1 else 1)
+    folded = _folded(u, v)
+    directions = unit(np.stack([np.where(z < 0, folded[0], u), np.where(z < 0, folded[1], v), z], axis=-1))
+    _, found = cKDTree(feet).query(directions, 2 if len(feet) > 1 else 1, workers=-1)
     index = found.reshape(texels, texels, -1)
     padding = np.zeros((texels, texels, 1))
     return [np.concatenate([feet[index[..., i]], padding], axis=-1).astype(np.float32) for i in (0, -1)]
+
+
+def _texel(directions: Floats, texels: int) -> tuple[Indices, Indices]:
+    """Return row and column (n,) of the net's texel that each direction (n, 3) is in."""
+    u, v, z = (directions / np.sum(np.abs(directions), axis=1, keepdims=True)).T
+    folded = _folded(u, v)
+    net = np.where(z < 0, folded[1], v), np.where(z < 0, folded[0], u)
+    row, column = ((0.5 * (one + 1.0) * texels).astype(np.intp).clip(0, texels - 1) for one in net)
+    return row, column
+
+
+def _folded(u: Floats, v: Floats) -> list[Floats]:
+    return [(1.0 - np.abs(other)) * np.where(one < 0, -1.0, 1.0) for one, other in ((u, v), (v, u))]
+
+
+def _ranges(low: Floats, high: Floats) -> tuple[Indices, Indices]:
+    """Return numbers (n,) of ranges, and whole numbers (n,) from low to high of each."""
+    count = np.maximum(high - low + 1.0, 0.0).astype(np.intp)
+    which = np.repeat(np.arange(len(count)), count)
+    return which, np.arange(len(which)) - (np.cumsum(count) - count - low.astype(np.intp))[which]
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("ij,ij->i", a, b)

@@ -38,7 +38,7 @@ class FurSurface(NamedTuple):
     """Surface that strands stand on: its GLSL, its maps of the nearest feet and the next, uniforms, and strands."""
 
     text: str
-    maps: list[Singles]
+    maps: dict[str, Singles]
     uniforms: dict[str, Any]
     radius: float
     length: float
@@ -48,19 +48,20 @@ class FurSurface(NamedTuple):
     def of_ball(cls, ball: Ball) -> Self:
         """Return a ball's, a texel of which is a strand's radius over `FINE` on average, up to `MOST_TEXELS` a side."""
         texels = min(int(np.ceil(FINE * np.sqrt(4.0 * np.pi) * ball.ball / ball.radius)), MOST_TEXELS)
-        text, maps = strand_text("surface.glsl", "ball.glsl"), nearest_feet(ball.feet, texels)
-        return cls(text, maps, {"ball": ball.ball}, ball.radius, ball.length, ball.force)
+        text, maps = strand_text("surface.glsl", "clumps.glsl", "ball.glsl"), _maps(nearest_feet(ball.feet, texels))
+        uniforms = {"ball": ball.ball, "gathered": ball.gathered}
+        return cls(text, {**maps, "clump_map": ball.clumps}, uniforms, ball.radius, ball.length, ball.force)
 
     @classmethod
     def of_patch(cls, patch: Patch, fine: float = FINE) -> Self:
         """Return a patch's, with so many texels of a strand's radius, up to `MOST_TEXELS` a side."""
         texels = min(int(np.ceil(fine * patch.side / patch.radius)), MOST_TEXELS)
-        text, maps = strand_text("surface.glsl", "plane.glsl"), nearest_ways(patch, texels)
+        text, maps = strand_text("surface.glsl", "plane.glsl"), _maps(nearest_ways(patch, texels))
         return cls(text, maps, {"side": patch.side}, patch.radius, patch.length, (*patch.lean, 0.0))
 
     def layered(self, view: FurView, by: LayerTechnique, layers: int) -> Pass:
         """Return the pass that fills `HITS` (rows, columns, 4) with first hits, as of `Ball.cast`."""
-        count, (nearest, following) = checked_whole("layers", layers, 1), self.maps
+        count = checked_whole("layers", layers, 1)
         given = {
             **self.uniforms,
             **_view(view),
@@ -71,9 +72,10 @@ class FurSurface(NamedTuple):
             "exponent": 1.0 if by.tested else by.exponent_of(count, self.length / self.radius),
             "layers": count,
             "tested": by.tested,
+            "walked": by.walked,
         }
         source = self.text + text_beside(__name__, "glsl/fur.frag")
-        return Pass("fur", {"nearest_map": nearest, "next_map": following}, HITS, source, given)
+        return Pass("fur", dict(self.maps), HITS, source, given)
 
 
 def pair(least: float, most: float) -> Any:
@@ -93,7 +95,7 @@ class ShadingTable(Declared):
     shifts: Annotated[tuple[Shift, Shift], LISTED, pair(-1.0, 1.0)] = (-0.1, 0.2)
     strengths: Annotated[tuple[Irradiance, Irradiance], LISTED, pair(0.0, MOST_LIGHT)] = (0.1, 0.15)
     normalised: bool = True
-    rim: Annotated[tuple[Rim, Rim, Rim], LISTED] = (0.0, 0.5, 4.0)
+    rim: Annotated[tuple[Rim, Rim, Rim], LISTED] = (0.0, 0.2, 4.0)
 
 
 class Coat(NamedTuple):
@@ -128,6 +130,7 @@ class Coat(NamedTuple):
         given = {
             **_view(view),
             "force": _floats(ball.force),
+            "gathered": ball.gathered,
             "radius": ball.radius,
             "tall": ball.length,
             "density": self.density,
@@ -145,13 +148,18 @@ class Coat(NamedTuple):
             "strengths": _floats(np.array(shading.strengths) / peak),
         }
         given.pop("eye")
-        source = strand_text() + text("harmonics.glsl") + text_beside(__name__, "glsl/shade.frag")
-        return Pass("shade", {HITS: HITS, "occlusion_map": table}, RADIANCE, source, given)
+        source = strand_text("clumps.glsl") + text("harmonics.glsl") + text_beside(__name__, "glsl/shade.frag")
+        maps: dict[str, str | Singles] = {HITS: HITS, "occlusion_map": table, "clump_map": ball.clumps}
+        return Pass("shade", maps, RADIANCE, source, given)
 
 
 def strand_text(*more: str) -> str:
     """Return glsl/strand.glsl, and other sources beside it, as a shader reads them."""
     return read_text("common") + "".join(text_beside(__name__, f"glsl/{one}") for one in ("strand.glsl", *more))
+
+
+def _maps(nearest: list[Singles]) -> dict[str, Singles]:
+    return dict(zip(("nearest_map", "next_map"), nearest, strict=True))
 
 
 def nearest_ways(patch: Patch, texels: int) -> list[Singles]:

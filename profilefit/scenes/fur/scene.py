@@ -14,21 +14,30 @@ from pydantic import Field, model_validator
 
 from mcml_sim.media.arrays import Floats
 from profilefit.recipes.declared import LISTED, Declared, OneOf, Refused, Seed, Shares, Text, Tolerance, words
-from profilefit.scenes.fur.ball import NOTHING, FurView, random_ball
+from profilefit.scenes.fur.ball import NOTHING, Ball, FurView, random_ball
 from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
-from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, LayerTechnique
+from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, WALKED, LayerTechnique
 from profilefit.scenes.stage.drawing import Drawer, RayDrawing
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, exposure_of
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.request import Samples, Seconds, TechniqueTable, Viewpoint, ViewRequest
+from profilefit.scenes.stage.request import (
+    Direction,
+    Irradiances,
+    LightTable,
+    Samples,
+    Seconds,
+    TechniqueTable,
+    Viewpoint,
+    ViewRequest,
+)
 from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
 from profilefit.scenes.stage.world import Rgb, rgb
 
-KINDS = ("swept", "shells")
-VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
+KINDS = ("walked", "swept", "shells")
+VIEW = Viewpoint((0.0, -4.0, 0.0), 650.0, (0.0, 0.0, 1.0), 84.0)
 LARGEST = 150.0  # of the ball, and of strands [mm]
-SLENDEREST = 140.0  # the ball's radius over a strand's: what a map of them resolves
-MOST_STRANDS = 1 << 16
+SLENDEREST = 640.0  # the ball's radius over a strand's: what a map of them resolves
+MOST_STRANDS, MOST_CLUMPS = 1 << 18, 1 << 13
 MOST_FORCE = 0.9
 WHITE = 0.99  # of the ball's pixels, the brightest of which becomes white
 
@@ -42,25 +51,39 @@ class FurTable(Declared):
 
     density  of strands [1/mm^2];  radius, length  of a strand [mm], along the skin's normal
     force    displacement of the tips, over the length [-];  ball  its radius [mm];  colour, skin  reflectances
+    clumps   density of clumps, 0 for none [1/mm^2];  gather  share of the way to its clump's centre that a tip is moved
     gust     largest displacement that wind adds, over the length [-], as a sine of period [s] at a time [s]
     """
 
-    density: Annotated[float, Field(gt=0.0)] = 0.64
-    radius: Length = 0.5
-    length: Length = 10.0
-    force: Annotated[tuple[Force, Force, Force], LISTED] = (0.0, -0.4, 0.0)
-    gust: Annotated[tuple[Force, Force, Force], LISTED] = (0.0, 0.0, 0.0)
+    density: Annotated[float, Field(gt=0.0)] = 19.2
+    radius: Length = 0.05
+    length: Length = 12.0
+    force: Annotated[tuple[Force, Force, Force], LISTED] = (0.3, -0.7, 0.0)
+    gust: Annotated[tuple[Force, Force, Force], LISTED] = (0.1, 0.05, 0.0)
     period: Annotated[float, Field(gt=0.0, le=1e3)] = 2.0
     time: Seconds = 0.0
-    ball: Length = 30.0
-    colour: Shares = (0.55, 0.38, 0.22)
+    clumps: Annotated[float, Field(ge=0.0)] = 0.6
+    gather: Annotated[float, Field(ge=0.0, le=0.9)] = 0.75
+    ball: Length = 27.0
+    colour: Shares = (0.62, 0.38, 0.18)
     skin: Shares = (0.35, 0.22, 0.16)
     seed: Seed = 1
 
     @property
     def count(self) -> int:
         """Number of strands."""
-        return max(round(self.density * 4.0 * np.pi * self.ball**2), 1)
+        return max(round(self.density * self.area), 1)
+
+    @property
+    def area(self) -> float:
+        """Area of the skin [mm^2]."""
+        return float(4.0 * np.pi * self.ball**2)
+
+    @property
+    def strands(self) -> Ball:
+        """Strands at the time."""
+        of = self.count, self.ball, self.radius, self.length, self.lean, self.seed
+        return random_ball(*of, round(self.clumps * self.area), self.gather)
 
     @property
     def reach(self) -> float:
@@ -74,7 +97,7 @@ class FurTable(Declared):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        spacing, area = self.density**-0.5, 4.0 * np.pi * self.ball**2
+        spacing, area = self.density**-0.5, self.area
         if self.radius > spacing:
             accepted = f"at most the strands' mean distance, 1 / sqrt(density) = {spacing:.4g} mm"
             raise Refused(accepted, self.radius, "radius")
@@ -83,6 +106,9 @@ class FurTable(Declared):
         if not self.density * area <= MOST_STRANDS:
             most = f"{MOST_STRANDS} at most, {MOST_STRANDS / area:.4g}"
             raise Refused(f"so many strands [1/mm^2] that the ball has {most}", self.density, "density")
+        if not self.clumps * area <= MOST_CLUMPS:
+            most = f"{MOST_CLUMPS} at most, {MOST_CLUMPS / area:.4g}"
+            raise Refused(f"so many clumps [1/mm^2] that the ball has {most}", self.clumps, "clumps")
         accepted = f"three numbers whose root of squares is {MOST_FORCE:g} at most"
         if not np.linalg.norm(self.force) <= MOST_FORCE:
             raise Refused(accepted, list(self.force), "force")
@@ -94,13 +120,14 @@ class FurTable(Declared):
 class FurTechnique(TechniqueTable):
     """Table [technique]; its samples are layers.
 
-    strands   of a swept layer that a ray is held against;  exponent  of the shells' opacity
+    kind      a ray is held against strands in even steps, in layers, or against their discs on shells
+    strands   that a step or a swept layer tests;  exponent  of the shells' opacity
     tolerance  of `choose`: rms error of the heights of hits over the length [-]
     supersampling  rays of a pixel along a side, averaged
     """
 
     kind: Annotated[str, OneOf(*KINDS)] = KINDS[0]
-    samples: Samples = 22
+    samples: Samples = 128
     strands: Annotated[int, Field(ge=1, le=2)] = 2
     exponent: Annotated[
         Annotated[float, Field(gt=0.0, le=100.0)] | Literal["fitted"],
@@ -112,7 +139,9 @@ class FurTechnique(TechniqueTable):
     @property
     def way(self) -> LayerTechnique:
         """Technique of drawing layers."""
-        if self.kind == KINDS[0]:
+        if self.kind == "walked":
+            return WALKED._replace(tested=self.strands)
+        if self.kind == "swept":
             return (SWEPT, SWEPT_TWO)[self.strands - 1]
         if isinstance(self.exponent, str):
             return FITTED
@@ -120,10 +149,18 @@ class FurTechnique(TechniqueTable):
 
     @model_validator(mode="after")
     def _of_kind(self) -> Self:
-        other = "exponent" if self.kind == KINDS[0] else "strands"
+        other = "strands" if self.kind == "shells" else "exponent"
         if other in self.model_fields_set:
             raise Refused(f"left out where kind is {self.kind}", getattr(self, other), other)
         return self
+
+
+class FurLight(LightTable):
+    """Table [light]: from above, beside the eye."""
+
+    direction: Direction = (-0.60, 0.60, 0.55)
+    irradiance: Irradiances = (4.4, 4.1, 3.6)
+    ambient: Irradiances = (0.30, 0.34, 0.40)
 
 
 class FurRequest(ViewRequest):
@@ -135,6 +172,7 @@ class FurRequest(ViewRequest):
     fur: FurTable = FurTable()
     shading_table: ShadingTable = Field(ShadingTable(), alias="shading")
     technique: FurTechnique = FurTechnique()
+    light_table: FurLight = Field(FurLight(), alias="light")
 
     @property
     def viewpoint(self) -> Viewpoint:
@@ -199,7 +237,7 @@ class FurRender(NamedTuple):
 def reference_render(context: moderngl.Context, of: FurRequest, has_reference: bool = True) -> Iterator[FurRender]:
     """Open the passes and the reference image of a request; without one, its judge is not to be used."""
     fur, each = of.fur, of.technique.supersampling
-    ball = random_ball(fur.count, fur.ball, fur.radius, fur.length, fur.lean, fur.seed)
+    ball = fur.strands
     size, view = (of.size[0] * each, of.size[1] * each), FurView.of(of.camera, of.size)
     light, colours = of.light_table, (fur.colour, fur.skin)
     coat = Coat(ball, fur.density, *colours, of.light, of.ambient, of.shading_table, light.lamps, light.sky)
@@ -241,5 +279,5 @@ def opened(context: moderngl.Context, of: FurRequest, has_reference: bool) -> It
 
 
 SHELLS = {"kind": "shells", "exponent": 1.0}
-drawer = Drawer(opened, (SHELLS, {"kind": "shells", "exponent": "fitted"}, {"kind": "swept"}), "the fur's light")
+drawer = Drawer(opened, ({"kind": "swept"}, SHELLS, {"kind": "walked"}), "the fur's light")
 draw, picture = drawer.draw, drawer.picture

@@ -66,11 +66,11 @@ def cast(patch: Patch, theta: float, start: Floats) -> Floats:
 def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[np.intp]]:
     """Return `cast`, and the strand that is met (n,), -1 where none is.
 
-    A cone that is met is within its radius and half a step of one of the places along a ray that are tried, at most a
-    root apart; what is met above the lower end of a step needs no further one.
+    A cone that is met is within its radius and half a step of one of the places along a ray that are tried, half the
+    strands' mean distance apart, or a root; what is met above the lower end of a step needs no further one.
     """
     rate, tree = float(np.hypot(*_rate(patch, theta))), _tree(patch)
-    steps = int(np.ceil(rate * patch.length / patch.radius)) + 1
+    steps = int(np.ceil(rate * patch.length / max(patch.radius, 0.5 * patch.density**-0.5))) + 1
     found, which = np.zeros(len(start)), np.full(len(start), -1)
     left = np.arange(len(start))
     for number in range(steps):

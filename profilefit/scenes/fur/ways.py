@@ -21,11 +21,13 @@ class LayerTechnique(NamedTuple):
     """Technique by shells of a threshold's exponent, or by swept slabs that test some of the nearest strands each.
 
     exponent  of shells; None is the one that is fitted to N r0 / L;  tested  0 of shells
+    walked    in even steps along a ray, as many as layers where its way over the skin is a strand's length
     """
 
     name: str
     exponent: float | None = None
     tested: int = 0
+    walked: bool = False
 
     def exponent_of(self, layers: int, slender: float) -> float:
         """Return p of N shells, L / r0 of the strands; below the fitted range that of its end, above it 1."""
@@ -37,6 +39,7 @@ class LayerTechnique(NamedTuple):
 
 LINEAR, QUADRATIC, FITTED = LayerTechnique("linear", 1.0), LayerTechnique("quadratic", 2.0), LayerTechnique("fitted")
 SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two strands", tested=2)
+WALKED = LayerTechnique("walked", tested=2, walked=True)
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
 
 
@@ -56,6 +59,8 @@ class FurTrial:
     def error(self, way: LayerTechnique, layers: int) -> float:
         """Return the root mean square of the errors of first hits' heights over the length, by so many layers [-]."""
         patch = self.patch
+        if way.walked:
+            layers = max(int(np.ceil(layers * np.hypot(np.tan(self.theta) - patch.lean[0], patch.lean[1]))), 1)
         if way.tested:
             heights = by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
         else:

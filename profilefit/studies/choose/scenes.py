@@ -184,7 +184,7 @@ FEWEST, CLEAR = 5, 4.0  # patches, and standard errors from the tolerance, after
 SAFE, NEGLIGIBLE = 2.0, 0.08
 COARSE = 20  # numbers of layers are found to one in so many
 LEAST_TOLERANCE = 0.01  # of less, too few of the rays are wrong to tell how many
-SLENDEREST = 100.0  # L / r0: rays are followed in steps of r0
+LONGEST = 100.0  # L over the strands' mean distance: rays are followed in steps of half of it
 
 
 @dataclass(frozen=True)
@@ -281,8 +281,8 @@ def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:
     if tolerance < LEAST_TOLERANCE:
         least = f"{of.file}: [technique] tolerance must be at least {LEAST_TOLERANCE:g}"
         raise InputError(f"{least} {rays} {tolerance:g}")
-    if strands.length > (longest := SLENDEREST * strands.radius):
-        most = f"{of.file}: [fur] length must be at most {SLENDEREST:g} times the radius, {longest:g} mm,"
+    if strands.length > (longest := LONGEST * strands.density**-0.5):
+        most = f"{of.file}: [fur] length must be at most {LONGEST:g} times the strands' mean distance, {longest:g} mm,"
         raise InputError(f"{most} {rays} {strands.length:g}")
     layers: dict[int, dict[str, int | None]] = {}
     for angle in angles:

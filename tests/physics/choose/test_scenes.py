@@ -197,7 +197,7 @@ def test_the_cheapest_is_by_the_cost_of_a_layer(monkeypatch):
     ("changes", "accepted", "got"),
     [
         ({"technique_tolerance": 0.005}, "[technique] tolerance must be at least 0.01", "0.005"),
-        ({"fur_length": 60.0}, "[fur] length must be at most 100 times the radius, 50 mm,", "60"),
+        ({"fur_length": 130.0}, "[fur] length must be at most 100 times the strands' mean distance, 125 mm,", "130"),
     ],
 )
 def test_what_rays_do_not_tell(changes, accepted, got):

@@ -118,7 +118,7 @@ def test_a_picture_without_a_reference(done, small, opengl):
 
 def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_path, opengl):
     fur = tmp_path / "fur.toml"
-    words = "density = 0.1\ngust = [0.3, 0.0, 0.0]\nperiod = 4.0"
+    words = "density = 0.1\nforce = [0.0, -0.4, 0.0]\ngust = [0.3, 0.0, 0.0]\nperiod = 4.0"
     size = "supersampling = 1\n[camera]\nresolution = [32, 24]\nreference_pixel = 1"
     fur.write_text(f'scene = "fur"\n[fur]\n{words}\n[technique]\n{size}\n', encoding="utf-8")
     told = json.loads(done("scene", str(fur), "--frames", "3", "--fps", "1", "--out", "drawn", "--json", "--quiet"))
@@ -207,9 +207,12 @@ samples = 8
 """
 FUR_MISTAKES = [
     ("0.5", "0", "[fur] density must be a number > 0"),
-    ("0.5", "5.8", "[fur] density must be so many strands [1/mm^2] that the ball has 65536 at most, 5.795"),
+    ("0.5\nradius = 0.4", "29\nradius = 0.1",
+     "[fur] density must be so many strands [1/mm^2] that the ball has 262144 at most, 28.62"),
+    ("8.0", "8.0\nclumps = 1", "[fur] clumps must be so many clumps [1/mm^2] that the ball has 8192 at most, 0.8942"),
+    ("8.0", "8.0\ngather = 1", "[fur] gather must be a number in 0 ... 0.9, got 1"),
     ("radius = 0.4", "radius = 1.5", "[fur] radius must be at most the strands' mean distance, 1 / sqrt(density)"),
-    ("radius = 0.4", "radius = 0.01", "[fur] ball must be at most 140 times the strands' radius, got 30"),
+    ("radius = 0.4", "radius = 0.01", "[fur] ball must be at most 640 times the strands' radius, got 27"),
     ("8.0", "-8.0", "[fur] length must be a number > 0 and <= 150, got -8"),
     ("8.0", "8.0\nforce = [0, -2, 0]", "[fur] force must be three numbers in -0.9 ... 0.9, got [0, -2, 0]"),
     ("samples = 8", "exponent = 2", "[technique] exponent must be left out where kind is swept, got 2"),

@@ -258,7 +258,10 @@ def fur(tmp_path, monkeypatch):
     for name, value in {"PATCHES": 6, "RAYS": 100, "MOST": 16, "ANGLES": (75,)}.items():
         monkeypatch.setattr(f"profilefit.studies.choose.scenes.{name}", value)
     path = tmp_path / "fur.toml"
-    path.write_text('scene = "fur"\n[fur]\nlength = 5\n[technique]\ntolerance = 0.1\n', encoding="utf-8")
+    path.write_text(
+        'scene = "fur"\n[fur]\ndensity = 0.64\nradius = 0.5\nlength = 5\n[technique]\ntolerance = 0.1\n',
+        encoding="utf-8",
+    )
     return path
 
 

@@ -20,18 +20,25 @@ vec2 level(vec3 o, vec3 d, float t) {
     return under < 0.0 ? vec2(NONE) : vec2(-along - half_way, -along + half_way);
 }
 
+// The way over the skin that a ray goes between two places, from strand to strand.
+float crossed(vec3 from, vec3 to) {
+    vec3 one = normalize(from - height_of(from) * tall * force);
+    vec3 other = normalize(to - height_of(to) * tall * force);
+    return 2.0 * ball * asin(min(0.5 * length(other - one), 1.0));
+}
+
 vec3 normal_at(vec3 p) {
     return normalize(p);
 }
 
-// Maps hold the directions of feet, over an octahedron's net.
+// Maps hold the directions of feet; a clump gathers the directions of its strands toward its centre.
 Strand strand_near(vec3 p, float t, int which) {
-    vec3 way = p - t * tall * force;
-    vec2 net = way.xy / (abs(way.x) + abs(way.y) + abs(way.z));
-    vec2 sides = vec2(net.x < 0.0 ? -1.0 : 1.0, net.y < 0.0 ? -1.0 : 1.0);
-    net = way.z < 0.0 ? (1.0 - abs(net.yx)) * sides : net;
-    int texels = textureSize(nearest_map, 0).x;
-    ivec2 texel = ivec2(clamp((0.5 * net + 0.5) * float(texels), 0.0, float(texels) - 0.5));
-    vec3 up = (which == 0 ? texelFetch(nearest_map, texel, 0) : texelFetch(next_map, texel, 0)).xyz;
-    return Strand(ball * up, up);
+    vec3 way = normalize(p - t * tall * force);
+    if (gathered > 0.0) {
+        vec3 centre = over_net(clump_map, way).xyz;
+        float left = 1.0 - t * tall * gathered / (ball + t * tall);  // of the way to the centre
+        way = centre + (way - centre) / left;
+    }
+    vec3 up = (which == 0 ? over_net(nearest_map, way) : over_net(next_map, way)).xyz;
+    return Strand(ball * up, up, up + force + gathered_at(up));
 }

@@ -2,12 +2,13 @@
 uniform vec3 eye, forward, right, up;
 uniform float parallel, radius, exponent;
 uniform int layers, tested;  // strands of a slab; 0: shells
+uniform bool walked;  // in even steps, as many as layers where the way over the skin is a strand's length
 in vec2 where;
 out vec4 found;  // foot and height over the length; the skin's normal and -1; -2
 
 // Height over the length, and place across a strand's axis.
 float across(Strand s, vec3 p, out vec3 q) {
-    vec3 axis = tall * (s.up + force);
+    vec3 axis = tall * s.axis;
     vec3 away = p - s.foot;
     float t = dot(away, s.up) / dot(axis, s.up);
     q = away - t * axis;
@@ -16,7 +17,7 @@ float across(Strand s, vec3 p, out vec3 q) {
 
 bool on_shell(vec3 p, float t) {
     Strand s = strand_near(p, t, 0);
-    bool hit = length(p - s.foot - t * tall * (s.up + force)) < radius * strand_slice(t, exponent);
+    bool hit = length(p - s.foot - t * tall * s.axis) < radius * strand_slice(t, exponent);
     if (hit) found = vec4(s.foot, t);
     return hit;
 }
@@ -30,7 +31,7 @@ bool in_slab(vec3 o, vec3 d, float begin, float end, float skin) {
     bool hit = false;
     for (int which = 0; which < tested; ++which) {
         Strand s = strand_near(p, t_middle, which);
-        vec3 q, m, axis = tall * (s.up + force);
+        vec3 q, m, axis = tall * s.axis;
         float t = across(s, p, q);
         float rate = dot(d, s.up) / dot(axis, s.up);
         m = d - rate * axis;
@@ -55,6 +56,16 @@ void main() {
     found = skin < NONE ? vec4(normal_at(o + skin * d), -1.0) : vec4(-2.0);
     float begin = level(o, d, 1.0).x;
     if (begin >= NONE) return;
+    if (walked) {
+        float end = skin < NONE ? skin : level(o, d, 1.0).y;
+        float way = crossed(o + begin * d, o + end * d);
+        int steps = int(clamp(ceil(float(layers) * way / tall), 1.0, 4096.0));
+        float one = (end - begin) / float(steps);
+        for (int i = 0; i < steps; ++i) {
+            if (in_slab(o, d, begin + float(i) * one, begin + float(i + 1) * one, skin)) return;
+        }
+        return;
+    }
     int i = layers - 1;
     for (; i >= 0; --i) {
         float t = float(i) / float(layers);

@@ -40,7 +40,7 @@ void main() {
     float edge = clamp(rim.x + rim.y * pow(1.0 - clamp(dot(n, to_eye), 0.0, 1.0), rim.z), 0.0, 1.0);
     vec3 seen = albedo / PI * (irradiance * max(onto, 0.0) * lit + sky * open) + edge * open * sky / PI;
     if (!is_skin) {
-        vec3 axis = normalize(n + force), middle = normalize(to_eye + to_light);
+        vec3 axis = normalize(n + force + gathered_at(n)), middle = normalize(to_eye + to_light);
         float angle = acos(clamp(dot(axis, middle), -1.0, 1.0));
         vec2 lobes = strengths * vec2(pow(abs(sin(angle - turns.x)), exponents.x), pow(abs(sin(angle - turns.y)), exponents.y));
         // The first is white; the other one went through the strand.

@@ -5,4 +5,4 @@ uniform float tall;
 
 const float NONE = 1e8;  // no such place along a ray
 
-struct Strand { vec3 foot; vec3 up; };
+struct Strand { vec3 foot; vec3 up; vec3 axis; };  // the axis from foot to tip, by the length

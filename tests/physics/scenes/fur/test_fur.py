@@ -17,7 +17,7 @@ from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.law import best_exponent, lobe_mean, occlusion, shadow, shell_shadow, visibility
 from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays, struck
-from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO
+from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WALKED, FurTrial
 from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.judge import srgb_codes, to_srgb
 from profilefit.scenes.stage.renderer import Renderer
@@ -301,10 +301,12 @@ def test_layers_in_opengl_are_those_of_rays(context, degrees, lean):
     view, start = patch_view(patch, theta, SIZE)
     surface = FurSurface.of_patch(patch, 16.0)
     with Renderer(context, SIZE) as renderer:
-        for way, layers in ((LINEAR, 12), (QUADRATIC, 12), (FITTED, 12), (SWEPT, 6), (SWEPT_TWO, 6)):
+        aside = np.hypot(np.tan(theta) - lean[0], lean[1])
+        for way, layers in ((LINEAR, 12), (QUADRATIC, 12), (FITTED, 12), (SWEPT, 6), (SWEPT_TWO, 6), (WALKED, 6)):
             found = np.maximum(renderer.image(surface.layered(view, way, layers))[..., 3].ravel(), 0.0)
             if way.tested:
-                expected = by_slabs(patch, theta, start, layers, way.tested)
+                steps = max(int(np.ceil(layers * aside)), 1) if way.walked else layers
+                expected = by_slabs(patch, theta, start, steps, way.tested)
             else:
                 expected = by_shells(patch, theta, start, layers, way.exponent_of(layers, 10.0))
             same = np.abs(found - expected) < 1e-3
@@ -357,17 +359,99 @@ def test_the_truth_of_a_ball_against_steps_along_each_ray():
     assert np.sum(found[..., 3] >= 0) > 30
 
 
-def test_layers_on_a_ball_tend_to_its_truth(context):
-    size, surface = (160, 120), FurSurface.of_ball(SMALL)
-    true = SMALL.cast(VIEW, size)
+CLUMPED = random_ball(3000, 10.0, 0.15, 3.0, (0.0, -0.3, 0.1), 3, 40, 0.6)
+
+
+def wrong(context, ball, surface, *ways):
+    """Shares of rays whose first hit is another by more than 0.02 of the length."""
+    size = 160, 120
+    true = ball.cast(VIEW, size)
     with Renderer(context, size) as renderer:
-        wrong = [
-            np.mean(np.abs(renderer.image(surface.layered(VIEW, way, layers))[..., 3] - true[..., 3]) > 0.02)
-            for way, layers in ((SWEPT_TWO, 64), (SWEPT, 64), (SWEPT, 8), (LINEAR, 8))
-        ]
-    assert wrong[0] < 0.01
-    assert wrong[1] < 0.02
-    assert wrong[1] < wrong[2] < wrong[3]
+        found = [renderer.image(surface.layered(VIEW, way, layers)) for way, layers in ways]
+    return [float(np.mean(np.abs(one[..., 3] - true[..., 3]) > 0.02)) for one in found]
+
+
+def test_layers_on_a_ball_tend_to_its_truth(context):
+    ways = (SWEPT_TWO, 64), (SWEPT, 64), (SWEPT, 8), (LINEAR, 8), (WALKED, 4), (SWEPT_TWO, 4)
+    found = wrong(context, SMALL, FurSurface.of_ball(SMALL), *ways)
+    assert found[0] < 0.01
+    assert found[1] < 0.02
+    assert found[1] < found[2] < found[3]
+    assert found[4] < 0.002 < found[5]
+
+
+def test_steps_through_clumps_tend_to_their_truth(context):
+    """And maps of the same strands without clumps do not."""
+    surface = FurSurface.of_ball(CLUMPED)
+    fine, coarse = wrong(context, CLUMPED, surface, (WALKED, 64), (WALKED, 8))
+    assert fine < 0.003
+    assert coarse > 0.01
+    upright = surface._replace(uniforms={**surface.uniforms, "gathered": 0.0})
+    assert wrong(context, CLUMPED, upright, (WALKED, 64))[0] > 0.2
+
+
+def test_a_tip_is_moved_toward_the_centre_of_its_clump():
+    """By a share of the way between both, as directions from the ball's middle less the force."""
+    tips = CLUMPED.ball * CLUMPED.feet + CLUMPED.length * (CLUMPED.axes - np.array(CLUMPED.force))
+    way = tips / (CLUMPED.ball + CLUMPED.length)
+    centre = CLUMPED.feet + (way - CLUMPED.feet) / 0.6
+    away, which = cKDTree(CLUMPED.centres).query(centre)
+    assert np.max(away) < 1e-6
+    nearest, _ = cKDTree(CLUMPED.centres).query(CLUMPED.feet)
+    own = np.linalg.norm(CLUMPED.centres[which] - CLUMPED.feet, axis=1)
+    assert np.max(own - nearest) < 3.0 / 512  # a texel of the map
+    assert len(np.unique(which)) > 30
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_the_truth_of_a_ball_against_all_strands(parallel):
+    """Each ray against each strand, the strips left out; strands toward every side of the picture."""
+    size = 24, 18
+    view = (
+        VIEW if not parallel else VIEW._replace(parallel=True, right=16.0 * unit(VIEW.right), up=12.0 * unit(VIEW.up))
+    )
+    start, way = (np.broadcast_to(one, (18, 24, 3)).reshape(-1, 3) for one in view.rays(size))
+    ray, strand = (one.ravel() for one in np.meshgrid(np.arange(len(way)), np.arange(3000), indexing="ij"))
+    far, height = (one.reshape(len(way), 3000) for one in CLUMPED._met(strand, start[ray], way[ray]))
+    first = np.argmin(far, axis=1)
+    found = CLUMPED.cast(view, size).reshape(-1, 4)
+    hit = found[:, 3] >= 0
+    assert 0.1 < hit.mean() < 0.9
+    rows = np.arange(len(way))
+    np.testing.assert_array_equal(found[hit, :3], CLUMPED.feet[first[hit]])
+    np.testing.assert_array_equal(found[hit, 3], height[rows, first][hit])
+    skin = found[:, 3] == SKIN
+    to_skin = np.sum((10.0 * found[skin, :3] - start[skin]) * way[skin], axis=1)
+    assert np.all(to_skin < far[rows, first][skin])
+    assert np.all(np.isinf(far[found[:, 3] == NOTHING]))
+
+
+def test_the_first_strand_on_a_patch_against_all():
+    """Thin ones, so that steps are longer than a root; each strand's images in reach against each ray."""
+    patch, theta = random_patch(20.0, 0.02, 1.0, 2.0, 7, (0.2, -0.1)), np.radians(50.0)
+    start = rays(patch, 300, 7)
+    way = np.array([np.tan(theta), 0.0])
+    images = np.array(list(product((-2, -1, 0, 1, 2), (-1, 0, 1)))) * patch.side
+    feet = (patch.feet[:, None] + images).reshape(-1, 2)
+    # |start - way s - foot - lean (1 - s)| = 0.02 s, s down from the tips: the first root in 0 ... 1.
+    away, rate = start[:, None] - feet - patch.lean, patch.lean - way
+    a, b, c = rate @ rate - 0.02**2, away @ rate, np.sum(away**2, axis=-1)
+    under = b * b - a * c
+    s = (-b - np.sqrt(np.maximum(under, 0.0))) / a
+    s = np.where((under >= 0) & (s >= 0) & (s <= 1), s, 1.0).min(axis=1)
+    np.testing.assert_allclose(cast(patch, theta, start), 1.0 - s, atol=1e-9)
+    assert 0.2 < np.mean(s < 1.0) < 0.95
+
+
+def test_steps_need_as_many_at_every_angle():
+    """What holds at 45 degrees holds at 75, where layers fail: mean squares over four patches."""
+    patches = [random_patch(20.0, 0.05, 1.0, 6.0, seed) for seed in range(4)]
+    for way, most in ((WALKED, 1.6), (SWEPT_TWO, 10.0)):
+        flat, steep = (
+            np.mean([FurTrial(one, np.radians(theta), rays(one, 1500, 3)).error(way, 8) ** 2 for one in patches])
+            for theta in (45.0, 75.0)
+        )
+        assert (steep < most**2 * flat) == way.walked, (way.name, steep, flat)
 
 
 def test_a_strand_alone_on_a_ball():
