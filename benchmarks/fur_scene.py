@@ -15,7 +15,7 @@ from profilefit.scenes.fur import law, scene
 from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch
-from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WAYS
+from profilefit.scenes.fur.ways import FITTED, LINEAR, OF_PICTURES, QUADRATIC, SWEPT, SWEPT_TWO, WALKED, WAYS
 from profilefit.scenes.stage.judge import srgb_codes, to_srgb
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
@@ -25,10 +25,11 @@ from profilefit.studies.tradeoff.points import Panel
 Rows = list[tuple[str | float, ...]]
 RAYS, ROOT, SIDE = 2048, 0.1, 2.0  # of a strand alone, of length 1
 UNIONS = ((20.0, 8), (45.0, 8), (45.0, 24), (58.0, 16))
-LAYERS = (8, 16, 32, 64)
+LAYERS = (16, 32, 64, 128)
 FINER = (1, 2, 4, 8)
 EXPONENTS = (0.0, 4.0, 12.0, 60.0, 240.0)
-SHOWN, LARGER = 16, 2  # layers; pixels of the figure that one of the picture has, along a side
+SHOWN, LARGER = 64, 2  # layers; pixels of the figure that one of the picture has, along a side
+IN_A_ROW = (LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WALKED)
 COLOURS = {LINEAR.name: GREY, QUADRATIC.name: VERMILION, FITTED.name: ORANGE, SWEPT.name: GREEN, SWEPT_TWO.name: BLUE}
 
 
@@ -53,7 +54,7 @@ def pictures() -> Rows:
     with opened() as context:
         panel = tradeoff.picture(context, tradeoff.FurSizes(layers=LAYERS))
     errors = {(one.method, one.label): one.error.value for one in panel.points}
-    return [(way.name, *(errors[way.name, str(n)] for n in LAYERS)) for way in WAYS]
+    return [(way.name, *(errors[way.name, str(n)] for n in LAYERS)) for way in OF_PICTURES]
 
 
 def gamma() -> Rows:
@@ -80,9 +81,9 @@ def lobes() -> Rows:
 
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
-    """Draw the example's truth and the five ways, three beside three, and error over time toward six angles."""
+    """Draw the example's truth and five ways, three beside three, and error over time toward six angles."""
     with scene.reference_render(context, tradeoff.example("fur")) as drawn:
-        judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in WAYS)]
+        judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in IN_A_ROW)]
         larger = [np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
     rows = [np.concatenate(row, axis=1) for row in (larger[:3], larger[3:])]
     image.imsave(folder / "render-fur.png", np.concatenate(rows))

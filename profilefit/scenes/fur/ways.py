@@ -39,8 +39,9 @@ class LayerTechnique(NamedTuple):
 
 LINEAR, QUADRATIC, FITTED = LayerTechnique("linear", 1.0), LayerTechnique("quadratic", 2.0), LayerTechnique("fitted")
 SWEPT, SWEPT_TWO = LayerTechnique("swept", tested=1), LayerTechnique("swept, two strands", tested=2)
-WALKED = LayerTechnique("walked", tested=2, walked=True)
 WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
+WALKED = LayerTechnique("walked", tested=2, walked=True)
+OF_PICTURES = (*WAYS, WALKED)  # toward one angle, steps are layers of another number
 
 
 @dataclass(frozen=True, eq=False)

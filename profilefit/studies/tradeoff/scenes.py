@@ -21,7 +21,7 @@ from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 from profilefit.scenes.fur import scene as fur_scene
 from profilefit.scenes.fur.chart import over_layers, wide_patch
-from profilefit.scenes.fur.ways import WAYS
+from profilefit.scenes.fur.ways import OF_PICTURES
 from profilefit.scenes.sea import scene as sea_scene
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.chart import FINE, Bundle, ViewRay, by_lines, by_prisms, by_slices
@@ -173,6 +173,6 @@ def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FUR) -> P
 def picture(context: moderngl.Context, sizes: FurSizes = FUR) -> Panel:
     """Return the example's ball, its light against rays to every strand."""
     with fur_scene.reference_render(context, example("fur")) as drawn:
-        found = [one for way in WAYS for one in drawn.points(way, sizes.layers, sizes.turns)]
+        found = [one for way in OF_PICTURES for one in drawn.points(way, sizes.layers, sizes.turns)]
     cost, error = "time of both passes [ms]", "root mean square error / mean [-]"
     return Panel("ball", "examples/fur.toml, layers", cost, error, _points("ball", found, "layers"), joined=True)

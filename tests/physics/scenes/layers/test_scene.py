@@ -186,13 +186,13 @@ def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, mon
     monkeypatch.setattr(fit, "stack_law", lambda *_: pytest.fail("skin has a record"))
     monkeypatch.setattr(scene, "stack_table", lru_cache(scene.stack_table))  # no pose changes it
     request = scene.read("head.toml", EXAMPLE)
-    request = request.changed(camera_table={"resolution": (96, 72), "reference_pixel": 1}, technique={"samples": 64})
+    request = request.changed(camera_table={"resolution": (128, 96), "reference_pixel": 1}, technique={"samples": 64})
     errors = {}
     for pose in scene.POSES:
         for kind in ("stack", "dipole"):
             drawn = scene.draw(context, request.changed(pose=pose, technique={"kind": kind}))
             errors[pose, kind] = drawn.point.rmse
-            assert drawn.picture.shape == drawn.truth.shape == (72, 96, 3)
+            assert drawn.picture.shape == drawn.truth.shape == (96, 128, 3)
             assert drawn.truth_error.rms < 0.01
             assert drawn.point.samples == 64
     stack, dipole = (np.array([errors[pose, kind] for pose in scene.POSES]) for kind in ("stack", "dipole"))
