@@ -194,12 +194,12 @@ TABLES = {
 
 def main(arguments: list[str] | None = None) -> None:
     parser = parser_of(__doc__, TABLES)
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures, only")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="the figure of its cost, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
         with opened() as context:
             panels = [tradeoff.angle(context, one) for one in tradeoff.DEGREES]
-            drawn.figures(context, given.pictures, panels, renderer(context))
+            drawn.cost_figure(panels, renderer(context), given.pictures / "render-fur-cost.png")
         return
     show_all({name: TABLES[name] for name in given.only or TABLES}, given.json)
 

@@ -1,13 +1,11 @@
-"""Fur as OpenGL draws it: discs against their union, the example by each way, where gamma belongs; and its figures."""
+"""Fur as OpenGL draws it: discs against their union, the example by each way, where gamma belongs; and its figure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-import moderngl
 import numpy as np
-from matplotlib import image
 
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILION, canvas, plain_log, styled
@@ -15,8 +13,8 @@ from profilefit.scenes.fur import law, scene
 from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.passes import FurSurface
 from profilefit.scenes.fur.truth import Patch
-from profilefit.scenes.fur.ways import FITTED, LINEAR, OF_PICTURES, QUADRATIC, SWEPT, SWEPT_TWO, WALKED, WAYS
-from profilefit.scenes.stage.judge import srgb_codes, to_srgb
+from profilefit.scenes.fur.ways import FITTED, LINEAR, OF_PICTURES, QUADRATIC, SWEPT, SWEPT_TWO, WAYS
+from profilefit.scenes.stage.judge import srgb_codes
 from profilefit.scenes.stage.renderer import Renderer
 from profilefit.shader import opened
 from profilefit.studies.tradeoff import scenes as tradeoff
@@ -28,8 +26,6 @@ UNIONS = ((20.0, 8), (45.0, 8), (45.0, 24), (58.0, 16))
 LAYERS = (16, 32, 64, 128)
 FINER = (1, 2, 4, 8)
 EXPONENTS = (0.0, 4.0, 12.0, 60.0, 240.0)
-SHOWN, LARGER = 64, 2  # layers; pixels of the figure that one of the picture has, along a side
-IN_A_ROW = (LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WALKED)
 COLOURS = {LINEAR.name: GREY, QUADRATIC.name: VERMILION, FITTED.name: ORANGE, SWEPT.name: GREEN, SWEPT_TWO.name: BLUE}
 
 
@@ -80,18 +76,9 @@ def lobes() -> Rows:
     return [(p, mean, mean / float(law.lobe_mean(p))) for p, mean in means]
 
 
-def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
-    """Draw the example's truth and five ways, three beside three, and error over time toward six angles."""
-    with scene.reference_render(context, tradeoff.example("fur")) as drawn:
-        judge, each = drawn.judge, [drawn.judge.reference, *(drawn.picture(way, SHOWN) for way in IN_A_ROW)]
-        larger = [np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]
-    rows = [np.concatenate(row, axis=1) for row in (larger[:3], larger[3:])]
-    image.imsave(folder / "render-fur.png", np.concatenate(rows))
-    _charts(panels, device, folder / "render-fur-cost.png")
-
-
 @styled
-def _charts(panels: Sequence[Panel], device: str, path: Path) -> None:
+def cost_figure(panels: Sequence[Panel], device: str, path: Path) -> None:
+    """Draw error over time toward six angles."""
     figure = canvas(5.0, 8.0)
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for ax, panel in zip(axes.flat, panels, strict=True):

@@ -29,7 +29,6 @@ from mcml_sim.files.whole_file import read_toml
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.kinds import stack
 from profilefit.recipes.stack.gaussians import shared_gaussians
-from profilefit.report.scene_report import scene_figures
 from profilefit.scenes.heart import chart, scene
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
@@ -247,9 +246,6 @@ def main(arguments: list[str] | None = None) -> None:
         if given.pictures is not None:
             cost_figure(of_size, device, given.pictures / "render-heart-cost.png")
             map_figure(by_view, TEXELS, VIEWS, given.pictures / "render-heart-map.png")
-            with opened() as context:
-                pictures = scene_figures(scene.draw(context, request((960, 540))), renderer(context))
-            (given.pictures / "render-heart.png").write_bytes(pictures["-comparison"])
         return
     if given.count < 1:
         parser.error(f"--count must be a number of scenes > 0, got {given.count}")

@@ -2,7 +2,7 @@
 
     python -m benchmarks.layers            # six minutes on two cores, of which the exact light takes two
     python -m benchmarks.layers --frames   # time of a frame over resolution and number of faces
-    python -m benchmarks.layers --pictures fits/evidence   # render-layers.png and render-ear.png, four minutes
+    python -m benchmarks.layers --pictures fits/evidence   # render-ear.png
 
 Of examples/layers-head.toml. Errors are root mean squares of scattered light over its mean, against the surface
 integral with the exact stack at each point; times are of this machine's OpenGL, the least of five turns.
@@ -33,7 +33,7 @@ from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.passes import diffusely_once, once
 from profilefit.scenes.layers.truth import stack_table
-from profilefit.scenes.stage.judge import EXPOSURE, to_srgb
+from profilefit.scenes.stage.judge import to_srgb
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.subject import head
 from profilefit.scenes.stage.technique import NamedTechnique
@@ -52,7 +52,7 @@ WAYS = {
     "none": (1,),
 }
 SIZES, DETAILS = ((128, 128), (256, 256), (512, 512), (1024, 1024)), (1, 2)
-PICTURED, LARGE = ("stack", "dipole", "half space"), (200, 200)
+PICTURED = ("stack", "dipole", "half space")
 BEHIND, PARTS = Camera((250.0, 10.0, 600.0), (78.0, 2.0, -10.0), 110.0), (2.0, 5.0)  # of the ear; parts [mm]
 THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 
@@ -134,31 +134,13 @@ def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
                 for detail in DETAILS:
                     drawn = scene.scene_of(request)
                     finer = (head.head(detail), head.ear(-1, detail), head.ear(1, detail), head.neck(detail))
-                    parts = tuple(Part(mesh, part.reflectance) for mesh, part in zip(finer, drawn.parts, strict=True))
-                    stage.draw(replace(drawn, parts=parts))
+                    skin = (Part(mesh, part.reflectance) for mesh, part in zip(finer, drawn.parts, strict=False))
+                    stage.draw(replace(drawn, parts=(*skin, *drawn.parts[len(finer) :])))
                     way = scene.technique(request, laws)
                     times = stage.time(way.by, way.mfp, request.sampling, 3, "frame")
                     faces = sum(len(mesh.triangles) for mesh in finer)
                     rows.append((f"{size[0]} x {size[1]}", str(faces), f"{median(times):.3g}"))
     return rows
-
-
-def head_picture(file: Path) -> None:
-    """Draw truth, stack, first layer's dipole and half space, side by side."""
-    request = request_of(LARGE)
-    table = stack_table(request.media, request.thickness.least, request.thickness.most, request.illumination)
-    laws, pictures = scene.laws_of(request), []
-    with opened() as context, Stage(context, request.size) as stage:
-        judge = scene.reference(stage, request, table)
-        for kind in PICTURED:
-            way = scene.technique(request.changed(technique={"kind": kind}), laws)
-            sampling = replace(request.sampling, samples=64)
-            radiance = stage.render(way.by, way.mfp, sampling, way.alpha)
-            if not pictures:
-                off = judge.reference - stage.scatter(way.by, way.mfp, sampling, way.alpha)
-                pictures.append(radiance + off / np.pi)
-            pictures.append(radiance)
-    image.imsave(file, np.concatenate([to_srgb(one[::-1], EXPOSURE) for one in pictures], axis=1))
 
 
 def ear(file: Path) -> list[tuple[str, ...]]:
@@ -193,10 +175,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", action="store_true", help="time of a frame over resolution and faces, only")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the errors by pose and way there too")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="the pictures, only")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="the picture of an ear, only")
     request, given = request_of(), parser.parse_args(arguments)
     if given.pictures is not None:
-        head_picture(given.pictures / "render-layers.png")
         columns = ("light through skin", "mm", "exact", "closed form", "half space's rest")
         show("Of light that arrives [-]", columns, ear(given.pictures / "render-ear.png"))
         return

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.sea_boxes import caustic_boxes
-from benchmarks.sea_figure import cost_figure, picture
+from benchmarks.sea_figure import cost_figure
 from benchmarks.sea_filter import adaptive_filter
 from benchmarks.sea_photons import trace_beam
 from benchmarks.table import Listed, Rows, parser_of, show_all
@@ -275,7 +275,6 @@ def main(arguments: list[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     if given.pictures is not None:
         with opened() as context, reference_render(context, tradeoff.example("sea"), PATHS) as found:
-            picture(found, given.pictures / "render-sea.png")
             cost_figure(tradeoff.view(found), renderer(context), given.pictures / "render-sea-cost.png")
         return
     show_all({name: TABLES[name] for name in given.only or TABLES}, given.json)

@@ -1,32 +1,17 @@
-"""Figures of the sea: the scene by each kind beside its truth, and error over time."""
+"""Figure of the sea: error over time."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-from matplotlib import image
 
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE
-from profilefit.scenes.sea.scene import SeaRender
-from profilefit.scenes.stage.judge import to_srgb
 from profilefit.studies.tradeoff.points import Panel
 
 COLOURS = {BROADENED: BLUE, SCALED: GREEN, SINGLE: VERMILION}
-LARGER = 3  # pixels of the figure that one of the picture has, along a side
-
-
-def picture(found: SeaRender, path: Path) -> None:
-    """Draw the truth, and the scene by each kind, two beside two."""
-    judge, samples = found.judge, found.request.sampling.samples
-    truth, *ways = (
-        np.kron(to_srgb(one[::-1], judge.exposure), np.ones((LARGER, LARGER, 1), np.uint8))
-        for one in (judge.reference, *(found.picture(kind, samples) for kind in KINDS))
-    )
-    top, bottom = (np.concatenate(row, axis=1) for row in ((truth, ways[0]), (ways[1], ways[2])))
-    image.imsave(path, np.concatenate([top, bottom]))
 
 
 @styled

@@ -253,18 +253,17 @@ RENDERS = {
     "render-choices.png": "One head by each sampling technique.",
     "render-17-samples.png": "One head by 17 samples per pixel, as in Figure 14 of Liang et al.",
 }
-# `python -m benchmarks.layers --pictures`, and those of heart, sea and fur, make them.
+# `python -m benchmarks.scenes --pictures`, and those of layers, heart, sea and fur, make them.
 OF_LAYERS = {
-    "render-layers.png": "Layered skin: reference, model of the layers, dipole of the first layer, one semi-infinite "
-    "medium.",
-    "render-ear.png": "An ear, lit from behind, by the same techniques.",
-    "render-heart.png": "A heart: reference, Gaussians split between screen and atlas, atlas alone, screen alone, no "
-    "scattering.",
+    "render-skin.png": "Skin: technique, reference, error, and two rivals.",
+    "render-layers.png": "Layered skin, likewise.",
+    "render-ear.png": "An ear, lit from behind: model of the layers, dipole of the first, one semi-infinite medium.",
+    "render-heart.png": "A heart, likewise.",
     "render-heart-cost.png": "Error of the heart over time, by each technique at four sizes.",
     "render-heart-map.png": "Error of the heart over texel size and view. The lowest of three is bold.",
-    "render-sea.png": "Under water: all light, broadened light, forward peak, single scattering.",
+    "render-sea.png": "Under water, likewise.",
     "render-sea-cost.png": "Error under water over the time of a view, by each technique.",
-    "render-fur.png": "Fur: rays against each strand, then shells (linear, quadratic, fitted), then swept slabs.",
+    "render-fur.png": "Fur, likewise.",
     "render-fur-cost.png": "Error of fur over time, at six angles.",
     "own-data.png": "Errors of tissue's properties by place and error of the data; n and g known or not.",
 }
