@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -19,29 +20,30 @@ from statistics import median
 import numpy as np
 from matplotlib import image
 
-from benchmarks.layers_tables import of_gaussians, of_table
 from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.files.whole_file import read_toml
 from mcml_sim.media.medium import fresnel
+from profilefit.laws.gaussians import MediumGaussians
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import shared_gaussians
 from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.half_space import one_half_space
-from profilefit.scenes.layers.law import plate_of
-from profilefit.scenes.layers.passes import diffusely_once, once
-from profilefit.scenes.layers.truth import stack_table
+from profilefit.scenes.layers.law import Plate, plate_of
+from profilefit.scenes.layers.passes import StackGather, diffusely_once, of_table, once
+from profilefit.scenes.layers.truth import table_of
 from profilefit.scenes.stage.judge import to_srgb
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.subject import head
-from profilefit.scenes.stage.technique import NamedTechnique
+from profilefit.scenes.stage.technique import LAW, LawText, NamedTechnique
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
+from profilefit.shader.stack_text import gaussians_text
 
 FILE = "layers-head.toml"
-TABLE = "exact table"
+TABLE = "exact tables"
 WAYS = {
     "stack": (4, 16, 64),
     TABLE: (4, 16, 64),
@@ -57,6 +59,13 @@ BEHIND, PARTS = Camera((250.0, 10.0, 600.0), (78.0, 2.0, -10.0), 110.0), (2.0, 5
 THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
+def of_gaussians(sums: Sequence[MediumGaussians], plates: Sequence[Plate]) -> StackGather:
+    """Return samples of sums of Gaussians, of red, green and blue, which are of one thickness everywhere."""
+    text = gaussians_text(sums, name=LAW)
+    law = LawText("gaussians", text, {}, f"{LAW}_shape(float(c))", f"{LAW}_reflectance(shape)")
+    return StackGather(law, tuple(plates))
+
+
 def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
     """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
@@ -65,7 +74,7 @@ def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
 
 def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     """Yield error and milliseconds of each way in each pose; one table of exact light serves all."""
-    table = stack_table(request.media, request.thickness.least, request.thickness.most, request.illumination)
+    table = table_of(request.media, request.map, request.illumination)
     rows = []
     media, light = request.media, request.illumination
     plates = [plate_of(medium, light) for medium in media]

@@ -1,4 +1,4 @@
-"""STACK.toml: layers from the surface down in red, green and blue, read and checked; a thickness may be an image.
+"""STACK.toml: layers from the surface down in red, green and blue, read and checked; one quantity may be an image.
 
     unit = "mm"
 
@@ -8,7 +8,7 @@
     mu_a = [0.21, 0.21, 0.50]  # red, green, blue [1/mm]; one number is that of all three
     mu_s = [4.8, 6.0, 6.5]
     g = 0.0
-    thickness = { image = "thickness.png", range = [0.05, 0.4] }
+    thickness = { image = "thickness.png", range = [0.05, 0.4] }  # or mu_a, between two spectra
 
     [[layers]]
     material = "marble"  # of profilefit.materials, in place of mu_a, mu_s and g
@@ -26,7 +26,7 @@ import stat
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -56,8 +56,10 @@ from profilefit.materials import BY_NAME, SOURCE, Material
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
 
 Floats = NDArray[np.float32]
+Colour = tuple[Medium, Medium, Medium]  # of red, green and blue
 Refusal = Callable[..., InputError]
 BY_MATERIAL = ("mu_a", "mu_s", "g")  # what a material says
+MAPPED = ("thickness", "mu_a")  # what may be an image
 UNIT = "mm"  # of the materials, and of a file that names none
 MOST_LAYERS = 20  # as many as the exact light of a stack has
 LARGEST_SIDE = 4096  # of an image [pixels]
@@ -79,20 +81,68 @@ logging.getLogger("PIL").addHandler(logging.NullHandler())  # else some of its e
 
 @dataclass(frozen=True, eq=False)
 class ThicknessMap:
-    """The thickness of a first layer from place to place: least + (most - least) values.
+    """The thickness of a layer from place to place: least + (most - least) values.
 
     values       (rows, columns) in [0, 1], read-only; row 0 is at the top of the image
     least, most  thickness where the value is 0 and where it is 1 [unit of the stack]
+    layer        its number, from 0 at the surface
     """
 
     values: Floats
     least: float
     most: float
+    layer: int = 0
 
     @property
     def mean(self) -> float:
         """The mean thickness of all pixels [unit of the stack]."""
         return self.least + (self.most - self.least) * float(self.values.mean(dtype=np.float64))
+
+    def media(self, media: Colour, value: float) -> Colour:
+        """Return the media of red, green and blue where the map has a value."""
+        thickness = self.least + (self.most - self.least) * value
+        return _changed(media, self.layer, [{"thickness": thickness}] * 3)
+
+
+@dataclass(frozen=True, eq=False)
+class AbsorptionMap:
+    """The absorption of a layer from place to place, as by a share of melanin or blood: least + (most - least) values.
+
+    values       (rows, columns) in [0, 1], read-only; row 0 is at the top of the image
+    least, most  mu_a in red, green and blue where the value is 0 and where it is 1 [1/unit of the stack]
+    layer        its number, from 0 at the surface
+    """
+
+    values: Floats
+    least: tuple[float, float, float]
+    most: tuple[float, float, float]
+    layer: int = 0
+
+    @property
+    def mean(self) -> tuple[float, float, float]:
+        """The mean mu_a of all pixels [1/unit of the stack]."""
+        return self._at(float(self.values.mean(dtype=np.float64)))
+
+    def media(self, media: Colour, value: float) -> Colour:
+        """Return the media of red, green and blue where the map has a value."""
+        return _changed(media, self.layer, [{"mu_a": mu_a} for mu_a in self._at(value)])
+
+    def _at(self, value: float) -> tuple[float, float, float]:
+        red, green, blue = ((1.0 - value) * a + value * b for a, b in zip(self.least, self.most, strict=True))
+        return red, green, blue
+
+
+LayerMap = ThicknessMap | AbsorptionMap
+
+
+def _changed(media: Colour, number: int, changes: list[dict[str, Any]]) -> Colour:
+    def changed(medium: Medium, change: dict[str, Any]) -> Medium:
+        layers = list(medium.layers)
+        layers[number] = replace(layers[number], **change)
+        return replace(medium, layers=tuple(layers))
+
+    red, green, blue = map(changed, media, changes)
+    return red, green, blue
 
 
 @dataclass(frozen=True)
@@ -103,14 +153,14 @@ class LayerStack:
     media    of red, green and blue light, equal where every coefficient is one number; air above and below
     names    one a layer; that of its material where the file gives none, or ""
     sources  one a layer: where its numbers are from, or ""
-    map      the first layer's thickness where it is an image, whose mean stands in the media; or None
+    map      a layer's thickness or absorption where it is an image, whose mean stands in the media; or None
     """
 
     unit: str
-    media: tuple[Medium, Medium, Medium]
+    media: Colour
     names: tuple[str, ...]
     sources: tuple[str, ...]
-    map: ThicknessMap | None = None
+    map: LayerMap | None = None
 
     @property
     def is_grey(self) -> bool:
@@ -156,13 +206,32 @@ class ImageTable(Declared):
         return self
 
 
+class AbsorptionTable(Declared):
+    """Absorption by an image, looked for beside the file: `range` holds where the value is 0 and where it is 1."""
+
+    range: Annotated[tuple[Colours, Colours], LISTED, words("two coefficients, each one number or three")]
+    image: Annotated[Line, words(IMAGE)]
+    _map: AbsorptionMap = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _read(self, info: ValidationInfo) -> Self:
+        self._map = AbsorptionMap(_values(Path(str(info.context)).parent, self.image), *self.range)
+        return self
+
+
 class LayerTable(Declared):
     """Table [[layers]]: a layer in red, green and blue, its coefficients given or those of a material."""
 
     name: Text | None = None
     material: Annotated[str, OneOf(*BY_NAME)] | None = None
     n: float
-    mu_a: Colours | None = None
+    mu_a: (
+        Annotated[
+            Annotated[Colours, Tag("[number]")] | Annotated[AbsorptionTable, Tag("[image]")],
+            Discriminator(lambda value: "[image]" if isinstance(value, dict) else "[number]"),
+        ]
+        | None
+    ) = None
     mu_s: Colours | None = None
     g: float | None = None
     thickness: Annotated[
@@ -173,9 +242,10 @@ class LayerTable(Declared):
     source: Line | None = None
     _colours: tuple[Layer, ...] = PrivateAttr()
 
-    @property
-    def map(self) -> ThicknessMap | None:
-        return self.thickness._map if isinstance(self.thickness, ImageTable) else None
+    def map(self, number: int) -> LayerMap | None:
+        """Return the image of one of its quantities, of a layer of that number."""
+        tables = (one for one in (self.thickness, self.mu_a) if isinstance(one, ImageTable | AbsorptionTable))
+        return next((replace(table._map, layer=number) for table in tables), None)
 
     @property
     def published(self) -> Material | None:
@@ -195,6 +265,7 @@ class LayerTable(Declared):
         mu_a, mu_s = (self.mu_a, self.mu_s) if known is None else (known.absorption, known.scattering)
         assert mu_a is not None
         assert mu_s is not None
+        mu_a = mu_a._map.mean if isinstance(mu_a, AbsorptionTable) else mu_a
         d = self.thickness._map.mean if isinstance(self.thickness, ImageTable) else self.thickness
         self._colours = tuple(Layer(self.n, a, s, self.g or 0.0, d) for a, s in zip(mu_a, mu_s, strict=True))
         return self
@@ -206,9 +277,11 @@ def _few(content: Any) -> Any:
         raise Refused(f"at most {MOST_LAYERS}", len(content))
     if not isinstance(content, list) or not content or not all(isinstance(layer, dict) for layer in content):
         raise Refused("tables [[layers]]", content)
-    for number, layer in enumerate(content):
-        if number > 0 and isinstance(layer.get("thickness"), dict):
-            raise Refused("a number > 0 below the first layer", layer["thickness"], number, "thickness")
+    images = [
+        (number, key) for number, layer in enumerate(content) for key in MAPPED if isinstance(layer.get(key), dict)
+    ]
+    for number, key in images[1:]:
+        raise Refused("one number, or three: a file has one image at most", content[number][key], number, key)
     return content
 
 
@@ -245,7 +318,7 @@ class Layered(Declared):
             _media(self.layers),
             tuple(name if name is not None else of.name if of else "" for name, _, of in known),
             tuple(source if source is not None else SOURCE if of else "" for _, source, of in known),
-            self.layers[0].map,
+            next((found for number, layer in enumerate(self.layers) if (found := layer.map(number))), None),
         )
 
 

@@ -1,6 +1,7 @@
 """Passes of layered objects: samples of a stack's law with the thickness of each pixel; light scattered once.
 
-The G-buffer's `reflectance_map` holds a share of the way from the least thickness of the first layer to the most.
+The G-buffer's `reflectance_map` holds a share of the way from the least thickness of the first layer to the most, or of
+what else varies.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from mcml_sim import Medium
 from mcml_sim.media.arrays import Floats
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
+from profilefit.materials import CHANNELS
 from profilefit.scenes.layers.law import Plate, single_scattering
+from profilefit.scenes.layers.truth import LEFT, StackTable
+from profilefit.scenes.stage.exact_law import columns, row, table_text
 from profilefit.scenes.stage.lighting import text
 from profilefit.scenes.stage.renderer import SUM, Pass, Read
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, maps
@@ -25,6 +29,7 @@ from profilefit.shader.stack_text import single_text, stack_text
 
 SCATTERED = "scattered_map"
 COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4
+ROWS = 32  # of a table of exact light, over a map's values
 LEAST = 1e-9  # mean free paths that stand for no first layer
 GRAZING = 1e-3  # cosine that stands for 0, where a quadrature is of no use
 # Quadratures over directions: cosines in (0, 1) and azimuths in (0, pi), since both sides of the plane are alike.
@@ -68,6 +73,33 @@ def of_stack(laws: Sequence[StackLaw], least: float, most: float, plates: Sequen
     shape = f"{LAW}_shape(float(c), {thickness_text(least, most)})"
     law = LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)")
     return StackGather(law, tuple(plates))
+
+
+def of_table(table: StackTable, plates: Sequence[Plate]) -> StackGather:
+    """Return samples of exact light by tables, of the nearest of ROWS values of the map at each pixel."""
+    values = np.repeat(np.linspace(0.0, 1.0, ROWS), len(CHANNELS))
+    curves, (t, x) = table.curves(values), columns()
+    every = np.broadcast_to(x, (values.size, x.size))
+    shares = np.maximum.accumulate(curves.share(every), axis=1)
+    rings = 2.0 * np.pi * x * curves.density(every)
+    rows = [row(_radii(t, x, share), ring, share) for share, ring in zip(shares, rings, strict=True)]
+    drawn, known = (np.stack(column) for column in zip(*rows, strict=True))
+    text = table_text(LAW, curves.reflectance)
+    shape = f"{LAW}_Shape(c + {len(CHANNELS)} * int(surface.r * {ROWS - 1}.0 + 0.5))"
+    textures = {f"{LAW}_drawn": drawn, f"{LAW}_known": known}
+    return StackGather(LawText("table", text, textures, shape, f"{LAW}_reflectance(shape)"), tuple(plates))
+
+
+def _radii(t: Floats, x: Floats, share: Floats) -> Floats:
+    """Return x at which all but e^-t of the light is within; beyond what a table tells, as it goes on."""
+    depth = -np.log(np.maximum(1.0 - share, LEFT))
+    told = np.searchsorted(depth, depth[-1])  # the first column with all that is told
+    ln = np.interp(t, depth[: told + 1], np.log(x[: told + 1]))
+    first = t < depth[0]  # R_d is as good as even there, or as 1 / r: next to none of the light
+    far = t > depth[told]
+    before = np.searchsorted(depth, depth[told] - 1.0)
+    rate = (x[told] - x[before]) / (depth[told] - depth[before])
+    return np.where(far, x[told] + rate * (t - depth[told]), np.where(first, x[0] * t / depth[0], np.exp(ln)))
 
 
 def of_half_space(law: ProfileLaw) -> Gather:

@@ -23,11 +23,11 @@ from profilefit.recipes.declared import OneOf, Refused, Tolerance, words
 from profilefit.recipes.folder import LOCAL, fits_folder
 from profilefit.recipes.kinds.stack import StackRequest, matching
 from profilefit.recipes.stack import fit
-from profilefit.recipes.stack.file import ThicknessMap
+from profilefit.recipes.stack.file import LayerMap, ThicknessMap
 from profilefit.scenes.layers import passes
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
-from profilefit.scenes.layers.truth import StackTable, stack_table
+from profilefit.scenes.layers.truth import StackTable, table_of
 from profilefit.scenes.stage import request
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge, surface_judge, whole_judge
@@ -36,8 +36,9 @@ from profilefit.scenes.stage.subject import eye, head
 from profilefit.scenes.stage.technique import NamedTechnique, Technique
 from profilefit.scenes.stage.world import ROUGHNESS, Part, Rgb, Scene, deformed, rgb
 
-KINDS = ("stack", "dipole", "half space", "none")
-OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
+KINDS = ("stack", "table", "dipole", "half space", "none")
+OF_LAW = ("stack", "none")  # which take the law's colour at each thickness of the first layer
+ELSEWHERE = "where the image is not of the first layer's thickness"
 POSES = ("rest", "turn", "nod")
 NEGLIGIBLE = 0.01  # share of white that directions may be wrong by before light scattered once is drawn by itself
 NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
@@ -69,18 +70,26 @@ class LayersRequest(request.MeshRequest, StackRequest):
 
     @property
     def kind(self) -> str:
-        """Kind of the technique."""
-        return self.technique.kind
+        """Kind of the technique; without one in the file, exact tables where the law has no such argument."""
+        is_said = "kind" in self.technique.model_fields_set
+        return self.technique.kind if is_said or self.is_of_law else "table"
+
+    @property
+    def is_of_law(self) -> bool:
+        """Whether what varies is the thickness of the first layer, an argument of the stack's law."""
+        return isinstance(self.map, ThicknessMap) and self.map.layer == 0
 
     @property
     def single(self) -> bool:
         """Whether light scattered once is drawn by itself: as the file says, else where it is not negligible."""
         said = self.technique.single
-        return said if isinstance(said, bool) else max(map(passes.alike_error, self.media)) > NEGLIGIBLE
+        if isinstance(said, bool):
+            return said
+        return self.is_of_law and max(map(passes.alike_error, self.media)) > NEGLIGIBLE
 
     @cached_property
-    def thickness(self) -> ThicknessMap:
-        """Thickness of the first layer [mm] over u and v; row 0 at the top."""
+    def map(self) -> LayerMap:
+        """Thickness of the first layer [mm] over u and v, or what else an image varies; row 0 at the top."""
         if self.stack.map is not None:
             return self.stack.map
         d, apart = self.media[0].layers[0].thickness, max(self.uneven, 1e-3)
@@ -91,7 +100,13 @@ class LayersRequest(request.MeshRequest, StackRequest):
     def _drawable(self) -> Self:
         fit.require_exact(self.stack)
         if self.stack.map is not None and "uneven" in self.model_fields_set:
-            raise Refused("left out where the thickness is an image", self.uneven, "uneven")
+            raise Refused("left out where a layer has an image", self.uneven, "uneven")
+        if self.technique.single is True and not self.is_of_law:
+            raise Refused(
+                "false or auto where the image is not of the first layer's thickness", True, "technique", "single"
+            )
+        if self.kind in OF_LAW and not self.is_of_law:
+            raise Refused(f"table, dipole or half space {ELSEWHERE}", self.kind, "technique", "kind")
         if self.surface.parts and "pose" in self.model_fields_set:
             raise Refused("left out of a mesh of a file", self.pose, "pose")
         return self
@@ -104,23 +119,25 @@ read = LayersRequest.of
 def opened(context: moderngl.Context, of: LayersRequest, has_reference: bool) -> Iterator[StageDrawing]:
     """Open the drawing of a request; exact light at nine thicknesses, for the reference, takes minutes."""
     scene, laws = scene_of(of), cache(lambda: laws_of(of))
+    table = cache(lambda: table_of(of.media, of.map, of.illumination))
 
     def technique_of(given: LayersRequest) -> tuple[NamedTechnique, Technique]:
-        named = technique(given, laws() if given.kind in OF_LAW else None)
+        is_tabulated = given.kind == "table"
+        named = technique(given, laws() if given.kind in OF_LAW else None, table() if is_tabulated else None)
         if not given.single:
             return named, named.by
-        return named, passes.WithSingle(named.by, given.media, given.thickness.least, given.thickness.most)
+        assert isinstance(given.map, ThicknessMap)
+        return named, passes.WithSingle(named.by, given.media, given.map.least, given.map.most)
 
     with Stage(context, of.size) as stage:
         request.draw_lit(stage, scene, of.file)  # before the minutes that exact light takes
         judge = None
         if has_reference:
-            table = stack_table(of.media, of.thickness.least, of.thickness.most, of.illumination)
-            judge = (whole_judge if of.surface.parts else surface_judge)(stage, scene, of.mfp, table)
+            judge = (whole_judge if of.surface.parts else surface_judge)(stage, scene, of.mfp, table())
         yield StageDrawing(stage, technique_of, judge)
 
 
-drawer = Drawer(opened, ({"kind": "dipole"}, {"kind": "half space"}, {"kind": "stack"}))
+drawer = Drawer(opened, ({"kind": "dipole"}, {"kind": "half space"}, {"kind": "table"}))
 draw, picture = drawer.draw, drawer.picture
 
 
@@ -131,21 +148,27 @@ def reference(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
     return surface_judge(stage, scene, of.mfp, table, has_error=False)
 
 
-def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> NamedTechnique:
+def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None, table: StackTable | None = None) -> NamedTechnique:
     """Return the technique of a `kind`, without light scattered once by itself.
 
-    It is the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
+    It is the stack's law, exact tables, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
 
     Args:
         of: the request.
         laws: of red, green and blue, which the first and the last of these need.
+        table: exact light, which the second needs.
     """
     light, n = of.illumination, of.media[0].layers[0].n
     if of.kind in OF_LAW:  # of which the last one's light does not leave its pixel
         assert laws is not None
         plates = [plate_of(medium, light) for medium in of.media]
         lengths = of.mfp if of.kind == "stack" else (NO_LENGTH,) * 3
-        return NamedTechnique(of.kind, passes.of_stack(laws, of.thickness.least, of.thickness.most, plates), lengths)
+        assert isinstance(of.map, ThicknessMap)
+        return NamedTechnique(of.kind, passes.of_stack(laws, of.map.least, of.map.most, plates), lengths)
+    if of.kind == "table":
+        assert table is not None
+        plates = [plate_of(medium, light) for medium in of.media]
+        return NamedTechnique("exact tables", passes.of_table(table, plates), of.mfp)
     if of.kind == "dipole":
         dipole = catalogue.load("dipole", setting=Setting(n=n))
         alpha = rgb(medium.layers[0].alpha for medium in of.media)
@@ -167,9 +190,9 @@ def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 
 
 def scene_of(of: LayersRequest) -> Scene:
-    """Return the head in its pose, or a mesh; the texture is the share of the way from least to most thickness."""
+    """Return the head in its pose, or a mesh; the texture is the share of the way from least to most of the map."""
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
-    values = np.repeat(of.thickness.values[::-1, :, None], len(CHANNELS), axis=-1)
+    values = np.repeat(of.map.values[::-1, :, None], len(CHANNELS), axis=-1)
     if of.surface.parts:
         own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
         return of.under_light(Scene(own, camera=of.camera, f0=f0))

@@ -7,15 +7,23 @@ import numpy as np
 import pytest
 
 import profilefit
-from benchmarks.layers_tables import of_table
 from benchmarks.planes import flat
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact.single_scattering import reflected
 from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.recipes.stack.file import AbsorptionMap, ThicknessMap
 from profilefit.scenes.layers import passes, truth
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_space, of_stack, once, once_table
-from profilefit.scenes.layers.truth import StackTable, stack_table
+from profilefit.scenes.layers.passes import (
+    WithSingle,
+    diffusely_once,
+    of_half_space,
+    of_stack,
+    of_table,
+    once,
+    once_table,
+)
+from profilefit.scenes.layers.truth import StackTable, stack_table, table_of
 from profilefit.scenes.stage.exact_law import FARTHEST, NEAREST, ExactLaw, exact_table
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.world import Light, unit
@@ -254,14 +262,14 @@ def halfway(table: StackTable, places: list[int]) -> list[float]:
 
 
 def errors(
-    table: StackTable, medium: Medium, channel: int, thickness: float, light: str, taken: float | None = None
+    table: StackTable, medium: Medium, channel: int, value: float, light: str, unit: float | None = None
 ) -> np.ndarray:
     """Largest error of R_d as far as light is SEEN, relative; of A, relative; of the cdf.
 
-    taken  what the table is asked for, if that is another thickness
+    value  share of the way from the table's least to its most;  unit  of the table's lengths, by default the medium's
     """
-    true, unit = exact.solve(medium.with_first(thickness), light), medium.layers[0].mfp
-    curves = table.curves(np.full(3, ((taken or thickness) - table.least) / (table.most - table.least)))
+    true, unit = exact.solve(medium, light), unit or medium.layers[0].mfp
+    curves = table.curves(np.full(3, value))
     share = np.asarray(true.cdf(unit * X))
     density = np.asarray(true.profile(unit * X)) * unit**2 / true.reflectance
     x = np.tile(X, (3, 1))
@@ -332,11 +340,45 @@ def test_between_its_thicknesses():
     accepted = np.array([1e-3, 1e-5, 2e-5])
     for thickness in halfway(table, [0, 3, 7]):
         for channel, medium in enumerate((RED, GREEN)):
-            found = errors(table, medium, channel, thickness, "diffuse")
+            found = errors(table, medium.with_first(thickness), channel, (thickness - 0.125) / 0.25, "diffuse")
             assert np.all(found < accepted), found
     # The comparison can fail: for another channel, and for a thickness that is 1 % off.
-    assert np.all(errors(table, RED, 1, 0.2, "diffuse") > 100.0 * accepted)
-    assert np.all(errors(table, RED, 0, 0.2, "diffuse", 0.202) > accepted)
+    assert np.all(errors(table, RED.with_first(0.2), 1, 0.3, "diffuse") > 100.0 * accepted)
+    assert np.all(errors(table, RED.with_first(0.2), 0, 0.308, "diffuse") > accepted)
+
+
+COLOUR = (RED, GREEN, RED)
+VARIED = {
+    "blood": AbsorptionMap(np.zeros((1, 1)), (0.005, 0.02, 0.005), (0.05, 0.4, 0.05), 2),
+    "melanin": AbsorptionMap(np.zeros((1, 1)), (0.0, 0.0, 0.0), (0.8, 2.0, 0.8), 0),
+    "thickness": ThicknessMap(np.zeros((1, 1)), 0.1, 0.6, 1),
+}
+
+
+BETWEEN = [("blood", (1e-3, 5e-4, 5e-4)), ("melanin", (1e-3, 5e-4, 5e-4)), ("thickness", (1e-3, 1e-4, 1e-4))]
+
+
+def test_a_map_of_one_value_is_a_stack_without(few):
+    """Whatever the map's value; a stack as exact as its table's columns."""
+    own = RED.layers[2].mu_a, GREEN.layers[2].mu_a, RED.layers[2].mu_a
+    table = table_of(COLOUR, AbsorptionMap(np.zeros((1, 1)), own, own, 2))
+    for channel, medium in enumerate((RED, GREEN)):
+        for value in (0.0, 0.4, 1.0):
+            assert np.all(errors(table, medium, channel, value, "diffuse") < [1e-3, 1e-5, 1e-5])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "accepted"), BETWEEN)
+def test_between_values_of_any_map(kind, accepted):
+    """Blood below, melanin on top from none at all, a second layer of another thickness."""
+    of = VARIED[kind]
+    table = table_of(COLOUR, of)
+    for value in (0.01, 0.2, 0.9):
+        for channel, medium in enumerate(of.media(COLOUR, value)[:2]):
+            found = errors(table, medium, channel, value, "diffuse", COLOUR[channel].layers[0].mfp)
+            assert np.all(found < accepted), (value, found)
+    medium = of.media(COLOUR, 0.9)[1]
+    assert np.all(errors(table, medium, 1, 0.85, "diffuse", COLOUR[1].layers[0].mfp) > accepted)
 
 
 @pytest.mark.slow
@@ -345,5 +387,10 @@ def test_a_range_of_a_hundred_times_and_from_nothing(least):
     """Its rows are then half a unit of ln d apart: 4e-2, 1.3e-3 and 7e-4 were found."""
     table = stack_table((HEART,) * 3, least, 2.0, "searchlight")
     last = len(table.u) - 2
-    found = np.array([errors(table, HEART, 0, d, "searchlight") for d in halfway(table, [last // 2, last])])
+    found = np.array(
+        [
+            errors(table, HEART.with_first(d), 0, (d - least) / (2.0 - least), "searchlight")
+            for d in halfway(table, [last // 2, last])
+        ]
+    )
     assert np.all(found.max(axis=0) < [5e-2, 2e-3, 1e-3]), found

@@ -7,6 +7,7 @@ import random
 import re
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,7 @@ mu_s = [1, 2, 3]
 g = 0
 """
 IMAGE = 'thickness = { image = "thickness.png", range = [0.05, 0.4] }'
+TWO = '[[layers]]\nn = 1.3\nmu_a = { image = "thickness.png", range = [0, 1] }\nmu_s = 1\ng = 0\n'
 KIND = r"8- or 16-bit grey, or a TIFF of float32, got thickness.png of another kind \(Pillow's "
 SIZE = r"image must be a grey PNG or TIFF of at most 4096 x 4096 pixels, got "
 
@@ -133,6 +135,28 @@ def test_stacks_are_no_recipes():
     names = ["heart", "marble-on-potato", "skimmilk-on-marble", "skimmilk-on-potato", "skin"]
     assert [path.stem for path in SHIPPED] == names
     assert not set(available(fits_folder(), "toml")) & {path.stem for path in SHIPPED}
+
+
+def test_values_are_absorptions(read, tmp_path):
+    """Between two spectra, of any layer; the mean stands in the media."""
+    Image.fromarray(np.array([[0, 255], [255, 255]], np.uint8)).save(tmp_path / "blood.png")
+    stack = read("mu_a = 1\n", 'mu_a = { image = "blood.png", range = [0.1, [0.3, 0.5, 2.1]] }\n')
+    assert [medium.layers[1].mu_a for medium in stack.media] == pytest.approx([0.25, 0.4, 1.6])
+    for value, expected in ((0.0, [0.1] * 3), (1.0, [0.3, 0.5, 2.1]), (0.5, [0.2, 0.3, 1.1])):
+        found = stack.map.media(stack.media, value)
+        assert [medium.layers[1].mu_a for medium in found] == pytest.approx(expected)
+        assert [replace(medium.layers[1], mu_a=0.0) for medium in found] == [
+            replace(medium.layers[1], mu_a=0.0) for medium in stack.media
+        ]
+        assert [medium.layers[0] for medium in found] == [medium.layers[0] for medium in stack.media]
+
+
+def test_a_thickness_of_any_layer(read, tmp_path):
+    Image.fromarray(np.array([[0, 255]], np.uint8)).save(tmp_path / "thickness.png")
+    stack = read("g = 0\n", f"g = 0\n{IMAGE}\n[[layers]]\nn = 1.3\nmu_a = 1\nmu_s = 1\ng = 0\n")
+    assert stack.map.layer == 1
+    assert [medium.layers[1].thickness for medium in stack.media] == [pytest.approx(0.225)] * 3
+    assert [medium.layers[1].thickness for medium in stack.map.media(stack.media, 1.0)] == [0.4] * 3
 
 
 def test_values_are_thicknesses(of_image, tmp_path):
@@ -308,7 +332,7 @@ IN_FIRST = [
     (D, "thickness must be a number > 0, got", {"-0.1": "-0.1$", "nan": "nan", "true": "True", "[1, 2]": r"\[1, 2\]"}),
     (A, "mu_a must be a coefficient >= 0, or three .*, got", {"": "nothing"}),
     (A, "mu_a must be a coefficient >= 0, or three of", {"[0.1, 0.2, -3]": ""}),
-    (A, "mu_a must be .* got", {"[0.1, 0.2]": r"\[0.1, 0.2\]", "inf": "inf", "{red = 1}": "{'red': 1}"}),
+    (A, "mu_a must be .* got", {"[0.1, 0.2]": r"\[0.1, 0.2\]", "inf": "inf"}),
     (A, "mu_a must be .* got", {"[[1, 2, 3]]": r"\[\[1, 2, 3\]\]", "[1, 2, true]": r"\[1, 2, True\]"}),
     ("n = 1.4", "n must be a refractive index > 0, got", {"-1": "-1"}),
     ("n = 1.4", "n must be a finite number, got", {"": "nothing", "[1.4, 1.4, 1.4]": r"\[1.4", "inf": "inf"}),
@@ -340,7 +364,13 @@ WRONG = [
     (D, IMAGE.replace('"thickness.png"', "3"), r"\[layers 1.thickness\] image must be .* got 3"),
     (D, IMAGE.replace(".png", "\\u0000"), r"\[layers 1.thickness\] image must be .*'thickness\\x00'"),
     (D, IMAGE.replace("thickness.png", "x" * 400), r"image must be a grey PNG .* got 'xx*"),
-    ("g = 0\n", f"g = 0\n{IMAGE}\n", r"\[layers 2\] thickness must be a number > 0 below the first layer, got {"),
+    ("g = 0\n", f"g = 0\n{IMAGE}\n{TWO}", r"\[layers 3\] mu_a must be one number, or three: a file .*, got {"),
+    (A, "mu_a = {red = 1}", r"\[layers 1.mu_a\] keys must be of range, image, got 'red'"),
+    (A, "mu_a = { range = [0, 1] }", r"\[layers 1.mu_a\] image must be .*, got nothing"),
+    *(
+        (A, f'mu_a = {{ image = "thickness.png", range = {given} }}', rf"range must be two .*, got {re.escape(given)}")
+        for given in ("[0]", "[0, -1]", "[[1, 2], 3]", "[0, nan]")
+    ),
     ("mu_s = 9", "mu_s = 9\nmaterial = 'marble'", r"\[layers 1\] material must be left out where mu_a, mu_s, g are"),
     (A, "mu_a = 1e308\n[x]", r"\[layers 1\] mu_s must be a coefficient .*, got nothing"),
     ("", "n = 1", r"table \[\[layers\]\] is missing"),
