@@ -194,7 +194,8 @@ def scene_of(of: LayersRequest) -> Scene:
     f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     values = np.repeat(of.map.values[::-1, :, None], len(CHANNELS), axis=-1)
     if of.surface.parts:
-        own = tuple(Part(one.mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for one in of.surface.parts)
+        bare = ((replace(one.mesh, tint=None), one) for one in of.surface.parts)
+        own = tuple(Part(mesh, values, one.roughness or ROUGHNESS, relief=one.relief) for mesh, one in bare)
         return of.under_light(Scene(own, camera=of.camera, f0=f0))
     skin = [Part(mesh, values) for mesh in (head.head(), head.ear(-1), head.ear(1), head.neck())]
     if of.stack.map is None and of.uneven > 0:

@@ -140,8 +140,10 @@ def read_mesh(path: Path, factor: float, name: str = "") -> tuple[FilePart, ...]
     parts = []
     for one, matrix in shapes:
         with _sound(name):
-            mesh = _mesh(one, np.asarray(matrix, float), kind == ".stl", name)
+            mesh = _mesh(one, np.asarray(matrix, float), kind, name)
             colour, roughness, relief = painter.surface(getattr(one.visual, "material", None))
+            if colour is None and mesh.tint is not None:
+                colour = np.ones((1, 1, 3), np.float32)
         parts.append(FilePart(mesh, colour, roughness, relief))
     return _placed(parts, factor, name)
 
@@ -159,14 +161,14 @@ def _placed(parts: list[FilePart], factor: float, name: str) -> tuple[FilePart, 
     return tuple(replace(part, mesh=mesh) for part, mesh in zip(parts, meshes, strict=True))
 
 
-def _mesh(shape: Any, matrix: Floats, is_soup: bool, name: str) -> Mesh:
+def _mesh(shape: Any, matrix: Floats, kind: str, name: str) -> Mesh:
     """Return a mesh of trimesh's in its place, without what has no area."""
     position, triangles = np.asarray(shape.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(shape.faces)
     if not np.all(np.isfinite(position)):
         raise InputError(f"mesh must have finite coordinates, got others in {name}")
     if triangles.min() < 0 or triangles.max() >= len(position):
         raise InputError(f"mesh must have triangles of its {len(position)} vertices, got others in {name}")
-    if is_soup:  # each triangle has vertices of its own, which have no normal but its
+    if kind == ".stl":  # each triangle has vertices of its own, which have no normal but its
         shape.merge_vertices()
         position, triangles = np.asarray(shape.vertices, float), np.asarray(shape.faces)
     face = _crosses(position, triangles)
@@ -183,10 +185,10 @@ def _mesh(shape: Any, matrix: Floats, is_soup: bool, name: str) -> Mesh:
     normal = unit(np.where((length > 1e-6) & np.isfinite(length), normal, of_face))
     if np.sum((position - position.mean(axis=0)) * normal) < 0:  # inside out
         normal = -normal
-    uv = _uv(shape, used, name)
+    uv, tint = _uv(shape, used, name), _tint(shape, used, kind)
     if uv is None:
-        return Mesh(position, normal, np.zeros((len(position), 2)), triangles)
-    mesh = Mesh(position, normal, uv, triangles)
+        return Mesh(position, normal, np.zeros((len(position), 2)), triangles, tint=tint)
+    mesh = Mesh(position, normal, uv, triangles, tint=tint)
     return replace(mesh, tangent=_tangents(mesh))
 
 
@@ -222,6 +224,17 @@ def _uv(shape: Any, used: NDArray[np.int64], name: str) -> Floats | None:
     if not np.all(np.abs(found) <= MOST_UV):
         raise InputError(f"mesh must have uv in {-MOST_UV:g} ... {MOST_UV:g}, got others in {name}")
     return found
+
+
+def _tint(shape: Any, used: NDArray[np.int64], kind: str) -> Floats | None:
+    """Return colours of vertices, linear: those of glTF are, others are taken for sRGB."""
+    visual = shape.visual
+    colours = visual.vertex_colors if visual.kind == "vertex" else getattr(visual, "vertex_attributes", {}).get("color")
+    every = np.asarray(colours)
+    if every.dtype != np.uint8 or every.ndim != 2 or every.shape[0] != len(shape.vertices) or every.shape[1] < 3:
+        return None
+    codes = every[used, :3]
+    return codes / 255.0 if kind in (".glb", ".gltf") else LINEAR[codes].astype(float)
 
 
 class _Painter:

@@ -22,7 +22,8 @@ UNIFORM = re.compile(r"\buniform\s+(?:(?:low|medium|high)p\s+)?\w+\s+([^;]+);")
 # What a fragment does to those before it in its place: it replaces them, only if it is nearer, or is added to them.
 REPLACE, NEAREST, SUM = "replace", "nearest", "sum"
 FLAGS = {REPLACE: moderngl.NOTHING, NEAREST: moderngl.DEPTH_TEST, SUM: moderngl.BLEND}
-ATTRIBUTES = {"position": 3, "normal": 3, "uv": 2, "tangent": 4}  # numbers of a vertex, in the order of `Mesh.vertices`
+# Numbers of a vertex, in the order of `Mesh.vertices`.
+ATTRIBUTES = {"position": 3, "normal": 3, "uv": 2, "tangent": 4, "tint": 3}
 ANISOTROPY = 8.0
 MOST_SENT = 64  # arrays and meshes that stay on the GPU: of more, those are released that were used longest ago
 

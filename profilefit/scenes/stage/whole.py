@@ -83,5 +83,5 @@ def _cut(mesh: Mesh, length: float) -> tuple[Mesh, Floats]:
     a, b, c = _corners(mesh.position, mesh)
     sign = np.where(turned, -1.0, 1.0) / cuts[of]
     sides = np.stack([sign[:, None] * (b - a)[of], sign[:, None] * (c - a)[of]])
-    tangent = None if mesh.tangent is None else mean(mesh.tangent)
-    return Mesh(mean(mesh.position), unit(mean(mesh.normal)), mean(mesh.uv), mesh.triangles, tangent), sides
+    tangent, tint = (None if values is None else mean(values) for values in (mesh.tangent, mesh.tint))
+    return Mesh(mean(mesh.position), unit(mean(mesh.normal)), mean(mesh.uv), mesh.triangles, tangent, tint), sides

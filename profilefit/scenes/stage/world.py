@@ -79,6 +79,7 @@ class Mesh:
 
     tangent  (n, 4) direction in which u grows, and 1 or -1, by which v grows along normal x tangent; where it is 0, as
              by default, the part has no relief
+    tint     (n, 3) factors of the reflectance; 1 by default
     """
 
     position: Floats
@@ -86,11 +87,13 @@ class Mesh:
     uv: Floats
     triangles: NDArray[np.int32]
     tangent: Floats | None = None
+    tint: Floats | None = None
 
     def vertices(self) -> NDArray[np.float32]:
-        """Return (n, 12) position, normal, uv, tangent, as a vertex buffer holds them."""
+        """Return (n, 15) position, normal, uv, tangent, tint, as a vertex buffer holds them."""
         tangent = np.zeros((len(self.position), 4)) if self.tangent is None else self.tangent
-        return np.concatenate([self.position, self.normal, self.uv, tangent], axis=1).astype(np.float32)
+        tint = np.ones((len(self.position), 3)) if self.tint is None else self.tint
+        return np.concatenate([self.position, self.normal, self.uv, tangent, tint], axis=1).astype(np.float32)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import json
 import os
 import struct
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from profilefit.scenes import SCENES
 from profilefit.scenes.skin import scene as skin
 from profilefit.scenes.stage import mesh_file
 from profilefit.scenes.stage.mesh_file import read_mesh
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.world import Camera, Scene
 from tests.fixtures import EXAMPLES
 
 BALL = trimesh.creation.icosphere(2, 10.0)
@@ -85,6 +88,28 @@ def test_colours_are_linear_and_a_relief_has_a_tangent(tmp_path):
     upside.putpixel((0, 1), (0, 0, 0))  # the last row of an image is at v = 0
     [part] = read_mesh(write(tmp_path, "glb", textured(upside)), 1.0)
     assert part.colour[:, 0, 0].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(("kind", "expected"), [("glb", 128 / 255), ("ply", 0.215861), ("obj", 0.215861)])
+def test_colours_of_vertices(context, tmp_path, kind, expected):
+    """Linear in glTF, else sRGB's 128; a picture shows what lies between them, times the texture."""
+    square = textured(solid(255, 255, 255))
+    square = trimesh.Trimesh(square.vertices, square.faces, process=False)
+    square.visual.vertex_colors = [[128, 0, 0, 255], [255, 0, 0, 255], [255, 255, 0, 255], [128, 255, 0, 255]]
+    [part] = read_mesh(write(tmp_path, kind, square), 1.0)
+    assert part.colour.tolist() == [[[1.0, 1.0, 1.0]]]
+    at = np.argsort(part.mesh.position @ [1.0, 10.0, 0.0])  # rows from below, from the left
+    expected = np.array([[expected, 0, 0], [1, 0, 0], [expected, 1, 0], [1, 1, 0]])
+    np.testing.assert_allclose(part.mesh.tint[at], expected, atol=1e-6)
+    half = part.part(np.zeros((1, 1, 3), np.float32), 0.5)
+    half = replace(half, reflectance=np.full((1, 1, 3), 0.5, np.float32))
+    with Stage(context, (40, 40), shadow_side=16) as stage:
+        stage.draw(Scene((half,), camera=Camera((0.0, 0.0, 100.0), height=20.0, kind="orthographic")))
+        seen = stage.buffers().reflectance
+    x = (np.arange(40) + 0.5) / 40.0
+    np.testing.assert_allclose(seen[..., 1], np.broadcast_to(0.5 * x[:, None], (40, 40)), atol=2e-3)
+    across = expected[0, 0] + (1.0 - expected[0, 0]) * x
+    np.testing.assert_allclose(seen[..., 0], np.broadcast_to(0.5 * across, (40, 40)), atol=2e-3)
 
 
 def test_units_and_cameras(tmp_path):

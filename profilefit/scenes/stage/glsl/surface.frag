@@ -4,6 +4,7 @@ in vec3 world_position;
 in vec3 world_normal;
 in vec2 texture_place;
 in vec4 world_tangent; // in which u grows, and the hand of u, v and the normal; 0 where there is no relief
+in vec3 own_tint; // factor of the reflectance
 uniform mat4 view;
 uniform vec3 light; // irradiance of a surface that faces it [-]
 uniform sampler2D skin;
@@ -31,7 +32,7 @@ void main() {
     float facing = dot(normal, toward_light);
     float seen = facing > 0.0 ? visibility(world_position, normal) : 0.0;
     irradiance_thickness = vec4(light * max(facing, 0.0) * seen, thickness(world_position, normal));
-    reflectance_visibility = vec4(texture(skin, texture_place).rgb, seen);
+    reflectance_visibility = vec4(texture(skin, texture_place).rgb * own_tint, seen);
     position_mask = vec4((view * vec4(world_position, 1.0)).xyz, translucent);
     normal_roughness = vec4(mat3(view) * normal, roughness * texel.w);
     place = vec4(texture_place, 0.0, 1.0);
