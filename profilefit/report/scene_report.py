@@ -145,7 +145,8 @@ def scene_lines(drawn: SceneImage, device: str) -> Iterator[str]:
         yield f"times are of {device}"
         return
     half, most, rms = judged.truth_error
-    yield f"error of the reference: {half:.1e} at half of the pixels, {most:.1e} at nine in ten, rms {rms:.1e}"
+    spread = f"{half:.1e} at half of the pixels, {most:.1e} at nine in ten, rms {rms:.1e}"
+    yield f"error of the reference: {'not known' if np.isnan(rms) else spread}"
     rows, columns = judged.truth.shape[:2]
     yield f"errors, at {columns} x {rows} pixels, are root mean squares of {judged.of}, over its mean"
     yield f"times are of {device}"

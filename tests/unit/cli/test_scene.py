@@ -129,6 +129,7 @@ def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_pa
     np.testing.assert_array_equal(pictures[0], pictures[2])  # half a period later the wind is still, too
     assert np.abs(pictures[0] - pictures[1]).max() > 0.1
     assert [0 < one["rmse"] < 1 for one in told["frames"]] == [True] * 3
+    assert "error of the reference: not known\n" in done("scene", str(fur), "--out", "drawn", "--quiet")
     said = "profilefit: --fps must be left out without --frames, got 12\n"
     assert command("scene", str(fur), "--fps", "12", "--out", "other") == (2, "", said)
     said = f"profilefit: {small}: --frames must be left out where nothing moves; sea and fur move\n"
