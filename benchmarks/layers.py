@@ -158,12 +158,13 @@ def ear(file: Path) -> list[tuple[str, ...]]:
     Returns rows of the light through a part with the layers on both sides, over what arrives: exact plates, the scene's
     closed form, and what a half space's law has left beyond the thickness.
     """
-    request = replace(
-        request_of((320, 320)), camera=BEHIND, light=Light((0.4, 0.25, -0.9)), ambient=(0.05, 0.055, 0.06)
+    request = request_of((320, 320))
+    behind = replace(
+        scene.scene_of(request), camera=BEHIND, light=Light((0.4, 0.25, -0.9)), ambient=(0.05, 0.055, 0.06)
     )
     laws, pictures, rows = scene.laws_of(request), [], []
     with opened() as context, Stage(context, request.size) as stage:
-        stage.draw(scene.scene_of(request))
+        stage.draw(behind)
         for kind in PICTURED:
             way = scene.technique(request.changed(technique={"kind": kind}), laws)
             pictures.append(to_srgb(stage.render(way.by, way.mfp, request.sampling, way.alpha)[::-1], 1.5))

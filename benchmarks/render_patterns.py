@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import profilefit
+from benchmarks.render_view import CLOSE
 from benchmarks.table import show
-from profilefit.scenes.skin.scene import FACE, head_scene
+from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
@@ -20,7 +21,7 @@ from profilefit.scenes.stage.technique import Gather
 from profilefit.scenes.stage.world import INSIDE
 from profilefit.shader.context import open_context
 
-SCENE = head_scene(camera=replace(FACE, target=(14.0, 24.0, 50.0), height=60.0))  # as `render_view` has it
+SCENE = head_scene(camera=CLOSE)
 SIZES = ((64, 48), (128, 96), (256, 192), (512, 384))  # [pixels]
 SAMPLES, BLOCK = (16, 64), 4  # of a pixel; pixels of a block's side
 KINDS = {"one for all": "importance blue", "white": "importance", "blue": "importance blue"}
