@@ -6,6 +6,7 @@ normal and the force (Fang et al., section 2), so that the shell at t L is a bal
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from profilefit.scenes.stage.world import Camera, Singles, unit
 
 SKIN, NOTHING = -1.0, -2.0  # in place of a height
 CLUMP_TEXELS = 512
-BLOCK = 4096  # strands that are cast at once
+BLOCK, MOST_PAIRS = 4096, 1 << 21  # strands that are cast at once, and pixels that they are seen in together
 
 Indices = NDArray[np.intp]
 
@@ -57,6 +58,49 @@ class FurView(NamedTuple):
         away = points - self.eye
         deep = np.ones(len(points)) if self.parallel else away @ self.forward
         return np.stack([away @ one / (one @ one) / deep for one in (self.right, self.up)], axis=-1)
+
+
+class _Strips(NamedTuple):
+    """Strips of a picture [pixels] that strands are seen in: hulls of a square around the root, and of the tip.
+
+    Attributes:
+        root: (k, 2) middles of the squares.
+        move: (k, 2) from there to the tips.
+        half: (k,) half the squares' sides.
+    """
+
+    root: Floats
+    move: Floats
+    half: Floats
+
+    def parts(self, size: tuple[int, int]) -> Iterator[slice]:
+        """Yield strands that together are seen in `MOST_PAIRS` pixels at most, or one by one."""
+        sides = np.minimum(np.abs(self.move) + 2.0 * self.half[:, None] + 1.0, size)
+        end = 0
+        while end < len(sides):
+            begin = end
+            whole = np.cumsum(np.prod(sides[begin : begin + BLOCK], axis=1))
+            end = begin + max(int(np.searchsorted(whole, MOST_PAIRS)), 1)
+            yield slice(begin, end)
+
+    def pairs(self, part: slice, size: tuple[int, int]) -> tuple[Indices, Indices]:
+        """Return strands (n,) of a part, and rays (n,) that each may meet, row by row."""
+        root, move, half = self.root[part], self.move[part], self.half[part]
+        low = np.ceil(np.minimum(root[:, 1], root[:, 1] + move[:, 1]) - half).clip(0, size[1])
+        high = np.floor(np.maximum(root[:, 1], root[:, 1] + move[:, 1]) + half).clip(-1, size[1] - 1)
+        which, row = _ranges(low, high)
+        # Shares of the way to the tip at which the strip is in the row, and the columns between.
+        off, rise, wide = row - root[which, 1], move[which, 1], half[which]
+        flat = np.abs(rise) < 1e-9
+        slope = np.where(flat, 1.0, rise)
+        ends = np.stack([np.where(flat, 0.0, (off - wide) / slope), np.where(flat, 1.0, (off + wide) / slope)])
+        ends = np.sort(ends, axis=0).clip(0.0, 1.0)
+        across = np.sort(root[which, 0] + ends * move[which, 0], axis=0)
+        wide = wide * (1.0 - ends[0])
+        first = np.ceil(across[0] - wide).clip(0, size[0])
+        last = np.floor(across[1] + wide).clip(-1, size[0] - 1)
+        strip, column = _ranges(first, last)
+        return which[strip] + part.start, row[strip] * size[0] + column
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,37 +153,22 @@ class Ball:
         far[seen] = -along[seen] - np.sqrt(half[seen])
         found[seen, :3] = (start[seen] + far[seen, None] * way[seen]) / self.ball
         found[seen, 3] = SKIN
-        for begin in range(0, len(self.feet), BLOCK):
-            strand, ray = self._pairs(view, size, slice(begin, begin + BLOCK))
+        strips = self._strips(view, size)
+        for part in strips.parts(size):
+            strand, ray = strips.pairs(part, size)
             distance, t = self._met(strand, start[ray], way[ray])
             np.minimum.at(far, ray, distance)
             first = np.isfinite(distance) & (distance == far[ray])
             found[ray[first], :3], found[ray[first], 3] = self.feet[strand[first]], t[first]
         return found.reshape(size[1], size[0], 4)
 
-    def _pairs(self, view: FurView, size: tuple[int, int], part: slice) -> tuple[Indices, Indices]:
-        """Return strands (n,) of a part, and rays (n,) that each may meet: of strips, row by row."""
-        feet, axes = self.feet[part], self.axes[part]
+    def _strips(self, view: FurView, size: tuple[int, int]) -> _Strips:
         corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) * self.radius
-        around = self._pixels(view, size, (self.ball * feet[:, None] + corners).reshape(-1, 3)).reshape(-1, 8, 2)
+        roots = self.ball * self.feet
+        around = self._pixels(view, size, (roots[:, None] + corners).reshape(-1, 3)).reshape(-1, 8, 2)
         root = 0.5 * (around.min(axis=1) + around.max(axis=1))
-        half = 0.5 * np.max(np.ptp(around, axis=1), axis=1)  # of a square in which the root is
-        move = self._pixels(view, size, self.ball * feet + self.length * axes) - root
-        low = np.ceil(np.minimum(root[:, 1], root[:, 1] + move[:, 1]) - half).clip(0, size[1])
-        high = np.floor(np.maximum(root[:, 1], root[:, 1] + move[:, 1]) + half).clip(-1, size[1] - 1)
-        which, row = _ranges(low, high)
-        # Shares of the way to the tip at which the strip is in the row, and the columns between.
-        off, rise, wide = row - root[which, 1], move[which, 1], half[which]
-        flat = np.abs(rise) < 1e-9
-        slope = np.where(flat, 1.0, rise)
-        ends = np.stack([np.where(flat, 0.0, (off - wide) / slope), np.where(flat, 1.0, (off + wide) / slope)])
-        ends = np.sort(ends, axis=0).clip(0.0, 1.0)
-        across = np.sort(root[which, 0] + ends * move[which, 0], axis=0)
-        wide = wide * (1.0 - ends[0])
-        first = np.ceil(across[0] - wide).clip(0, size[0])
-        last = np.floor(across[1] + wide).clip(-1, size[0] - 1)
-        strip, column = _ranges(first, last)
-        return which[strip] + part.start, row[strip] * size[0] + column
+        half = 0.5 * np.max(np.ptp(around, axis=1), axis=1)
+        return _Strips(root, self._pixels(view, size, roots + self.length * self.axes) - root, half)
 
     def _pixels(self, view: FurView, size: tuple[int, int], points: Floats) -> Floats:
         return 0.5 * (view.places(points) + 1.0) * np.array(size) - 0.5
