@@ -26,9 +26,13 @@ from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import Waves, first_hit, newton_hit, refracted
 
 LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile
-TOGETHER = 1 << 16  # paths in memory at once
+TOGETHER = 1 << 15  # paths in memory at once
 SUNWARD = 0.25  # share of all turns that are drawn around the way to the sun, from where most light comes
 LEAST_SPREAD = 1e-3  # of rays [-], below which the phase function alone is wide enough
+PLACES = 2  # where each part of a path may end, which all bring sunlight
+# Steps of a sequence that fills a pixel evenly (M. Roberts, The unreasonable effectiveness of quasirandom sequences,
+# 2018): powers of 1 / x, x^3 = x + 1.
+EVEN = np.array([0.7548776662466927, 0.5698402909980532])[:, None, None]
 SURE = 0.25  # below this weight a path goes on with a chance in its proportion
 MOST_EVENTS = 1000
 NEWTON, STEPS = 4, 16  # to a surface that a ray meets once; of one that it may meet more often
@@ -99,6 +103,20 @@ class Event(NamedTuple):
     way: Floats
 
 
+class Stretch(NamedTuple):
+    """Straight parts of n paths.
+
+    place, way     (n, 3) start and direction;  wall  (n,) distance to floor or waves, inf where they are far [m]
+    worth, chance  (n, 3) light that the path before leaves, and the density of its draw, of each colour's water
+    """
+
+    place: Floats
+    way: Floats
+    wall: Floats
+    worth: Floats
+    chance: Floats
+
+
 def traced(
     world: World, light: Sunlight, origin: Floats, corner: Floats, across: Floats, up: Floats, paths: int, seed: int = 0
 ) -> Floats:
@@ -117,7 +135,7 @@ def traced(
     def means(half: int, first: int) -> Floats:
         part = np.repeat(corner[first : first + at_once], each, axis=0)
         rng = np.random.default_rng([seed, half, first])
-        spot = rng.random((2, len(part), 1))
+        spot = np.mod(rng.random((2, len(part) // each, 1)) + EVEN * np.arange(each), 1.0).reshape(2, -1, 1)
         way = part + spot[0] * across + spot[1] * up
         way /= np.linalg.norm(way, axis=1)[:, None]
         start = np.broadcast_to(origin, way.shape).copy()
@@ -140,8 +158,14 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
     for _ in range(MOST_EVENTS):
         if not len(own):
             break
-        length = rng.exponential(size=len(own)) / c[hero]
-        end, kind = _ends(world, place, way, length)
+        # Ways that the path might go, evenly from the shortest to the longest; it goes one of them.
+        even = (np.arange(PLACES) + rng.random((len(own), PLACES))) / PLACES
+        each = -np.log1p(-even) / c[hero][:, None]
+        wall, kind = _ends(world, place, way, each[:, -1])
+        wall[kind == WATER] = np.inf
+        found[own] += aside[:, None] * _along(world, light, Stretch(place, way, wall, worth, chance), each)
+        length = each[np.arange(len(own)), rng.integers(0, PLACES, len(own))]
+        end, kind = np.minimum(length, wall), np.where(length < wall, WATER, kind)
         faded = np.exp(-c * end[:, None])
         worth, chance = worth * faded, chance * faded
         place = place + end[:, None] * way
@@ -165,14 +189,30 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
     return found
 
 
+def _along(world: World, light: Sunlight, part: Stretch, each: Floats) -> Floats:
+    """Return the sunlight (n, 3) that the water turns into paths, the mean over each place where they may turn.
+
+    One place has next to none of it or thousands of times the mean: the sun's rays turn by more than the phase
+    function's peak is wide within a hand's breadth.
+
+    each  (n, PLACES) distances of the places [m]; none is seen beyond the wall
+    """
+    spot = part.place[:, None] + each[..., None] * part.way[:, None]
+    flux, beam = light.at(*spot.reshape(-1, 3).T)
+    turned = np.clip(-np.sum(beam.reshape(spot.shape) * part.way[:, None], axis=2), -1.0, 1.0).ravel()
+    seen = (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, spot.reshape(-1, 3), beam)
+    faded = np.exp(-world.c * each[..., None])
+    share = faded * part.worth[:, None] / np.mean(faded * part.chance[:, None] * world.c, axis=2, keepdims=True)
+    share[each >= part.wall[:, None]] = 0.0
+    return np.asarray(world.b) * np.mean(share * seen.reshape(spot.shape), axis=1)
+
+
 def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
-    """Return what is scattered in the water: sunlight that turns into the path, and where it goes on backward."""
-    flux, beam = light.at(*place.T)
-    turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
-    seen = (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam)
+    """Return where a path goes on backward that the water scatters; `_along` has the sunlight that it sees there."""
+    _, beam = light.at(*place.T)
     new = _turned(world.phase, way, rng)
     factor = _sunward(light, beam, new, partial(_density, world.phase, way), rng)
-    return Event(seen, np.ones((1, 3)), factor, place, new)
+    return Event(np.zeros((1, 3)), np.ones((1, 3)), factor, place, new)
 
 
 def _sunward(
