@@ -333,7 +333,7 @@ RUNS = (
     )),
     Run(RENDERING, "python -m benchmarks.render errors", "", "exact profile over the visible surface",
         "extremes of four seeds", (
-        ("flip", "≤ 0.007", flip, "FLIP error of a head, 256 samples of hazard"),
+        ("flip", "≤ 0.006", flip, "FLIP error of a head, 256 samples of hazard"),
         ("flip-nearer", "≥ 1.4", flip_nearer, "FLIP error, refitted normalized diffusion over hazard"),
     )),
     Run(RENDERING, "python -m benchmarks.choose", "--quick", "pictures rendered by OpenGL, and the exact profile",

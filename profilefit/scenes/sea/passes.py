@@ -70,12 +70,15 @@ class SeaPasses:
         self._turns = _four(np.log(blurred_phase(world, TURNS))[None, :, None])
         self._tables: dict[str, tuple[Singles, Singles, Singles]] = {}
 
-    def view(self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int, views: int = 1) -> Pass:
+    def view(
+        self, camera: Camera, size: tuple[int, int], kind: str, pieces: int, steps: int, views: int = 1, looks: int = 1
+    ) -> Pass:
         """Return the pass of the radiance that a camera sees, after those of `light`: z is up.
 
         size  columns and rows;  kind  one of `haze.KINDS`
         pieces, steps  of a ray through the water, and of the search for a hit
-        views          of a pixel along a side, each of which looks at another place of a piece
+        views          of a pixel along a side, each of which looks at other places of a piece
+        looks          at the shafts, of each piece
         """
         self.renderer.declare(VIEW, size)
         world, (right, up, forward) = self.world, axes(camera, size)
@@ -119,6 +122,7 @@ class SeaPasses:
             "turn": TURN,
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
+            "looks": checked_whole("looks", looks, 1, 64),
             "views": checked_whole("views", views, 1, 64),
         }
         shared, own = map(read_text, ("common", "near_zero")), (text_beside(__name__, f"glsl/{one}") for one in SOURCES)

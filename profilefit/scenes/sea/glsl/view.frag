@@ -36,6 +36,7 @@ uniform vec3 again;  // irradiance of the floor by its own light, which the surf
 uniform float turn;  // 1 - cosine of turns, a share of 1 / e of which are of unscattered light
 uniform float rate;  // of pieces with equal shares of the light [1/m]
 uniform int pieces;
+uniform int looks;  // at the shafts, of a piece
 uniform int views;  // of a pixel along a side, which look at different places of a piece
 const float PI = 3.141592653589793;
 const float SPREAD = 0.06;  // angle by which light spreads on its way to the eye, whose picture of the floor it blurs [rad]
@@ -125,7 +126,7 @@ vec3 haze(vec3 from, vec3 along, float gone, float way) {
     float turned = phase_of(along, -beam), slant = -1.0 / beam.z;
     vec3 sunny = b * sunlight * slant * turned;
     float fresh = exp(-(1.0 + dot(along, beam)) / turn);  // share of this turn's light that was not scattered before
-    // A piece that crosses shafts sees their mean: sinc to its second order, of light whose waves are four half-widths.
+    // A look that crosses shafts sees their mean: sinc to its second order, of light whose waves are four half-widths.
     float crossed = length(along - beam * along.z / beam.z) / shaft;
     float k = rate, whole = 1.0 - exp(-k * way), t = 0.0;
     ivec2 view = ivec2(gl_FragCoord.xy) % views;
@@ -140,10 +141,11 @@ vec3 haze(vec3 from, vec3 along, float gone, float way) {
         vec3 narrow_end = fading(1, gone + next) + fading(1, depth * slant);
         vec3 wide_end = back + fading(2, depth * slant), glow_end = back + glowing(along.z, depth);
         vec3 sharp_end = back + fading(0, depth * slant);
-        float light = shaft_at(from + mix(t, next, place) * along) - 1.0;
-        float share = exp(-0.1028 * step * step * each * each * crossed * crossed);
+        float light = 0.0, look = step * each / float(looks);
+        for (int j = 0; j < looks; ++j) light += shaft_at(from + mix(t, next, (place + float(j)) / float(looks)) * along) - 1.0;
+        light *= exp(-0.1028 * look * look * crossed * crossed) / float(looks);
         vec3 mean = mix(between(wide, wide_end, step), between(sharp, sharp_end, step), fresh);
-        sum += sunny * (share * light * between(narrow, narrow_end, step) + mean);
+        sum += sunny * (light * between(narrow, narrow_end, step) + mean);
         sum += b * between(glow, glow_end, step);
         narrow = narrow_end;
         wide = wide_end;

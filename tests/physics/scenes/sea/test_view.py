@@ -296,7 +296,10 @@ def test_the_phase_function_behind_waves():
 
 
 def test_views_of_a_pixel_share_its_pieces(context, few_directions):
-    """Four views that look at different places of a piece see the shafts as four times as many pieces do."""
+    """Four views that look at different places of a piece see the shafts as four times as many pieces do.
+
+    So do four looks of one view.
+    """
     world = World((0.1,) * 3, (0.2,) * 3, PETZOLD, N, random_sea(0.17, TILE, 7), LEVEL, NONE, 0.6, (3.0,) * 3, NONE)
     camera = toward((1.0, 2.0, -3.0), (-1.0, 0.1, 0.3), 1.2)
     with Renderer(context, (1, 1)) as renderer:
@@ -304,13 +307,14 @@ def test_views_of_a_pixel_share_its_pieces(context, few_directions):
         for own in passes.light.values():
             renderer.run(*own)
 
-        def picture(pieces, number):
-            seen = renderer.image(passes.view(camera, (64, 48), BROADENED, pieces, 16, number))[..., 0].astype(float)
-            return seen.reshape(24, 2, 32, 2).mean(axis=(1, 3))
+        def picture(pieces, number, looks=1):
+            view = passes.view(camera, (64, 48), BROADENED, pieces, 16, number, looks)
+            return renderer.image(view)[..., 0].astype(float).reshape(24, 2, 32, 2).mean(axis=(1, 3))
 
-        true, plain, shared = picture(512, 1), picture(8, 1), picture(8, 2)
-    plain, shared = (np.sqrt(np.mean((one - true) ** 2)) / true.mean() for one in (plain, shared))
+        true, *pictures = picture(512, 1), picture(8, 1), picture(8, 2), picture(8, 1, 4)
+    plain, shared, looked = (np.sqrt(np.mean((one - true) ** 2)) / true.mean() for one in pictures)
     assert shared < 0.75 * plain
+    assert looked < 0.5 * plain
 
 
 def test_errors_leave_the_truths_own_noise_out():
