@@ -301,6 +301,22 @@ def test_it_is_drawn_by_the_command(done, opengl, toy):
     assert np.all(np.diff(truth[0, :, 0]) < 0)
 
 
+def test_a_picture_is_larger_than_its_reference(done, opengl, toy):
+    """A size of which `reference_pixel` is no factor is rounded and said; an error that nobody estimated is no NaN."""
+    Path(toy).write_text(FILE.replace("reference_pixel = 1", "reference_pixel = 2"), encoding="utf-8")
+    out = done("scene", toy, "--out", "drawn", "--quiet").splitlines()
+    assert "error of the reference: not known" in out
+    assert "errors, at 12 x 4 pixels, are root mean squares of toy light, over its mean" in out
+    picture, truth = (image.imread(f"drawn/toy{end}.png")[..., :3] for end in ("", "-truth"))
+    assert (picture.shape, truth.shape) == ((8, 24, 3), (4, 12, 3))
+    means = picture.reshape(4, 2, 12, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(means, truth, atol=3 / 255)
+    Path(toy).write_text(FILE.replace("reference_pixel = 1", "reference_pixel = 5"), encoding="utf-8")
+    out = done("scene", toy, "--out", "drawn", "--quiet")
+    assert "errors, at 5 x 2 pixels (24 x 8 over reference_pixel, rounded), are root mean squares of toy light" in out
+    assert image.imread("drawn/toy-truth.png").shape[:2] == (2, 5)
+
+
 def test_its_mistakes_are_one_line(command, toy):
     Path(toy).write_text(FILE.replace("[technique]", "k = -1\n[technique]"), encoding="utf-8")
     assert command("scene", toy, "--out", "drawn") == (2, "", f"profilefit: {toy}: k must be a number > 0, got -1\n")
