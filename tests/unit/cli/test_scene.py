@@ -136,6 +136,30 @@ def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_pa
     assert not Path("other").exists()
 
 
+def test_older_files_are_named_and_no_older_frame_follows_new_ones(command, done, toy, monkeypatch, opengl):
+    """Nothing is deleted: the JSON lists the files of its run, a note lists the others, and more frames are refused."""
+    folder, ends = Path("drawn"), ("", "-truth", "-error", "-comparison", "-chart")
+    told = json.loads(done("scene", toy, "--out", folder, "--json", "--quiet"))
+    assert told["files"] == [*(f"toy{end}.png" for end in ends), "toy.json"]
+    before = (folder / "toy-truth.png").read_bytes()
+    code, out, said = command("scene", toy, "--no-reference", "--out", folder, "--json")
+    assert (code, json.loads(out)["files"]) == (0, ["toy.png", "toy.json"])
+    assert said.splitlines() == [
+        "not of this run, and still in drawn: toy-truth.png, toy-error.png, toy-comparison.png, toy-chart.png",
+        "wrote drawn/toy.json, drawn/toy.png",
+    ]
+    assert (folder / "toy-truth.png").read_bytes() == before
+    monkeypatch.setattr("tests.unit.scenes.toy.scene.ToyRequest.after", lambda self, _: self)
+    words = "scene", toy, "--no-reference", "--out", folder, "--json", "--quiet", "--frames"
+    assert json.loads(done(*words, 3))["files"] == [*(f"toy-000{number}.png" for number in (1, 2, 3)), "toy.json"]
+    said = "profilefit: drawn/toy-0003.png would follow the 2 frames, but is of a longer run: "
+    said += "use --out with another folder, or delete the older pictures\n"
+    assert command(*words, 2) == (2, "", said)
+    assert len(json.loads((folder / "toy.json").read_text(encoding="utf-8"))["frames"]) == 3
+    (folder / "toy-0003.png").unlink()
+    assert len(json.loads(done(*words, 2))["files"]) == 3
+
+
 def test_a_reference_has_a_largest_size(command, small):
     small.write_text(SMALL.replace("[64, 48]", "[4096, 4096]\nreference_pixel = 2"), encoding="utf-8")
     said = (
