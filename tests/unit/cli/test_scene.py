@@ -160,6 +160,13 @@ def test_older_files_are_named_and_no_older_frame_follows_new_ones(command, done
     assert len(json.loads(done(*words, 2))["files"]) == 3
 
 
+@pytest.mark.parametrize("name", ["skin", "layers", "heart"])
+def test_frames_of_what_stays_still_are_refused(refused, name):
+    said = "--frames must be left out where nothing moves; sea and fur move"
+    refused(f"scene {SCENES[name][1]} --frames 2 --out drawn", said)
+    assert not Path("drawn").exists()
+
+
 def test_a_reference_has_a_largest_size(command, small):
     small.write_text(SMALL.replace("[64, 48]", "[4096, 4096]\nreference_pixel = 2"), encoding="utf-8")
     said = (
