@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,12 +10,13 @@ from typing import Annotated, Any
 import typer
 
 from profilefit.cli.options import AsJson, Quiet, refused
-from profilefit.errors import InputError
+from profilefit.errors import InputError, OutputError
 from profilefit.recipes.folder import shipped
 from profilefit.scenes import SCENES
 
 OUT = Path("scene")
 MOST_FRAMES, FPS = 9999, 24.0
+MOST_NAMES = 4  # of older files in a note
 
 
 def scene(
@@ -76,10 +78,14 @@ def scene(
     stem = out / Path(file).stem
     stems = [f"{stem}"] if frames is None else [f"{stem}-{number:04d}" for number in range(1, frames + 1)]
     numbers = Path(f"{stem}.json")
-    for path in (numbers, *(Path(f"{one}{end}.png") for one in stems for end in report.ENDS)):
+    pictures = [Path(f"{one}{end}.png") for one in stems for end in report.ENDS]
+    for path in (numbers, *pictures):
         require_writable(path)
+    if frames is not None:
+        _require_no_more(stem, frames)
     body: dict[str, Any] = {"made": {"by": typed(), "version": __version__}, "of": content}
     bodies: list[dict[str, Any]] = []
+    written: list[Path] = []
     exposure: float | None = None
     sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
@@ -90,11 +96,12 @@ def scene(
             bodies.append(report.content(drawn, device))
             figures = report.scene_figures(drawn, device.partition(",")[0])
             files: dict[Path, bytes | str] = {Path(f"{name}{end}.png"): png for end, png in figures.items()}
-            if moment is moments[-1]:
-                body |= bodies[0] if frames is None else {"frames": bodies}
-                body |= {} if sky is None else {"environment": {"harmonics_error": sky.error._asdict()}}
-                files[numbers] = json_text(body)
-            write_together(files)
+            written += files
+            body |= bodies[0] if frames is None else {"frames": bodies}
+            body |= {} if sky is None else {"environment": {"harmonics_error": sky.error._asdict()}}
+            body["files"] = [path.name for path in (*written, numbers)]
+            # With each frame, or a run that is stopped would leave an older run's numbers beside its pictures.
+            write_together({**files, numbers: json_text(body)})
             if frames is not None and not as_json:
                 screen().print(f"{name}.png:", markup=False, soft_wrap=True)
             for line in () if as_json else report.scene_lines(drawn, device):
@@ -103,6 +110,20 @@ def scene(
         screen().print(report.sky_line(sky), markup=False, soft_wrap=True)
     if as_json:
         print_json(body)
+    if older := [path.name for path in pictures if path not in written and path.exists()]:
+        names = ", ".join(older[:MOST_NAMES]) + (f" and {more} more" if (more := len(older) - MOST_NAMES) > 0 else "")
+        notes(quiet).print(f"not of this run, and still in {out}: {names}", markup=False)
     last = "" if frames is None else f" to {stems[-1]}.png"
-    more = ", ".join(f"{end}.png" for end in figures if end)
-    notes(quiet).print(f"wrote {numbers}, {stems[0]}.png{last}{more and f', with {more}'}", markup=False)
+    ends = ", ".join(f"{end}.png" for end in figures if end)
+    notes(quiet).print(f"wrote {numbers}, {stems[0]}.png{last}{ends and f', with {ends}'}", markup=False)
+
+
+def _require_no_more(stem: Path, frames: int) -> None:
+    """Raise OutputError where frames of a longer run would follow those of this one in the folder."""
+    name = re.compile(rf"{re.escape(stem.name)}-(\d{{4}})\.png")
+    numbers = (int(match[1]) for path in stem.parent.iterdir() if (match := name.fullmatch(path.name)))
+    if (last := max(numbers, default=0)) > frames:
+        raise OutputError(
+            f"{stem}-{last:04d}.png would follow the {frames} frames, but is of a longer run: "
+            "use --out with another folder, or delete the older pictures"
+        )

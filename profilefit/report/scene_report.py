@@ -145,10 +145,12 @@ def scene_lines(drawn: SceneImage, device: str) -> Iterator[str]:
         yield f"times are of {device}"
         return
     half, most, rms = judged.truth_error
-    spread = f"{half:.1e} at half of the pixels, {most:.1e} at nine in ten, rms {rms:.1e}"
-    yield f"error of the reference: {'not known' if np.isnan(rms) else spread}"
-    rows, columns = judged.truth.shape[:2]
-    yield f"errors, at {columns} x {rows} pixels, are root mean squares of {judged.of}, over its mean"
+    values = f"{half:.1e} at half of the pixels, {most:.1e} at nine in ten, rms {rms:.1e}"
+    yield f"error of the reference: {values if np.isfinite(rms) else 'not known'}"
+    (rows, columns), (tall, wide) = judged.truth.shape[:2], judged.picture.shape[:2]
+    is_even = tall % rows == wide % columns == 0 and tall // rows == wide // columns
+    size = f"{columns} x {rows} pixels{'' if is_even else f' ({wide} x {tall} over reference_pixel, rounded)'}"
+    yield f"errors, at {size}, are root mean squares of {judged.of}, over its mean"
     yield f"times are of {device}"
 
 

@@ -229,10 +229,10 @@ class ViewRequest(Declared):
 
     @property
     def of_reference(self) -> Self:
-        """Request at the size of the reference."""
+        """Request at the size of the reference, whose sides are rounded to whole pixels."""
         if self.camera_table.reference_pixel == 1:
             return self
-        columns, rows = (max(side // self.camera_table.reference_pixel, 1) for side in self.size)
+        columns, rows = (max(round(side / self.camera_table.reference_pixel), 1) for side in self.size)
         return self.changed(camera_table={"resolution": (columns, rows), "reference_pixel": 1})
 
     def after(self, seconds: float) -> Self:

@@ -137,6 +137,37 @@ def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_pa
     assert not Path("other").exists()
 
 
+def test_older_files_are_named_and_no_older_frame_follows_new_ones(command, done, toy, monkeypatch, opengl):
+    """Nothing is deleted: the JSON lists the files of its run, a note lists the others, and more frames are refused."""
+    folder, ends = Path("drawn"), ("", "-truth", "-error", "-comparison", "-chart")
+    told = json.loads(done("scene", toy, "--out", folder, "--json", "--quiet"))
+    assert told["files"] == [*(f"toy{end}.png" for end in ends), "toy.json"]
+    before = (folder / "toy-truth.png").read_bytes()
+    code, out, said = command("scene", toy, "--no-reference", "--out", folder, "--json")
+    assert (code, json.loads(out)["files"]) == (0, ["toy.png", "toy.json"])
+    assert said.splitlines() == [
+        "not of this run, and still in drawn: toy-truth.png, toy-error.png, toy-comparison.png, toy-chart.png",
+        "wrote drawn/toy.json, drawn/toy.png",
+    ]
+    assert (folder / "toy-truth.png").read_bytes() == before
+    monkeypatch.setattr("tests.unit.scenes.toy.scene.ToyRequest.after", lambda self, _: self)
+    words = "scene", toy, "--no-reference", "--out", folder, "--json", "--quiet", "--frames"
+    assert json.loads(done(*words, 3))["files"] == [*(f"toy-000{number}.png" for number in (1, 2, 3)), "toy.json"]
+    said = "profilefit: drawn/toy-0003.png would follow the 2 frames, but is of a longer run: "
+    said += "use --out with another folder, or delete the older pictures\n"
+    assert command(*words, 2) == (2, "", said)
+    assert len(json.loads((folder / "toy.json").read_text(encoding="utf-8"))["frames"]) == 3
+    (folder / "toy-0003.png").unlink()
+    assert len(json.loads(done(*words, 2))["files"]) == 3
+
+
+@pytest.mark.parametrize("name", ["skin", "layers", "heart"])
+def test_frames_of_what_stays_still_are_refused(refused, name):
+    said = "--frames must be left out where nothing moves; sea and fur move"
+    refused(f"scene {SCENES[name][1]} --frames 2 --out drawn", said)
+    assert not Path("drawn").exists()
+
+
 def test_a_reference_has_a_largest_size(command, small):
     small.write_text(SMALL.replace("[64, 48]", "[4096, 4096]\nreference_pixel = 2"), encoding="utf-8")
     said = (
@@ -300,6 +331,22 @@ def test_it_is_drawn_by_the_command(done, opengl, toy):
     assert picture.shape == truth.shape == (8, 24, 3)
     np.testing.assert_allclose(picture, truth, atol=2 / 255)
     assert np.all(np.diff(truth[0, :, 0]) < 0)
+
+
+def test_a_picture_is_larger_than_its_reference(done, opengl, toy):
+    """A size of which `reference_pixel` is no factor is rounded and said; an error that nobody estimated is no NaN."""
+    Path(toy).write_text(FILE.replace("reference_pixel = 1", "reference_pixel = 2"), encoding="utf-8")
+    out = done("scene", toy, "--out", "drawn", "--quiet").splitlines()
+    assert "error of the reference: not known" in out
+    assert "errors, at 12 x 4 pixels, are root mean squares of toy light, over its mean" in out
+    picture, truth = (image.imread(f"drawn/toy{end}.png")[..., :3] for end in ("", "-truth"))
+    assert (picture.shape, truth.shape) == ((8, 24, 3), (4, 12, 3))
+    means = picture.reshape(4, 2, 12, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(means, truth, atol=3 / 255)
+    Path(toy).write_text(FILE.replace("reference_pixel = 1", "reference_pixel = 5"), encoding="utf-8")
+    out = done("scene", toy, "--out", "drawn", "--quiet")
+    assert "errors, at 5 x 2 pixels (24 x 8 over reference_pixel, rounded), are root mean squares of toy light" in out
+    assert image.imread("drawn/toy-truth.png").shape[:2] == (2, 5)
 
 
 def test_its_mistakes_are_one_line(command, toy):
