@@ -56,7 +56,7 @@ from profilefit.materials import BY_NAME, SOURCE, Material
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Range, Refused, Table, Text, words
 
 Floats = NDArray[np.float32]
-Colour = tuple[Medium, Medium, Medium]  # of red, green and blue
+Media = tuple[Medium, Medium, Medium]  # of red, green and blue
 Refusal = Callable[..., InputError]
 BY_MATERIAL = ("mu_a", "mu_s", "g")  # what a material says
 MAPPED = ("thickness", "mu_a")  # what may be an image
@@ -98,7 +98,7 @@ class ThicknessMap:
         """The mean thickness of all pixels [unit of the stack]."""
         return self.least + (self.most - self.least) * float(self.values.mean(dtype=np.float64))
 
-    def media(self, media: Colour, value: float) -> Colour:
+    def media(self, media: Media, value: float) -> Media:
         """Return the media of red, green and blue where the map has a value."""
         thickness = self.least + (self.most - self.least) * value
         return _changed(media, self.layer, [{"thickness": thickness}] * 3)
@@ -123,7 +123,7 @@ class AbsorptionMap:
         """The mean mu_a of all pixels [1/unit of the stack]."""
         return self._at(float(self.values.mean(dtype=np.float64)))
 
-    def media(self, media: Colour, value: float) -> Colour:
+    def media(self, media: Media, value: float) -> Media:
         """Return the media of red, green and blue where the map has a value."""
         return _changed(media, self.layer, [{"mu_a": mu_a} for mu_a in self._at(value)])
 
@@ -135,7 +135,7 @@ class AbsorptionMap:
 LayerMap = ThicknessMap | AbsorptionMap
 
 
-def _changed(media: Colour, number: int, changes: list[dict[str, Any]]) -> Colour:
+def _changed(media: Media, number: int, changes: list[dict[str, Any]]) -> Media:
     def changed(medium: Medium, change: dict[str, Any]) -> Medium:
         layers = list(medium.layers)
         layers[number] = replace(layers[number], **change)
@@ -157,7 +157,7 @@ class LayerStack:
     """
 
     unit: str
-    media: Colour
+    media: Media
     names: tuple[str, ...]
     sources: tuple[str, ...]
     map: LayerMap | None = None

@@ -17,7 +17,7 @@ from mcml_sim import Medium, exact
 from mcml_sim.media.arrays import Floats
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
-from profilefit.recipes.stack.file import Colour, LayerMap, ThicknessMap
+from profilefit.recipes.stack.file import LayerMap, Media, ThicknessMap
 from profilefit.recipes.stack.fit import NODES
 from profilefit.scenes.stage.exact_law import Curves, held, hermite, knots
 
@@ -63,7 +63,7 @@ class StackTable:
         return Curves(np.zeros(given.size), reflectance, kappa, profile, cdf)
 
 
-def table_of(media: Colour, of: LayerMap, illumination: str = "diffuse") -> StackTable:
+def table_of(media: Media, of: LayerMap, illumination: str = "diffuse") -> StackTable:
     """Return the table of a stack with a map; x = r / l, l the mean free path of the first layer in `media`.
 
     media  of red, green, blue, of one index and g = 0, with the map's mean
@@ -84,7 +84,7 @@ def _not_empty(medium: Medium, number: int, least: float) -> Medium:
     return replace(medium, layers=tuple(layers))
 
 
-def stack_table(media: Colour, least: float, most: float, illumination: str = "diffuse") -> StackTable:
+def stack_table(media: Media, least: float, most: float, illumination: str = "diffuse") -> StackTable:
     """Return the table of a stack whose first layer is `least` to `most` thick; x = r / l, l its mean free path.
 
     media  of red, green, blue, of one index and g = 0;  thicknesses in their unit, 0 <= least < most
@@ -108,7 +108,7 @@ def stack_table(media: Colour, least: float, most: float, illumination: str = "d
     return _table(media, rows, u, places, illumination)
 
 
-def _table(media: Colour, rows: Sequence[Sequence[Medium]], u: Floats, places: Places, illumination: str) -> StackTable:
+def _table(media: Media, rows: Sequence[Sequence[Medium]], u: Floats, places: Places, illumination: str) -> StackTable:
     """Return a table of rows of media by channel; equal channels are solved once."""
     every = [(medium.layers[0].mfp, tuple(row)) for medium, row in zip(media, rows, strict=True)]
     solved = {one: _channel(*one, u, illumination) for one in dict.fromkeys(every)}
