@@ -17,6 +17,7 @@ from mcml_sim import Setting
 from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
+from profilefit.scenes.stage.drawing import RIVALS
 from profilefit.shader import opened
 from tests.fixtures import EXAMPLES, slow
 
@@ -165,6 +166,13 @@ def test_frames_of_what_stays_still_are_refused(refused, name):
     said = "--frames must be left out where nothing moves; sea and fur move"
     refused(f"scene {SCENES[name][1]} --frames 2 --out drawn", said)
     assert not Path("drawn").exists()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_picture_of_any_kind_has_two_rivals(name):
+    home = import_module(SCENES[name][0])
+    rivals = [one["kind"] for one in home.drawer.rivals]
+    assert {kind: len({*rivals} - {kind}) >= RIVALS for kind in home.KINDS} == dict.fromkeys(home.KINDS, True)
 
 
 def test_a_reference_has_a_largest_size(command, small):
