@@ -260,6 +260,11 @@ class ViewRequest(Declared):
             )
 
     @property
+    def wait(self) -> str:
+        """Say what takes minutes before the picture; empty where nothing does."""
+        return ""
+
+    @property
     def sampling(self) -> Sampling:
         """Samples of a pixel."""
         return Sampling(self.technique.samples)

@@ -340,6 +340,13 @@ def test_it_is_drawn_by_the_command(done, opengl, toy):
     assert np.all(np.diff(truth[0, :, 0]) < 0)
 
 
+def test_what_takes_minutes_is_said_before(done, opengl, toy, monkeypatch):
+    monkeypatch.setattr("tests.unit.scenes.toy.scene.ToyRequest.wait", "it takes [minutes]")
+    words = "scene", toy, "--no-reference", "--out", "drawn", "--json"
+    done(*words, said="it takes [minutes]\nwrote drawn/toy.json, drawn/toy.png\n")
+    done(*words, "--quiet")
+
+
 def test_a_picture_is_larger_than_its_reference(done, opengl, toy):
     """A size of which `reference_pixel` is no factor is rounded and said; an error that nobody estimated is no NaN."""
     Path(toy).write_text(FILE.replace("reference_pixel = 1", "reference_pixel = 2"), encoding="utf-8")
