@@ -4,6 +4,7 @@ tests/unit/scenes/toy, and one line: the command reads, draws and judges it.
 
 import io
 import json
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -135,6 +136,24 @@ def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_pa
     said = f"profilefit: {small}: --frames must be left out where nothing moves; sea and fur move\n"
     assert command("scene", str(small), "--frames", "2", "--out", "other") == (2, "", said)
     assert not Path("other").exists()
+
+
+def test_a_sea_moves_from_frame_to_frame(done, tmp_path, monkeypatch, opengl):
+    """The example at a tiny size: in both frames spread beams have a lower error than single scattering."""
+    monkeypatch.setattr("profilefit.scenes.sea.scene.PATHS", 40_000)
+    text = Path(EXAMPLES["sea.toml"]).read_text(encoding="utf-8")
+    tiny = {"resolution": "[12, 9]", "reference_pixel": 1, "vertices": 32, "texels": 64, "slices": 4}
+    for key, number in tiny.items():
+        text = re.sub(rf"^{key} = (\[.*?\]|\d+)", f"{key} = {number}", text, flags=re.MULTILINE)
+    path = tmp_path / "sea.toml"
+    path.write_text(text, encoding="utf-8")
+    told = json.loads(done("scene", path, "--frames", "2", "--fps", "2", "--out", "drawn", "--json", "--quiet"))
+    first, second = (image.imread(f"drawn/sea-000{number}.png")[..., :3] for number in (1, 2))
+    assert first.shape == second.shape == (9, 12, 3)
+    assert np.abs(first - second).max() > 0.02
+    for one in told["frames"]:
+        single = next(rival["rmse"] for rival in one["rivals"] if rival["technique"] == "single")
+        assert one["rmse"] < 0.5 * single  # 0 where the noise of so few paths is larger than the error
 
 
 def test_older_files_are_named_and_no_older_frame_follows_new_ones(command, done, toy, monkeypatch, opengl):
