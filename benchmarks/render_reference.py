@@ -1,4 +1,4 @@
-"""Reference of a render: seconds, memory, what half a pixel changes, and its difference from a double sum over pixels."""
+"""Reference of a render: seconds, memory, what half a pixel changes, and its difference from a double sum."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from mcml_sim import Setting
 from profilefit.scenes.skin.scene import head_scene, read
 from profilefit.scenes.stage.exact_law import exact_table
+from profilefit.scenes.stage.reference.surface import Surface, View, exitance_of, own_error, seen
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import Surface, View, exitance_of, own_error, seen
 from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]

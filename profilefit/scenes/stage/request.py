@@ -11,10 +11,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Refused, Text, words
-from profilefit.scenes.stage.environment import Environment, read_map
-from profilefit.scenes.stage.mesh_file import MeshTable
+from profilefit.scenes.stage.light.environment import Environment, read_map
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject.mesh_file import MeshTable
 from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
