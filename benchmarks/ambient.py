@@ -3,7 +3,7 @@
     python -m benchmarks.ambient              # a minute on two cores; --size 480 540 for another picture
 
 Errors are root mean squares over pixels that scatter and that the lamp does not reach, over the mean of the reference,
-whose sky is seen through a shadow map a patch (`profilefit/scenes/stage/occlusion.py`).
+whose sky is seen through a shadow map a patch (`profilefit/scenes/stage/light/occlusion.py`).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import profilefit
 from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage.lighting import IRRADIANCE
-from profilefit.scenes.stage.occlusion import PATCHES
+from profilefit.scenes.stage.light.lighting import IRRADIANCE
+from profilefit.scenes.stage.light.occlusion import PATCHES
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import exitance_of
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import exitance_of
 from profilefit.scenes.stage.world import INSIDE, Light
 from profilefit.shader.context import opened, renderer
 

@@ -44,7 +44,7 @@ from mcml_sim.files.whole_file import as_json, write_whole
 from profilefit import convert
 from profilefit.convert.colour import wrenninge_alpha
 from profilefit.convert.engine import skin_alpha
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.reference.step_edge import step_response
 
 Floats = NDArray[np.float64]
 Edge = Callable[[Floats], Floats]  # share of its light that a point gathers from beyond the edge, by its distance

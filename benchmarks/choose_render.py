@@ -19,8 +19,8 @@ from mcml_sim import Setting
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.truth import albedo_of
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import gathered, seen
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import gathered, seen
 from profilefit.scenes.stage.world import Buffers
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
 from profilefit.studies.choose.error import ReferenceLight, passes

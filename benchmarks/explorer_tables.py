@@ -25,7 +25,7 @@ from profilefit.report.explorer.fragment import __file__ as beside
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
 from profilefit.scenes.stage.exact_law import LEAST_ALPHA, log_profile
 from profilefit.scenes.stage.judge import srgb_codes
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.reference.step_edge import step_response
 
 FAINT = 1e-9  # x^2 R_d l^2 / A below which the quadrature of a refracting surface leaves no digits
 LOWEST, STEP = -32.0, 4e-6  # of the numbers in three bytes; the same in exact.js

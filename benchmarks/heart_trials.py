@@ -19,8 +19,8 @@ from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import evenly, sees, world
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import evenly, sees, world
 from profilefit.scenes.stage.technique import EXITANCE
 from profilefit.scenes.stage.world import INSIDE, Camera, Light, Mesh, Part, Scene, unit
 

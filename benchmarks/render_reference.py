@@ -1,7 +1,8 @@
-"""Reference of a render: seconds, what half a pixel changes, and its difference from a double sum over pixels."""
+"""Reference of a render: seconds, memory, what half a pixel changes, and its difference from a double sum."""
 
 from __future__ import annotations
 
+import resource
 import time
 
 import moderngl
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from mcml_sim import Setting
 from profilefit.scenes.skin.scene import head_scene, read
 from profilefit.scenes.stage.exact_law import exact_table
+from profilefit.scenes.stage.reference.surface import Surface, View, exitance_of, own_error, seen
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import Surface, View, exitance_of, own_error, seen
 from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]
@@ -29,22 +30,24 @@ def measured(context: moderngl.Context, size: tuple[int, int]) -> dict:
     with Stage(context, size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()
-    start = time.perf_counter()
+    before, start = peak(), time.perf_counter()
     light = exitance_of(buffers, scene.material.mfp, SETTING)
-    seconds = time.perf_counter() - start
+    seconds, own = time.perf_counter() - start, peak()
     surface, view = seen(buffers)
     pixels = np.random.default_rng(1).permutation(np.argwhere(surface.mask))[:CHECKED]
     summed = double_sum(surface, view, scene.material.mfp, SETTING, pixels)
     with Stage(context, (2 * size[0], 2 * size[1])) as stage:
         stage.draw(scene)
         fine = stage.buffers()
+    error = own_error(fine, scene.material.mfp, SETTING)
     change = np.abs(light[tuple(pixels.T)] - summed) / light[surface.mask].mean()
     return {
         "size": size,
         "pixels": len(np.argwhere(surface.mask)),
         "seconds": seconds,
         "double_sum": {"rms": float(np.sqrt(np.mean(change**2))), "largest": float(change.max())},
-        "own_error": own_error(fine, scene.material.mfp, SETTING),
+        "own_error": error,
+        "peak_bytes": {"before": before, "reference": own, "with_error": peak()},
     }
 
 
@@ -55,6 +58,13 @@ def report(found: dict) -> None:
     differences = ", ".join(f"{name} {value:.1e}" for name, value in found["double_sum"].items())
     print(f"difference from a double sum at {CHECKED} pixels: {differences}")
     print("what half a pixel changes, median, 90 %, RMS:", *(f"{value:.1e}" for value in found["own_error"]))
+    before, own, with_error = (size / 1e9 for size in found["peak_bytes"].values())
+    print(f"peak memory: {own:.2f} GB, with its error {with_error:.2f} GB, of which {before:.2f} GB before it")
+
+
+def peak() -> int:
+    """Return the largest resident memory of this process so far [bytes]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # Linux counts KiB
 
 
 def double_sum(surface: Surface, view: View, mfp: Rgb, setting: Setting, pixels: NDArray[np.intp]) -> Floats:

@@ -23,8 +23,8 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.step_edge import LAST_XI, shifted_points, step_response
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_response
 
 Floats = NDArray[np.float64]
 SIZE = (256, 128)  # [pixels]: 19 mfp of red beside the places, 8 above and below the rows

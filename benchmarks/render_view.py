@@ -15,8 +15,8 @@ from mcml_sim import Setting
 from profilefit.scenes.skin.scene import FACE, Head, head_scene
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import EXPOSURE, Judge, surface_judge
+from profilefit.scenes.stage.reference.surface import UNKNOWN, TruthError
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError
 from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]

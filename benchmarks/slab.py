@@ -27,7 +27,7 @@ from scipy.stats import chi2
 
 from benchmarks.table import show
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.reference.step_edge import step_response
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.fitting.sampling import ExactTarget
 from profilefit.laws.base import ProfileLaw
-from profilefit.scenes.stage.step_edge import (
+from profilefit.scenes.stage.reference.step_edge import (
     UNIFORM_SHARE,
     EdgeGather,
     by_law,

@@ -87,6 +87,8 @@ def scene(
     bodies: list[dict[str, Any]] = []
     written: list[Path] = []
     exposure: float | None = None
+    if request.wait:
+        notes(quiet).print(request.wait, markup=False)
     sky = request.light_table.sky
     with working(f"drawing the scene{'' if no_reference else ' and its reference'}", quiet), opened() as context:
         device = renderer(context)

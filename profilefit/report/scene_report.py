@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
 from profilefit.report.tables.cells import significant
-from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.judge import ChartPoint, RenderResult, SceneImage
+from profilefit.scenes.stage.light.environment import Environment
 
 LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from profilefit.scenes.stage.exact_law import ExactLaw
     from profilefit.scenes.stage.judge import srgb_codes, to_srgb
     from profilefit.scenes.stage.pattern import Sampling
+    from profilefit.scenes.stage.reference.step_edge import step_response
+    from profilefit.scenes.stage.reference.surface import gathered, seen
     from profilefit.scenes.stage.stage import Stage
-    from profilefit.scenes.stage.step_edge import step_response
-    from profilefit.scenes.stage.surface import gathered, seen
     from profilefit.scenes.stage.technique import Lambert
     from profilefit.scenes.stage.world import Camera
 else:
@@ -36,9 +36,9 @@ else:
             **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.judge"),
             "Stage": "stage.stage",
             "covering": "skin.chart",
-            "step_response": "stage.step_edge",
-            "seen": "stage.surface",
-            "gathered": "stage.surface",
+            "step_response": "stage.reference.step_edge",
+            "seen": "stage.reference.surface",
+            "gathered": "stage.reference.surface",
             "Lambert": "stage.technique",
             "Camera": "stage.world",
         },

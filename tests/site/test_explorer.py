@@ -18,7 +18,7 @@ from profilefit.recipes.catalogue import profile_laws
 from profilefit.report.explorer import explorer_section
 from profilefit.report.explorer.fragment import address, first, offered
 from profilefit.scenes.stage.judge import srgb_codes
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.reference.step_edge import step_response
 from profilefit.shader.law_file import export
 
 pytestmark = pytest.mark.slow

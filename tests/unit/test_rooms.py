@@ -340,6 +340,21 @@ def test_a_scene_has_its_five_names_and_no_renderer(name):
     assert {path.name: own for path in folder.rglob("*.py") if (own := renders(path))} == {}
 
 
+def nouns(folder: Path) -> list[str]:
+    """Files and sub-rooms of a room."""
+    files = [path.stem for path in folder.glob("*.py") if path.stem != "__init__"]
+    return sorted([*files, *(path.parent.name for path in folder.glob("*/__init__.py"))])
+
+
+def test_a_room_of_scenes_has_3_to_12_nouns(tmp_path):
+    rooms = [path.parent for path in (ROOT / "profilefit" / "scenes").rglob("__init__.py")]
+    assert len(rooms) > 8
+    assert {room: len(nouns(room)) for room in rooms if not 3 <= len(nouns(room)) <= 12} == {}
+    written(tmp_path / "bad", dict.fromkeys(["__init__", "first"], ""))  # negative control
+    written(tmp_path / "bad" / "inner", dict.fromkeys(["__init__", "second"], ""))
+    assert nouns(tmp_path / "bad") == ["first", "inner"]
+
+
 def test_every_scene_is_one_of_the_shelf():
     rooms = {path.parent.name for path in (ROOT / "profilefit" / "scenes").glob("*/__init__.py")}
     assert rooms == {"stage", *SCENES}

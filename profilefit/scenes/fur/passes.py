@@ -15,9 +15,9 @@ from profilefit.scenes.fur.ball import Ball, FurView, nearest_feet
 from profilefit.scenes.fur.law import lobe_mean, occlusion
 from profilefit.scenes.fur.truth import Patch
 from profilefit.scenes.fur.ways import LayerTechnique
-from profilefit.scenes.stage.environment import Environment
-from profilefit.scenes.stage.lighting import harmonics_of, text
-from profilefit.scenes.stage.renderer import SUM, Pass
+from profilefit.scenes.stage.light.environment import Environment
+from profilefit.scenes.stage.light.lighting import harmonics_of
+from profilefit.scenes.stage.renderer import SUM, Pass, text
 from profilefit.scenes.stage.request import MOST_LIGHT, Irradiance
 from profilefit.scenes.stage.technique import RADIANCE
 from profilefit.scenes.stage.world import Light, Rgb, Singles, unit

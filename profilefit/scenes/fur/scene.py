@@ -19,6 +19,7 @@ from profilefit.scenes.fur.passes import HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.ways import FITTED, SWEPT, SWEPT_TWO, WALKED, LayerTechnique
 from profilefit.scenes.stage.drawing import Drawer, RayDrawing
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, exposure_of
+from profilefit.scenes.stage.reference.surface import UNKNOWN, TruthError, averaged
 from profilefit.scenes.stage.renderer import Pass, Renderer
 from profilefit.scenes.stage.request import (
     Direction,
@@ -30,7 +31,6 @@ from profilefit.scenes.stage.request import (
     Viewpoint,
     ViewRequest,
 )
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, averaged
 from profilefit.scenes.stage.world import Rgb, rgb
 
 KINDS = ("walked", "swept", "shells")

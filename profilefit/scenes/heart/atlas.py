@@ -26,8 +26,8 @@ from scipy.spatial import cKDTree
 from mcml_sim.media.arrays import Floats, require, require_all
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.stage.reference.surface_sum import Elements
 from profilefit.scenes.stage.renderer import GpuOwner, Pass, Read, Renderer
-from profilefit.scenes.stage.surface_sum import Elements
 from profilefit.scenes.stage.technique import Unwraps, maps
 from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Singles
 from profilefit.shader.emit import text_beside

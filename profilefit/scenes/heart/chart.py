@@ -13,7 +13,7 @@ from profilefit.scenes.heart.scene import HeartRender, HeartRequest
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, points
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.surface_sum import Elements
+from profilefit.scenes.stage.reference.surface_sum import Elements
 
 SURE = Sampling(64)  # where the error of a technique is asked for, not its noise
 

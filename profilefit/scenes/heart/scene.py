@@ -32,7 +32,8 @@ from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.drawing import Drawer, StageDrawing
 from profilefit.scenes.stage.judge import Judge
-from profilefit.scenes.stage.mesh_file import MeshTable
+from profilefit.scenes.stage.reference.surface import UNKNOWN, TruthError, evenly, world
+from profilefit.scenes.stage.reference.whole import whole_elements
 from profilefit.scenes.stage.request import (
     MOST_PIXELS,
     Irradiances,
@@ -46,9 +47,8 @@ from profilefit.scenes.stage.request import (
     seen_whole,
 )
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, evenly, world
+from profilefit.scenes.stage.subject.mesh_file import MeshTable
 from profilefit.scenes.stage.technique import Lambert, NamedTechnique, Technique
-from profilefit.scenes.stage.whole import whole_elements
 from profilefit.scenes.stage.world import INSIDE, Mesh, Part, Rgb, Scene, rgb
 
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats, checked_finite, checked_numbers, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.surface_sum import Elements, gaussian_sums
+from profilefit.scenes.stage.reference.surface_sum import Elements, gaussian_sums
 
 NEIGHBOURS = 24  # points that gather together
 MERGED = 1.0 / 6.0  # side of the cubes in which elements are merged [sigma]

@@ -20,8 +20,7 @@ from profilefit.materials import CHANNELS
 from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.layers.truth import LEFT, StackTable
 from profilefit.scenes.stage.exact_law import columns, row, table_text
-from profilefit.scenes.stage.lighting import text
-from profilefit.scenes.stage.renderer import SUM, Pass, Read
+from profilefit.scenes.stage.renderer import SUM, Pass, Read, text
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, Gather, LawText, Technique, maps
 from profilefit.scenes.stage.world import Singles
 from profilefit.shader.emit import law_text, literal, prefix, text_beside

@@ -21,7 +21,7 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.recipes.declared import OneOf, Refused, Tolerance, words
 from profilefit.recipes.folder import LOCAL, fits_folder
-from profilefit.recipes.kinds.stack import StackRequest, matching
+from profilefit.recipes.kinds.stack import StackRecord, StackRequest, matching
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.file import LayerMap, ThicknessMap
 from profilefit.scenes.layers import passes
@@ -86,6 +86,13 @@ class LayersRequest(request.MeshRequest, StackRequest):
         if isinstance(said, bool):
             return said
         return self.is_of_law and max(map(passes.alike_error, self.media)) > NEGLIGIBLE
+
+    @property
+    def wait(self) -> str:
+        """Say that the law of these layers has to be fitted; empty where a record or the technique needs no fit."""
+        if self.kind not in OF_LAW or recorded(self) is not None:
+            return ""
+        return f"fitting the model of these layers takes minutes; profilefit regenerate {self.file} --out fits keeps it"
 
     @cached_property
     def map(self) -> LayerMap:
@@ -181,12 +188,17 @@ def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None, table: Stack
 
 def laws_of(of: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
     """Return the laws of a record of these very layers, in ./fits or shipped; fitted now where there is none."""
-    for folder in (LOCAL, fits_folder()):
-        if (record := matching(of, folder)) is not None:
-            return record.laws
+    if (record := recorded(of)) is not None:
+        return record.laws
     found = [fit.stack_law(medium, of.illumination) for medium in of.media]
     red, green, blue = (one for one in found if isinstance(one, StackLaw))  # a file has two layers or more
     return red, green, blue
+
+
+def recorded(of: StackRequest) -> StackRecord | None:
+    """Return the record of these very layers, in ./fits or shipped; None where there is none."""
+    records = (matching(of, folder) for folder in (LOCAL, fits_folder()))
+    return next((record for record in records if record is not None), None)
 
 
 def scene_of(of: LayersRequest) -> Scene:

@@ -24,8 +24,8 @@ from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
 from profilefit.scenes.stage import request
 from profilefit.scenes.stage.drawing import Drawer, RayDrawing
 from profilefit.scenes.stage.judge import TURNS, ChartPoint, Judge, exposure_of
+from profilefit.scenes.stage.reference.surface import averaged
 from profilefit.scenes.stage.renderer import Pass, Renderer
-from profilefit.scenes.stage.surface import averaged
 from profilefit.scenes.stage.world import Camera
 
 PHASE = "petzold"

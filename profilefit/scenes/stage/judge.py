@@ -14,10 +14,10 @@ from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats, require
 from profilefit.scenes.stage.exact_law import DIFFUSE, CurveTable
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import UNKNOWN, TruthError, exitance_of, own_error, wider_error
+from profilefit.scenes.stage.reference.whole import whole_elements
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import UNKNOWN, TruthError, exitance_of, own_error, wider_error
 from profilefit.scenes.stage.technique import NamedTechnique
-from profilefit.scenes.stage.whole import whole_elements
 from profilefit.scenes.stage.world import INSIDE, Scene
 
 Bytes = NDArray[np.uint8]

@@ -14,6 +14,7 @@ import numpy as np
 from profilefit.errors import ShaderError
 from profilefit.scenes.stage.world import Mesh, Singles
 from profilefit.shader.context import check_errors, fragments, program, seconds
+from profilefit.shader.emit import text_beside
 
 VERSION = "#version 330\n"
 POINTS, LINES, TRIANGLES = moderngl.POINTS, moderngl.LINES, moderngl.TRIANGLES
@@ -306,3 +307,8 @@ def uniforms_of(source: str) -> frozenset[str]:
     """Return the names of all uniforms that a shader declares, those in parts that are switched off included."""
     found = UNIFORM.findall(COMMENT.sub(" ", source))
     return frozenset(name.partition("[")[0].strip() for names in found for name in names.split(","))
+
+
+def text(*files: str) -> str:
+    """Return the sources of GLSL files of the stage, one after the other."""
+    return "".join(text_beside(__name__, f"glsl/{file}") for file in files)

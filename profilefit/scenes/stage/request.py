@@ -11,10 +11,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Valida
 
 from profilefit.errors import InputError
 from profilefit.recipes.declared import LISTED, Declared, Line, OneOf, Refused, Text, words
-from profilefit.scenes.stage.environment import Environment, read_map
-from profilefit.scenes.stage.mesh_file import MeshTable
+from profilefit.scenes.stage.light.environment import Environment, read_map
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject.mesh_file import MeshTable
 from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb, Scene, unit
 
 MOST_CHART = 8  # numbers of samples
@@ -258,6 +258,11 @@ class ViewRequest(Declared):
                 f"{self.file}: [camera] resolution over reference_pixel must be {MOST_PIXELS} pixels of a reference at "
                 f"most, got {columns} x {rows}; a larger picture is drawn with --no-reference"
             )
+
+    @property
+    def wait(self) -> str:
+        """Say what takes minutes before the picture; empty where nothing does."""
+        return ""
 
     @property
     def sampling(self) -> Sampling:

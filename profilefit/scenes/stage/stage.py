@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from mcml_sim.media.arrays import Floats, checked_whole, require
 from profilefit.errors import InputError
-from profilefit.scenes.stage.lighting import (
+from profilefit.scenes.stage.light.lighting import (
     BACK,
     IRRADIANCE,
     MARGIN,
@@ -34,11 +34,10 @@ from profilefit.scenes.stage.lighting import (
     screen_uniforms,
     shadow_passes,
     sphere,
-    text,
 )
-from profilefit.scenes.stage.occlusion import PATCHES, sky_irradiance
+from profilefit.scenes.stage.light.occlusion import PATCHES, sky_irradiance
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import NEAREST, POINTS, GpuOwner, Pass, Read, Renderer, Smooth
+from profilefit.scenes.stage.renderer import NEAREST, POINTS, GpuOwner, Pass, Read, Renderer, Smooth, text
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, Law, Technique, combination, technique
 from profilefit.scenes.stage.world import (
     EVEN,

@@ -15,9 +15,9 @@ from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.exact_law import NAME, ExactLaw
-from profilefit.scenes.stage.lighting import OtherLamp, text
+from profilefit.scenes.stage.light.lighting import OtherLamp
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.renderer import SUM, Pass, Read
+from profilefit.scenes.stage.renderer import SUM, Pass, Read, text
 from profilefit.scenes.stage.world import Part, Rgb, Scene, Singles, unit
 from profilefit.shader.emit import law_text, prefix, text_beside
 

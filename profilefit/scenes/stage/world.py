@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.arrays import Floats, checked_finite, require, require_all
 from profilefit.errors import InputError
-from profilefit.scenes.stage.environment import Environment
+from profilefit.scenes.stage.light.environment import Environment
 
 ROUGHNESS = 0.42  # of skin, GGX [-]
 EVEN = np.array([[[0.0, 0.0, 1.0, 1.0]]], np.float32)  # relief of a part that has none

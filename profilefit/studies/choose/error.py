@@ -38,7 +38,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.laws.rational import REFRACTING
 from profilefit.scenes.skin.law import DARKEST, FOLLOW, Separable, kernel_quartile
 from profilefit.scenes.skin.truth import albedo_of
-from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_response
+from profilefit.scenes.stage.reference.step_edge import LAST_XI, shifted_points, step_response
 from profilefit.scenes.stage.world import Rgb
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
 

@@ -25,7 +25,7 @@ from profilefit.scenes.sea.passes import axes, reach_of
 from profilefit.scenes.sea.scene import SPLATS, SeaRequest
 from profilefit.scenes.sea.water import World
 from profilefit.scenes.sea.waves import FINE, refracted
-from profilefit.scenes.stage.surface import evenly, sees, world
+from profilefit.scenes.stage.reference.surface import evenly, sees, world
 from profilefit.scenes.stage.world import INSIDE
 from profilefit.studies.stability.scenes import SEARCHES
 

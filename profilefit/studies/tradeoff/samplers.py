@@ -26,8 +26,8 @@ from mcml_sim.media.arrays import Floats
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
-from profilefit.scenes.stage import step_edge
-from profilefit.scenes.stage.step_edge import EdgeGather, by_law
+from profilefit.scenes.stage.reference import step_edge
+from profilefit.scenes.stage.reference.step_edge import EdgeGather, by_law
 from profilefit.studies.tradeoff import laws, stopwatch
 from profilefit.studies.tradeoff.laws import SPECS, YARDSTICK, Contender, contenders, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread

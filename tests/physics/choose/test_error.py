@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from mcml_sim import Setting
 from profilefit.scenes.skin.law import Separable
-from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points, step_response
+from profilefit.scenes.stage.reference.step_edge import by_law, edge_estimate, shifted_points, step_response
 from profilefit.studies.choose import error as module
 from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
 from profilefit.studies.choose.choice import laws

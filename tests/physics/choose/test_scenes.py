@@ -15,8 +15,8 @@ from profilefit.scenes.heart import scene as heart
 from profilefit.scenes.sea import scene as sea
 from profilefit.scenes.sea.haze import BROADENED, SCALED, SINGLE, sunlit_haze
 from profilefit.scenes.sea.waves import refracted
+from profilefit.scenes.stage.reference.surface import sees
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import sees
 from profilefit.scenes.stage.world import Camera, Part, Scene
 from profilefit.studies.choose import scenes
 from profilefit.studies.choose.scenes import RandomFur, atlas_need, fur_need, sea_need, steepest_ray

@@ -18,9 +18,9 @@ from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import FACE, head_scene
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw
 from profilefit.scenes.stage.pattern import CHANNELS, KINDS, Sampling
+from profilefit.scenes.stage.reference.step_edge import UNIFORM_SHARE, by_law
+from profilefit.scenes.stage.reference.surface import gathered, seen
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.step_edge import UNIFORM_SHARE, by_law
-from profilefit.scenes.stage.surface import gathered, seen
 from tests.physics.scenes import edges
 from tests.unit.scenes.scenes import refused, scene
 

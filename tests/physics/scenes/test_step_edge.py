@@ -11,11 +11,18 @@ from benchmarks.step_edge import by_uniform
 from mcml_sim import Setting, exact
 from profilefit.errors import SettingError
 from profilefit.laws.gaussians import law_class
-from profilefit.scenes.stage import pattern, step_edge
+from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import KINDS, WRAPS, Sampling
+from profilefit.scenes.stage.reference import step_edge
+from profilefit.scenes.stage.reference.step_edge import (
+    by_quantile,
+    edge_estimate,
+    random_points,
+    shifted_points,
+    step_response,
+)
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.step_edge import by_quantile, edge_estimate, random_points, shifted_points, step_response
 from tests.physics.scenes import edges
 from tests.unit.scenes.scenes import refused
 

@@ -11,8 +11,8 @@ from mcml_sim import Setting, exact
 from profilefit.errors import SettingError
 from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw, exact_table
-from profilefit.scenes.stage.step_edge import step_response
-from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, refined, seen
+from profilefit.scenes.stage.reference.step_edge import step_response
+from profilefit.scenes.stage.reference.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, refined, seen
 from tests.unit.scenes.scenes import refused
 
 FORWARD = np.array([0.0, 0.0, -1.0])

@@ -10,11 +10,11 @@ from mcml_sim import Setting
 from profilefit.scenes.heart.truth import sphere_blur
 from profilefit.scenes.stage.exact_law import DIFFUSE, exact_table
 from profilefit.scenes.stage.judge import surface_judge, whole_judge
+from profilefit.scenes.stage.reference.step_edge import step_response
+from profilefit.scenes.stage.reference.surface import Surface, View, gathered
+from profilefit.scenes.stage.reference.surface_sum import Elements, gaussian_sums
+from profilefit.scenes.stage.reference.whole import _cut, whole_elements
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.step_edge import step_response
-from profilefit.scenes.stage.surface import Surface, View, gathered
-from profilefit.scenes.stage.surface_sum import Elements, gaussian_sums
-from profilefit.scenes.stage.whole import _cut, whole_elements
 from profilefit.scenes.stage.world import INSIDE, Camera, Light, Mesh, Part, Scene
 from tests.unit.scenes.scenes import RADIUS, ball, scene
 

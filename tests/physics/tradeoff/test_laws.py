@@ -12,7 +12,7 @@ from benchmarks.laws import described
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.burley import BurleySampler
-from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
+from profilefit.scenes.stage.reference.step_edge import by_law, by_quantile, edge_estimate, random_points, step_response
 from profilefit.studies.tradeoff import laws, samplers
 from profilefit.studies.tradeoff.laws import YARDSTICK, LawSpec, count, with_samplers
 from profilefit.studies.tradeoff.stopwatch import Rates

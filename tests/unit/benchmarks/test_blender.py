@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import blender, entering
 from mcml_sim import Setting, exact
-from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.reference.step_edge import step_response
 
 DISTANCES = np.array([0.05, 0.3, 2.0, 8.0])
 ENTRIES = {"searchlight": entering.refracted(1.4, 0.0), "diffuse": entering.cosine_weighted()}

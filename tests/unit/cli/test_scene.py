@@ -4,6 +4,7 @@ tests/unit/scenes/toy, and one line: the command reads, draws and judges it.
 
 import io
 import json
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -17,6 +18,7 @@ from mcml_sim import Setting
 from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
+from profilefit.scenes.stage.drawing import RIVALS
 from profilefit.shader import opened
 from tests.fixtures import EXAMPLES, slow
 
@@ -137,6 +139,24 @@ def test_frames_are_numbered_pictures_of_what_moves(done, command, small, tmp_pa
     assert not Path("other").exists()
 
 
+def test_a_sea_moves_from_frame_to_frame(done, tmp_path, monkeypatch, opengl):
+    """The example at a tiny size: in both frames spread beams have a lower error than single scattering."""
+    monkeypatch.setattr("profilefit.scenes.sea.scene.PATHS", 40_000)
+    text = Path(EXAMPLES["sea.toml"]).read_text(encoding="utf-8")
+    tiny = {"resolution": "[12, 9]", "reference_pixel": 1, "vertices": 32, "texels": 64, "slices": 4}
+    for key, number in tiny.items():
+        text = re.sub(rf"^{key} = (\[.*?\]|\d+)", f"{key} = {number}", text, flags=re.MULTILINE)
+    path = tmp_path / "sea.toml"
+    path.write_text(text, encoding="utf-8")
+    told = json.loads(done("scene", path, "--frames", "2", "--fps", "2", "--out", "drawn", "--json", "--quiet"))
+    first, second = (image.imread(f"drawn/sea-000{number}.png")[..., :3] for number in (1, 2))
+    assert first.shape == second.shape == (9, 12, 3)
+    assert np.abs(first - second).max() > 0.02
+    for one in told["frames"]:
+        single = next(rival["rmse"] for rival in one["rivals"] if rival["technique"] == "single")
+        assert one["rmse"] < 0.5 * single  # 0 where the noise of so few paths is larger than the error
+
+
 def test_older_files_are_named_and_no_older_frame_follows_new_ones(command, done, toy, monkeypatch, opengl):
     """Nothing is deleted: the JSON lists the files of its run, a note lists the others, and more frames are refused."""
     folder, ends = Path("drawn"), ("", "-truth", "-error", "-comparison", "-chart")
@@ -166,6 +186,13 @@ def test_frames_of_what_stays_still_are_refused(refused, name):
     said = "--frames must be left out where nothing moves; sea and fur move"
     refused(f"scene {SCENES[name][1]} --frames 2 --out drawn", said)
     assert not Path("drawn").exists()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_picture_of_any_kind_has_two_rivals(name):
+    home = import_module(SCENES[name][0])
+    rivals = [one["kind"] for one in home.drawer.rivals]
+    assert {kind: len({*rivals} - {kind}) >= RIVALS for kind in home.KINDS} == dict.fromkeys(home.KINDS, True)
 
 
 def test_a_reference_has_a_largest_size(command, small):
@@ -331,6 +358,13 @@ def test_it_is_drawn_by_the_command(done, opengl, toy):
     assert picture.shape == truth.shape == (8, 24, 3)
     np.testing.assert_allclose(picture, truth, atol=2 / 255)
     assert np.all(np.diff(truth[0, :, 0]) < 0)
+
+
+def test_what_takes_minutes_is_said_before(done, opengl, toy, monkeypatch):
+    monkeypatch.setattr("tests.unit.scenes.toy.scene.ToyRequest.wait", "it takes [minutes]")
+    words = "scene", toy, "--no-reference", "--out", "drawn", "--json"
+    done(*words, said="it takes [minutes]\nwrote drawn/toy.json, drawn/toy.png\n")
+    done(*words, "--quiet")
 
 
 def test_a_picture_is_larger_than_its_reference(done, opengl, toy):

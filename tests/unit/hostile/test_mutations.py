@@ -53,7 +53,7 @@ from profilefit.report.tables.claims_table import read_claims
 from profilefit.scenes import SCENES
 from profilefit.scenes.heart import scene as heart
 from profilefit.scenes.skin import scene as skin
-from profilefit.scenes.stage.mesh_file import read_mesh
+from profilefit.scenes.stage.subject.mesh_file import read_mesh
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
 from profilefit.studies.choose import requirements

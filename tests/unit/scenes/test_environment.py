@@ -10,7 +10,7 @@ from profilefit.scenes.fur.scene import FurRequest
 from profilefit.scenes.sea.scene import SeaRequest
 from profilefit.scenes.skin.scene import SceneRequest
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.environment import read_map
+from profilefit.scenes.stage.light.environment import read_map
 from profilefit.scenes.stage.world import Light
 from tests.fixtures import refused
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.skin.material import plain
-from profilefit.scenes.stage.environment import (
+from profilefit.scenes.stage.light.environment import (
     Environment,
     even_directions,
     harmonic_irradiance,
 )
-from profilefit.scenes.stage.occlusion import sky_irradiance
+from profilefit.scenes.stage.light.occlusion import sky_irradiance
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet, unit

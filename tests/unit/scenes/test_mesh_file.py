@@ -17,9 +17,9 @@ from mcml_sim.files.whole_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
 from profilefit.scenes.skin import scene as skin
-from profilefit.scenes.stage import mesh_file
-from profilefit.scenes.stage.mesh_file import read_mesh
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.subject import mesh_file
+from profilefit.scenes.stage.subject.mesh_file import read_mesh
 from profilefit.scenes.stage.world import Camera, Scene
 from tests.fixtures import EXAMPLES
 

@@ -12,8 +12,8 @@ from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.judge import srgb_codes, to_srgb
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import world
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import world
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE
 from profilefit.scenes.stage.world import NUMBERS, SURFACE, VECTORS, Camera
 from tests.unit.scenes.scenes import RADIUS, ball, refused, scene

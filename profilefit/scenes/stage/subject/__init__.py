@@ -1,1 +1,1 @@
-"""Head that scenes draw where a file names no mesh: solids of formulas, and eyes."""
+"""Subjects that scenes draw: a head of solids of formulas and eyes, or a mesh of a file."""

@@ -18,10 +18,10 @@ from profilefit.scenes.fur.law import best_exponent, lobe_mean, occlusion, shado
 from profilefit.scenes.fur.passes import BACKGROUND, HITS, Coat, FurSurface, ShadingTable
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays, struck
 from profilefit.scenes.fur.ways import FITTED, LINEAR, QUADRATIC, SWEPT, SWEPT_TWO, WALKED, FurTrial
-from profilefit.scenes.stage.environment import Environment
 from profilefit.scenes.stage.judge import srgb_codes, to_srgb
+from profilefit.scenes.stage.light.environment import Environment
+from profilefit.scenes.stage.reference.surface import averaged
 from profilefit.scenes.stage.renderer import Renderer
-from profilefit.scenes.stage.surface import averaged
 from profilefit.scenes.stage.world import Camera, Light, unit
 from tests.fixtures import slow
 from tests.unit.scenes.scenes import refused

@@ -16,8 +16,8 @@ from profilefit.scenes.heart.meshes import ball, bumps, heart
 from profilefit.scenes.heart.passes import ATLAS, SCREEN, Balanced, gather_of, kernel_of
 from profilefit.scenes.heart.truth import surface_blur
 from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.reference.surface import sees, world
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import sees, world
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene
 from tests.unit.scenes.scenes import refused
 

@@ -176,6 +176,16 @@ def test_laws_are_those_of_a_record_where_there_is_one(monkeypatch):
     assert asked == [(medium, "diffuse") for medium in other.media]
 
 
+def test_a_fit_of_minutes_is_announced():
+    """Only for layers without a record, and of a technique that needs their law; no rival is of that sort."""
+    other = scene.read("head.toml", content("layers.2.thickness", 0.21))
+    said = "fitting the model of these layers takes minutes; profilefit regenerate head.toml --out fits keeps it"
+    by_kind = {kind: other.changed(technique={"kind": kind}).wait for kind in scene.KINDS}
+    assert by_kind == {"stack": said, "table": "", "dipole": "", "half space": "", "none": said}
+    assert scene.read("head.toml", EXAMPLE).wait == ""
+    assert not {one["kind"] for one in scene.drawer.rivals} & {*scene.OF_LAW}
+
+
 @pytest.mark.slow
 def test_the_stack_is_less_wrong_than_its_first_layer_in_every_pose(context, monkeypatch):
     """Error over the mean: 1.1 to 1.4 % by the stack's law were found, and 14 to 16 % by the first layer's dipole.

@@ -30,7 +30,7 @@ from mcml_sim import Setting
 from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.scenes.stage.exact_law import DIFFUSE, FARTHEST, NEAREST, CurveTable, exact_table
-from profilefit.scenes.stage.surface_sum import RINGS, Elements, gaussian_sums, gaussian_weights
+from profilefit.scenes.stage.reference.surface_sum import RINGS, Elements, gaussian_sums, gaussian_weights
 from profilefit.scenes.stage.world import INSIDE, Buffers, Camera
 
 FORWARD = np.array([0.0, 0.0, -1.0])

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from mcml_sim.media.arrays import Floats
-from profilefit.scenes.stage.environment import SkyCells, even_cells, even_directions
-from profilefit.scenes.stage.lighting import SHADOWS, shadow_passes, shadow_uniforms, sphere, text
-from profilefit.scenes.stage.renderer import SUM, Pass, Renderer
+from profilefit.scenes.stage.light.environment import SkyCells, even_cells, even_directions
+from profilefit.scenes.stage.light.lighting import SHADOWS, shadow_passes, shadow_uniforms, sphere
+from profilefit.scenes.stage.renderer import SUM, Pass, Renderer, text
 from profilefit.scenes.stage.world import Scene
 
 PATCHES, SIDE = 256, 1024  # of the sky, and texels of a side of their shadow maps

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
+from profilefit.scenes.stage.reference.surface_sum import Elements
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface_sum import Elements
 from profilefit.scenes.stage.world import Mesh, Part, Scene, unit
 
 MOST = 1 << 21  # triangles

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mcml_sim.media.arrays import Floats
-from profilefit.scenes.stage.environment import Environment
-from profilefit.scenes.stage.renderer import NEAREST, SUM, Pass, Read
+from profilefit.scenes.stage.light.environment import Environment
+from profilefit.scenes.stage.renderer import NEAREST, SUM, Pass, Read, text
 from profilefit.scenes.stage.world import MOST_LAMPS, Camera, Light, Part, Rgb, Scene, looking, orthographic, rgb, unit
-from profilefit.shader.emit import text_beside
 
 IRRADIANCE, OCCLUSION, BACK = "irradiance_map", "occlusion_map", "back_map"
 SHADOWS = ("shadow_map", *(f"shadow_map_{number}" for number in range(2, MOST_LAMPS + 1)))  # of one channel
@@ -129,11 +128,6 @@ def screen_uniforms(camera: Camera, size: tuple[int, int]) -> dict[str, Any]:
     columns, rows = size
     perspective = float(camera.is_perspective)
     return {"size": (float(columns), float(rows)), "pixel": camera.pixel(rows), "perspective": perspective}
-
-
-def text(*files: str) -> str:
-    """Return the sources of GLSL files of the stage, one after the other."""
-    return "".join(text_beside(__name__, f"glsl/{file}") for file in files)
 
 
 def _surface() -> dict[str, Read]:

@@ -24,7 +24,7 @@ from mcml_sim.media.arrays import Floats, require
 from profilefit.errors import InputError
 from profilefit.measured.photo import exposure
 
-HDR, EXR = KINDS = (".hdr", ".exr")  # Radiance's RGBE, and OpenEXR
+KINDS = (".hdr", ".exr")  # Radiance's RGBE, and OpenEXR
 MOST_BYTES, MOST_COLUMNS = 256 << 20, 8192
 MOST_RADIANCE = 1e9  # of a pixel
 ROWS, COLUMNS = 128, 256  # of the cells that pixels are merged into

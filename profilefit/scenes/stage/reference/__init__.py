@@ -1,0 +1,1 @@
+"""References of pictures: exact light over a surface, and at a step edge."""
