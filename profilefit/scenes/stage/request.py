@@ -19,7 +19,9 @@ from profilefit.scenes.stage.world import INSIDE, MOST_LAMPS, Camera, Light, Rgb
 
 MOST_CHART = 8  # numbers of samples
 MOST_SIDE, MOST_RAYS = 4096, 16384  # of a picture [pixels], and rays along a side, as many as OpenGL's maps have texels
-MOST_PIXELS = 2**21  # of a reference: two minutes on two cores for a head that fills half of them
+# Of a reference: two minutes on two cores for a head that fills half of them, and 3.4 GB of memory at 1920 x 1080. Its
+# error takes more of both: 4.4 GB at 1280 x 720.
+MOST_PIXELS = 2**21
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
 LARGEST_VIEW = 1000.0  # [mm]
 FAR_OFF, MARGIN = 3.0, 1.2  # distance to a mesh, and height of its view, in its size
