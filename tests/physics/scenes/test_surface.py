@@ -13,6 +13,7 @@ from profilefit.scenes.skin.law import Separable
 from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw, exact_table
 from profilefit.scenes.stage.reference.step_edge import step_response
 from profilefit.scenes.stage.reference.surface import LEAST_COSINE, Surface, View, exitance_of, gathered, refined, seen
+from tests.fixtures import slow
 from tests.unit.scenes.scenes import refused
 
 FORWARD = np.array([0.0, 0.0, -1.0])
@@ -188,7 +189,7 @@ def test_islands_far_apart():
         np.testing.assert_allclose(found.share[here], own.share, rtol=1e-4)
 
 
-@pytest.mark.parametrize("reflectance", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("reflectance", [*slow(0.0), 0.5, *slow(1.0)])
 def test_even_light_on_even_skin_is_conserved(reflectance):
     found = gathered(flat(12, 24, reflectance, 0.75), VIEW, MFP)
     np.testing.assert_allclose(found.light, 0.75 * reflectance, rtol=1e-14, atol=0.0)
@@ -252,6 +253,7 @@ def test_refined_says_what_coarse_pixels_cost():
     assert 1e-4 < np.max(np.abs(change)) < 0.02
 
 
+@pytest.mark.slow
 def test_a_table_of_ones_own():
     """One that knows its curves by (A - 0.1) / 0.8: the same light as of A itself, but for rounding."""
 
