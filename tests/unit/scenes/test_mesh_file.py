@@ -112,6 +112,43 @@ def test_colours_of_vertices(context, tmp_path, kind, expected):
     np.testing.assert_allclose(seen[..., 0], np.broadcast_to(0.5 * across, (40, 40)), atol=2e-3)
 
 
+CODES = {np.uint8: 255, np.uint16: 65535, np.float32: 1}  # of glTF's colours, and which is 1
+
+
+def coloured(folder: Path, values: np.ndarray, has_material: bool) -> Path:
+    """Write a square whose COLOR_0 has these values: trimesh itself writes 8 bits alone."""
+    square = textured(solid(255, 255, 255))
+    if not has_material:
+        square = trimesh.Trimesh(square.vertices, square.faces, process=False)
+    square.vertex_attributes["_C"] = values
+    path = write(folder, "glb", square)
+
+    def renamed(content):
+        [primitive] = content["meshes"][0]["primitives"]
+        primitive["attributes"]["COLOR_0"] = primitive["attributes"].pop("_C")
+
+    header(path, renamed)
+    return path
+
+
+def replaced(path: Path, value: float, by: float) -> Path:
+    """Change a number in the buffers of a file, whose JSON cannot hold NaN."""
+    path.write_bytes(path.read_bytes().replace(struct.pack("<f", value), struct.pack("<f", by)))
+    return path
+
+
+@pytest.mark.parametrize("has_material", [True, False])
+@pytest.mark.parametrize("code", CODES)
+def test_colours_of_vertices_in_every_code_of_gltf(tmp_path, code, has_material):
+    """Beside a material or not, and as fine as the file has them: trimesh makes 8 bits of them, or none."""
+    given = np.array([[0.5, 0.0, 0.0], [0.01, 0.02, 0.003], [1.0, 1.0, 0.0], [0.0, 0.25, 1.0]])
+    values = np.concatenate([given, np.ones((4, 1))], axis=1) * CODES[code]
+    values = values.astype(code) if code == np.float32 else np.round(values).astype(code)
+    [part] = read_mesh(coloured(tmp_path, values, has_material), 1.0)
+    assert part.colour.reshape(-1, 3).min() == 1.0
+    np.testing.assert_allclose(part.mesh.tint, given, atol=1e-7 if code == np.float32 else 0.51 / CODES[code])
+
+
 def test_units_and_cameras(tmp_path):
     write(tmp_path, "glb", BALL.copy().apply_scale(0.01))
     write(tmp_path, "stl")
@@ -255,6 +292,23 @@ BAD = {
     "many parts": (many_parts, "64 parts at most"),
     "a wide texture": (wide_texture, "8192 pixels of a side"),
     "a texture that unpacks": (bomb, "PNG or JPEG"),
+    "a colour that is not finite": (
+        lambda folder: replaced(coloured(folder, np.full((4, 4), 0.123, np.float32), True), 0.123, np.nan),
+        "finite values of COLOR_0",
+    ),
+    "colours of too few values": (
+        lambda folder: coloured(folder, np.ones((4, 2), np.float32), True),
+        "three or four finite values of COLOR_0",
+    ),
+    "colours of 16 bits in a PLY": (
+        raw(
+            "ply",
+            trimesh.Trimesh(BALL.vertices, BALL.faces, vertex_colors=[9, 9, 9])
+            .export(file_type="ply", encoding="ascii")
+            .replace(b"property uchar red", b"property ushort red"),
+        ),
+        "8 bits or floats, got uint16",
+    ),
     "no triangles": (shape(TRIANGLE, []), "1 ... 2000000 triangles"),
     "points alone": (raw("ply", trimesh.PointCloud(BALL.vertices).export(file_type="ply")), "triangles, got 0"),
     "NaN": (shape([["nan", 0, 0], *TRIANGLE[1:]], [[1, 2, 3]]), "finite coordinates"),

@@ -7,6 +7,7 @@ lie in its folder.
 
 from __future__ import annotations
 
+import json
 import logging
 import struct
 import warnings
@@ -30,6 +31,7 @@ from profilefit.recipes.declared import Declared, Line, OneOf, Refused, words
 from profilefit.scenes.stage.world import EVEN, Mesh, Part, Singles, unit
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+GLTF = (".glb", ".gltf")
 UNITS = {"m": 1000.0, "cm": 10.0, "mm": 1.0, "in": 25.4}  # [mm]
 MOST_BYTES, MOST_JSON = 200 << 20, 32 << 20
 MOST_TRIANGLES, MOST_PARTS, MOST_ENTRIES = 2_000_000, 64, 4096
@@ -38,6 +40,7 @@ MOST_SIDE, MOST_PIXELS = 8192, 1 << 25  # of a texture, and of all textures of a
 LEAST_SIZE, MOST_SIZE = 0.1, 2000.0  # of a mesh [mm]
 MOST_UV = 1e3
 LINEAR = linear(np.arange(256, dtype=np.uint8))
+COLOUR = "_profilefit_COLOR_0"  # trimesh keeps such an attribute as it is, but rounds or loses one named COLOR_0
 MESH = f"a file {', '.join(SUFFIXES)}"
 
 
@@ -98,7 +101,7 @@ class MeshTable(Declared):
                 if key in self.model_fields_set:
                     raise Refused("left out without a mesh", getattr(self, key), key)
             return self
-        is_metric = self.mesh.lower().endswith((".glb", ".gltf")) and "unit" not in self.model_fields_set
+        is_metric = self.mesh.lower().endswith(GLTF) and "unit" not in self.model_fields_set
         factor = self.scale * UNITS["m" if is_metric else self.unit]
         self._parts = read_mesh(Path(str(info.context)).parent / self.mesh, factor, self.mesh)
         return self
@@ -119,8 +122,11 @@ def read_mesh(path: Path, factor: float, name: str = "") -> tuple[FilePart, ...]
     trimesh = library("trimesh")
     folder = _Folder(path, name)
     content = folder.content(path.name)
-    if kind in (".glb", ".gltf"):
-        _require_bounded(_header(content, kind, name), folder, name)
+    if kind in GLTF:
+        header = _header(content, kind, name)
+        _require_bounded(header, folder, name)
+        with _sound(name):
+            content = _renamed(content, kind, header)
     try:
         with _sound(name):
             scene = trimesh.load_scene(BytesIO(content), file_type=kind[1:], resolver=folder, process=False)
@@ -185,7 +191,7 @@ def _mesh(shape: Any, matrix: Floats, kind: str, name: str) -> Mesh:
     normal = unit(np.where((length > 1e-6) & np.isfinite(length), normal, of_face))
     if np.sum((position - position.mean(axis=0)) * normal) < 0:  # inside out
         normal = -normal
-    uv, tint = _uv(shape, used, name), _tint(shape, used, kind)
+    uv, tint = _uv(shape, used, name), _tint(shape, used, kind, name)
     if uv is None:
         return Mesh(position, normal, np.zeros((len(position), 2)), triangles, tint=tint)
     mesh = Mesh(position, normal, uv, triangles, tint=tint)
@@ -226,15 +232,23 @@ def _uv(shape: Any, used: NDArray[np.int64], name: str) -> Floats | None:
     return found
 
 
-def _tint(shape: Any, used: NDArray[np.int64], kind: str) -> Floats | None:
-    """Return colours of vertices, linear: those of glTF are, others are taken for sRGB."""
-    visual = shape.visual
-    colours = visual.vertex_colors if visual.kind == "vertex" else getattr(visual, "vertex_attributes", {}).get("color")
-    every = np.asarray(colours)
-    if every.dtype != np.uint8 or every.ndim != 2 or every.shape[0] != len(shape.vertices) or every.shape[1] < 3:
+def _tint(shape: Any, used: NDArray[np.int64], kind: str, name: str) -> Floats | None:
+    """Return colours of vertices, linear: those of glTF are, others are taken for sRGB. InputError."""
+    if kind in GLTF:
+        if (colours := shape.vertex_attributes.get(COLOUR)) is None:
+            return None
+        most = np.iinfo(colours.dtype).max if colours.dtype.kind == "u" else 1.0
+        is_sound = len(colours) == len(shape.vertices) and colours.shape[1:] in ((3,), (4,))
+        share = colours[used, :3] / most if is_sound else np.array(np.nan)
+        if not np.all(np.isfinite(share)):
+            raise InputError(f"mesh must have three or four finite values of COLOR_0 a vertex, got others in {name}")
+        return np.clip(share.astype(float), 0.0, 1.0)
+    if shape.visual.kind != "vertex":
         return None
-    codes = every[used, :3]
-    return codes / 255.0 if kind in (".glb", ".gltf") else LINEAR[codes].astype(float)
+    kept = shape.metadata.get("_ply_raw", {}).get("vertex", {}).get("properties", {}).get("red", "u1")
+    if np.dtype(kept).kind != "f" and np.dtype(kept).itemsize > 1:  # which trimesh takes for 8 bits
+        raise InputError(f"mesh must have colours of vertices of 8 bits or floats, got {np.dtype(kept)} in {name}")
+    return LINEAR[np.asarray(shape.visual.vertex_colors)[used, :3]].astype(float)
 
 
 class _Painter:
@@ -336,6 +350,22 @@ def _header(content: bytes, kind: str, name: str) -> dict[str, Any]:
     if not isinstance(header, dict):
         raise InputError(f"mesh must be glTF, got {name}, whose JSON is no table")
     return header
+
+
+def _renamed(content: bytes, kind: str, header: dict[str, Any]) -> bytes:
+    """Return a glTF or GLB file whose attributes COLOR_0 are named COLOUR; `header` is its JSON, which is changed."""
+    every = [one["attributes"] for mesh in header.get("meshes", []) for one in mesh["primitives"]]
+    coloured = [attributes for attributes in every if "COLOR_0" in attributes]
+    if not coloured:
+        return content
+    for attributes in coloured:
+        attributes[COLOUR] = attributes.pop("COLOR_0")
+    text = json.dumps(header).encode()
+    if kind == ".gltf":
+        return text
+    text += b" " * (-len(text) % 4)
+    rest = content[20 + struct.unpack("<I", content[12:16])[0] :]
+    return content[:8] + struct.pack("<II4s", 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
 
 
 def _require_bounded(header: dict[str, Any], folder: _Folder, name: str) -> None:
