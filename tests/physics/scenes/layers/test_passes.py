@@ -368,6 +368,16 @@ def test_a_map_of_one_value_is_a_stack_without(few):
 
 
 @pytest.mark.slow
+def test_a_second_layer_s_thickness_is_that_of_a_plain_stack(few):
+    """At a row of its table, whose places are the roots of values; exact light of the plain stack knows no map."""
+    table = table_of((RED,) * 3, ThicknessMap(np.zeros((1, 1)), 0.1, 0.6, 1))
+    first, second, last = RED.layers
+    for d, is_same in ((0.1 + 0.5 * 4.0 / 9.0, True), (0.31, False)):
+        plain = Medium((first, replace(second, thickness=d), last))
+        assert np.all(errors(table, plain, 0, 4.0 / 9.0, "diffuse") < [1e-3, 1e-5, 1e-5]) == is_same
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "accepted"), BETWEEN)
 def test_between_values_of_any_map(kind, accepted):
     """Blood below, melanin on top from none at all, a second layer of another thickness."""
